@@ -46,13 +46,16 @@ control: $(READY)
 demo-control: $(READY)
 	$(BIN)/python tests/demo_control.py --out out/control
 
+# What compilers made of what, which later runs find again.
+KEPT = LINKWISE_TEST_CACHE=$(CURDIR)/.cache/tests TORCHINDUCTOR_CACHE_DIR=$(CURDIR)/.cache/inductor
+
 # Two files of tests at a time.
 test: $(READY)
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not ship"
+	$(KEPT) $(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not ship"
 
 # What leaves the house, as others get it: pages, wheels, CMake's projects, exports, other processors and systems; minutes.
 ship: $(READY)
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m ship
+	$(KEPT) $(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m ship
 
 # What could be wrong without a test, or without `linkwise check`, noticing: hours. Without the latter, MINUTES=30 ends
 # earlier, and the next run goes on from there; ONLY="dynamics runtime/rule" takes rooms.
@@ -126,4 +129,4 @@ embedded: $(READY)
 	$(BIN)/python tests/cortex_m.py
 
 clean:
-	rm -rf out $(VENV)
+	rm -rf out .cache $(VENV)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from linkwise.analysis import analyze
 from linkwise.analysis.show.page import TEMPLATE, page_data, report, view
-from linkwise.emit.render import variables
+from linkwise.render import variables
 from motion_logs import PLANAR3, smooth, write_csv
 from plotly.offline import get_plotlyjs
 

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from linkwise import Options, check_package, generate, read_system, write_package
 from linkwise.check import simulation_checks
-from linkwise.check.contact_checks import HeldContacts
-from linkwise.check.loop_checks import loop_calls
-from linkwise.check.loop_reference import LoopReference, loop_reference
+from linkwise.check.constraint_checks import HeldContacts, loop_calls
 from linkwise.check.parametric_tree import tree_with
 from linkwise.check.simulation_checks import simulated_motion, simulation_calls
-from linkwise.check.states import random_states
+from linkwise.oracle.loop_reference import LoopReference, loop_reference
+from linkwise.oracle.states import random_states
 from linkwise.package.load import Package, load_package
 from linkwise.package.manifest import Manifest
 

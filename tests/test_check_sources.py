@@ -10,24 +10,26 @@ import numpy as np
 import pytest
 from conftest import DATA, needs_compiler
 from linkwise import Options, read_system
-from linkwise.check.body_reference import body_reference
-from linkwise.check.compare import ROUNDINGS, Entries, compare
-from linkwise.check.energy_reference import energy_reference, states_of_energies
-from linkwise.check.frame_reference import frame_calls, frame_reference
-from linkwise.check.latex_reader import LatexReader, Unreadable
-from linkwise.check.magnitudes import Magnitudes
-from linkwise.check.newton_euler import NewtonEuler
-from linkwise.check.packed_layout import IndexRows
+from linkwise.check.compare import ROUNDINGS, Entries, IndexRows, compare
+from linkwise.check.frame_checks import frame_calls, frame_reference
 from linkwise.check.parametric_tree import check_bodies, tree_with
-from linkwise.check.reference import STIFF, Reference, link_sizes
-from linkwise.check.states import States, random_states, states_where
-from linkwise.check.text_lagrangian import TextLagrangian
-from linkwise.check.text_reader import NAMES, NUMPY, TextFormula, torch_functions
-from linkwise.check.torque_reference import states_of_torques, torque_reference
-from linkwise.emit.definition import rigid_tree
 from linkwise.expression.expression_graph import FUNCTIONS
+from linkwise.oracle.energies import TextLagrangian, energy_reference, states_of_energies
+from linkwise.oracle.formula_text import NAMES, NUMPY, LatexReader, TextFormula, Unreadable, torch_functions
+from linkwise.oracle.magnitudes import Magnitudes
+from linkwise.oracle.newton_euler import NewtonEuler
+from linkwise.oracle.reference import (
+    STIFF,
+    Reference,
+    body_reference,
+    link_sizes,
+    states_of_torques,
+    torque_reference,
+)
+from linkwise.oracle.states import States, random_states, states_where
 from linkwise.package.entries import JointEntry
 from linkwise.package.manifest import EnergyEntry, Manifest
+from linkwise.symbolic.definition import rigid_tree
 
 LEG, TURNTABLE = str(DATA / "leg.toml"), str(DATA / "turntable.py")
 EPSILON = 2.0**-52

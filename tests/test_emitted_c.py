@@ -17,7 +17,7 @@ from answers import random_states, relative_error
 from compiled import Compiled, check_syntax, compile_library, library_of, link_parts, name_of
 from conftest import DATA, PANDA, needs_compiler
 from linkwise import Coordinate, LinkEnergy, Options, energy_system, generate, read_system, write_package
-from linkwise.check.newton_euler import NewtonEuler
+from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 from needed import missing

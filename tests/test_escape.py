@@ -25,9 +25,9 @@ from linkwise.analysis.result_columns import columns_of
 from linkwise.analysis.show import figure_png
 from linkwise.analysis.show.page import report
 from linkwise.analysis.term_rows import term_rows
-from linkwise.emit.render import render
 from linkwise.package.load import import_package
 from linkwise.plotstyle import drawn
+from linkwise.render import render
 from markdown_it import MarkdownIt
 from motion_logs import PLANAR3, smooth, write_csv
 from test_names import chain

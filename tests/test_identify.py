@@ -24,13 +24,13 @@ from linkwise import (
 )
 from linkwise.analysis import Lowpass, Processing, Reading
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
-from linkwise.check.newton_euler import NewtonEuler
 from linkwise.cli.app import app
 from linkwise.identification.base_parameters import base_parameters
 from linkwise.identification.identified_files import page
 from linkwise.identification.identified_robot import identified_robot
 from linkwise.identification.pseudo_inertia import pseudo_inertia
 from linkwise.identification.urdf_file import urdf_text
+from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 from linkwise_runtime.rule.joint_tree import Bodies

@@ -20,7 +20,7 @@ from linkwise.check import check_package
 from linkwise.cli.app import app
 from linkwise.emit.backend import BACKENDS
 from linkwise.emit.c.loop_costs import decomposition_cost, link_costs
-from linkwise.emit.kernel_choice import check_size, chosen_kernel
+from linkwise.kernel_choice import check_size, chosen_kernel
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 from needed import needs
@@ -304,7 +304,7 @@ def test_the_header_says_how_much_stack_it_takes(robot: str, kernel: str, tmp_pa
 
 
 def test_formulas_asked_for_by_name_are_derived(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("linkwise.emit.kernel_choice.MOST_STRAIGHT", 0)
+    monkeypatch.setattr("linkwise.kernel_choice.MOST_STRAIGHT", 0)
     kernels = {
         backend: json.loads(generate(read_system("planar3"), [backend])["manifest.json"])["kernel"]
         for backend in ("formulas", "numpy", "c")

@@ -113,7 +113,7 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
         "tree.frames has 'base' twice",
     ),
     "frame on nothing": (
-        lambda data: data["tree"]["frames"][0].update(body=2),
+        lambda data: data["tree"]["frames"][0].update(joint=2),
         "frame 0 of the tree is on a body that is not there",
     ),
     "mirrored frame": (
@@ -121,7 +121,7 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
         "the rotation of frame 0 of the tree is not a rotation",
     ),
     "frame of a link": (
-        lambda data: data["tree"]["frames"][2].update(body=0),
+        lambda data: data["tree"]["frames"][2].update(joint=0),
         "tree.frames has no frame 'link2' on the body of that link",
     ),
     "formula of no frame": (

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 import sympy as sp
-from linkwise.emit.render import render, variables
 from linkwise.errors import LinkwiseError
 from linkwise.escape import printable
 from linkwise.progress import silent
+from linkwise.render import render, variables
 from linkwise.report import (
     DerivationTime,
     TermQuery,

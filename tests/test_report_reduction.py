@@ -12,10 +12,10 @@ import pytest
 import sympy as sp
 from linkwise.dynamics.derive import derive
 from linkwise.dynamics.kernel import decomposition_cost
-from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError
 from linkwise.plotstyle import styled
 from linkwise.progress import silent
+from linkwise.render import render
 from linkwise.report import (
     PAPER,
     CurvePoint,

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 from linkwise import Options, read_system
-from linkwise.emit.definition import rigid_tree
 from linkwise.robot.robot import Robot
+from linkwise.symbolic.definition import rigid_tree
 from linkwise.symbolic.system import RigidSystem, rigid_system
 from urdf_text import joint, link, robot
 

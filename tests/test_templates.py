@@ -11,10 +11,10 @@ import sympy as sp
 import urdf_text
 from conftest import DATA
 from linkwise import Coordinate, LinkEnergy, Options, energy_system, generate, read_system
+from linkwise import render as rendering
 from linkwise.emit import autograd, closed_forms, formula_page, shared_texts, tree_file
-from linkwise.emit import render as rendering
 from linkwise.emit.c import loops, sources
-from linkwise.emit.render import render, variables
+from linkwise.render import render, variables
 from urdf_text import joint
 
 ROBOTS = (

@@ -99,7 +99,8 @@ _ROOM_OF = {
     "run_study": "study",
     "write_package": "package.write",
 }
-"""A room is imported when one of its names is first used, and SymPy, NumPy and SciPy not before."""
+"""Package of each name, imported when one of its names is first used, and SymPy, NumPy and SciPy not
+before."""
 
 
 def __dir__() -> list[str]:

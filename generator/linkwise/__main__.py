@@ -30,10 +30,10 @@ def main() -> None:
 
 
 def _heed_one_interrupt() -> None:
-    """Have the first Ctrl-C decide: others, while all is tidied up, would break that off, with tracebacks.
+    """Let the first Ctrl-C decide: others, while all is tidied up, would break that off, with tracebacks.
 
-    Where a library has swallowed it, one is heeded again when the end is overdue. Whoever started this
-    program with Ctrl-C ignored, or has a way of their own with it, keeps that.
+    Where a library has swallowed it, another one counts again when the end is overdue. A program that was
+    started with Ctrl-C ignored, or with a handler of its own, keeps that.
     """
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         return
@@ -49,7 +49,7 @@ def _heed_one_interrupt() -> None:
 
 
 def _open_closed() -> None:
-    """Have streams that the caller closed lead nowhere: a file opened later would get their numbers.
+    """Open streams that the caller closed to nowhere: a file opened later would get their numbers.
 
     Python has None for them, and prints what is meant for stderr to stdout.
     """

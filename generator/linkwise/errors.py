@@ -1,4 +1,4 @@
-"""The one error that a user's mistake raises."""
+"""The error that a user's mistake raises, and the warning for what may affect a result."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,4 +18,4 @@ def within(place: str) -> Iterator[None]:
 
 
 class LinkwiseWarning(UserWarning):
-    """What a user is to know before they trust a result; the command line tells it in a line."""
+    """A warning that a user must know before trusting a result; the command line prints it in one line."""

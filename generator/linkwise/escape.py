@@ -1,4 +1,4 @@
-"""Text from a file made fit for where it goes: one function for each kind of place, and no other escaping.
+"""Escaping of text from a file for where it goes: one function for each kind of place, and no other escaping.
 
 Names of robots, links, joints, parameters and columns are any text. Where code needs a name, it is made by
 `identifiers`; everywhere else the text itself is shown, such that it can neither end the place where it
@@ -16,10 +16,10 @@ from urllib.parse import quote
 LONGEST_NAME = 60
 """Characters of a name that a comment, a list or a file's name shows."""
 MARKUP = re.compile(r"(?<![0-9A-Za-z])_|_(?![0-9A-Za-z])|[\\`*\[\]|~$#^!:<>&]")
-"""What Markdown may take for markup; an underscore within a word is none."""
+"""Characters that Markdown may take for markup; an underscore within a word is none."""
 ENTITIES = {"<": "&lt;", ">": "&gt;", "&": "&amp;"}
 ENDING = re.compile(r"[_-](joint|link)$", re.IGNORECASE)
-"""What names of joints and links often end in."""
+"""Common endings of the names of joints and links."""
 GREEK = re.compile(
     "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|iota|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|upsilon|phi|chi"
     "|psi|omega|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Upsilon|Phi|Psi|Omega"
@@ -28,7 +28,7 @@ GREEK = re.compile(
 
 
 def printable(text: str, shows: Callable[[str], bool] = str.isprintable) -> str:
-    r"""Plain text on one line: what cannot be seen, or turns what follows, is written \n, \x1b or \u202e.
+    r"""Return plain text on one line: the unseen, or what turns what follows, as \n, \x1b or \u202e.
 
     `shows` says of a character whether it can be shown as it is.
     """
@@ -36,12 +36,12 @@ def printable(text: str, shows: Callable[[str], bool] = str.isprintable) -> str:
 
 
 def one_line(text: str, most: int) -> str:
-    """A message as one printable line of at most `most` characters, its middle left out if it is longer."""
+    """Return a message as one printable line of at most `most` characters, its middle left out if longer."""
     return short(printable(re.sub(r"\s*[\r\n]\s*", " ", text.strip())), most)
 
 
 def short(text: str, most: int = 24) -> str:
-    """The text, its middle left out where it is longer than `most`: exporters number names at their end."""
+    """Return the text, its middle left out if longer than `most`: exporters number names at their end."""
     if len(text) <= most:
         return text
     tail = (most - 1) // 2
@@ -49,9 +49,9 @@ def short(text: str, most: int = 24) -> str:
 
 
 def without_ending(names: Sequence[str]) -> tuple[str, ...]:
-    """The names without the "_joint", or "_link", that all end in.
+    """Return the names without the ending "_joint", or "_link", if all have it.
 
-    As they are where one has no such ending, or would be empty or another's without.
+    Otherwise they stay as they are, also where one would be empty or another's without it.
     """
     bare = tuple(ENDING.sub("", name) for name in names)
     cut = all(map(ENDING.search, names)) and all(bare) and len(set(bare)) == len(bare)
@@ -59,30 +59,33 @@ def without_ending(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def listed(items: Iterable[object], most: int = 8, longest: int = LONGEST_NAME) -> str:
-    """A list in a message: "a, b, c and 212 more", items beyond `longest` shortened."""
+    """Return a list for a message: "a, b, c and 212 more", items beyond `longest` shortened."""
     texts = [short(str(item), longest) for item in items]
     more = f" and {len(texts) - most} more" if len(texts) > most else ""
     return f"{', '.join(texts[:most])}{more}"
 
 
 def markdown(text: str) -> str:
-    """A phrase or a table's cell of Markdown, in the dialects with tables, formulas and emoji too."""
+    """Return text for a phrase or table cell of Markdown, in dialects with tables, formulas or emoji too."""
     return MARKUP.sub(lambda found: ENTITIES.get(found[0], f"\\{found[0]}"), printable(text))
 
 
 def html_text(text: str) -> str:
-    """Text or a quoted attribute of HTML."""
+    """Return text, or a quoted attribute, for HTML."""
     return html.escape(printable(text))
 
 
 def script_data(data: Any) -> str:
-    """JSON as the content of an HTML `script` element, which nothing in it can end; raises for NaN."""
+    """Return JSON as the content of an HTML `script` element, which nothing in it can end.
+
+    Raises ValueError for NaN.
+    """
     text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return re.sub("[<>&]", lambda found: _unicode(found[0]), text)
 
 
 def json_text(data: Any, indent: int | None = None) -> str:
-    """JSON to read, in a file or on a terminal: letters as they are, the unprintable as JSON's escapes.
+    """Return JSON to read, in a file or on a terminal: letters as they are, the unprintable as escapes.
 
     Raises ValueError for NaN and infinity, which JSON does not have.
     """
@@ -92,30 +95,33 @@ def json_text(data: Any, indent: int | None = None) -> str:
 
 
 def python_literal(text: str) -> str:
-    """A string literal of Python in ASCII; in quotes, it also names something in plain text."""
+    """Return a string literal of Python in ASCII; in quotes, it also names something in plain text."""
     return ascii(text)
 
 
 def python_docstring(text: str) -> str:
-    '''A quoted name within a docstring between """.'''
+    """Return a quoted name for a docstring, which no quote or backslash in it can end."""
     return re.sub(r'[\\"]', r"\\\g<0>", ascii(text))
 
 
 def c_comment(text: str) -> str:
-    """A quoted name within a comment of C: in ASCII, no comment's start or end nor trigraph in it."""
+    """Return a quoted name for a comment of C: in ASCII, no comment's start or end nor trigraph in it."""
     literal = ascii(text)
     literal = literal if len(literal) <= LONGEST_NAME else f"{literal[:LONGEST_NAME]}..."
     return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", literal)
 
 
 def c_string(text: str) -> str:
-    """A string literal of C in ASCII: its bytes are the name in UTF-8; neither trigraph nor comment in it."""
+    """Return a string literal of C in ASCII, whose bytes are the name in UTF-8.
+
+    There is neither a trigraph nor a comment in it.
+    """
     plain = "".join(chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode())
     return '"{}"'.format(plain.replace("/*", "\\057*").replace("*/", "*\\057"))
 
 
 def latex_symbol(identifier: str) -> str:
-    """An identifier in a formula of LaTeX: its first letters, and the rest as their index, literally."""
+    """Return an identifier in LaTeX: its first letters, and the rest as their index, literally."""
     head = re.match("[A-Za-z]*", identifier)[0]  # type: ignore[index]
     index = identifier[len(head) :].removeprefix("_")
     upright = f"\\{head}" if GREEK.fullmatch(head) else head if len(head) == 1 else f"\\mathrm{{{head}}}"
@@ -124,7 +130,7 @@ def latex_symbol(identifier: str) -> str:
 
 
 def identifiers(names: Sequence[str], prefix: str, taken: Iterable[str] = ()) -> list[str]:
-    """Names for code, of Python and of C alike: ASCII letters, digits and _ behind a prefix, told apart.
+    """Return distinct names for code, of Python and of C alike: ASCII letters, digits and _ after a prefix.
 
     Compilers need not tell more than 63 characters apart.
     """
@@ -142,12 +148,12 @@ def identifiers(names: Sequence[str], prefix: str, taken: Iterable[str] = ()) ->
 
 
 def column_part(text: str) -> str:
-    """A part, between slashes, of a table's column name: printable, different for different texts."""
+    """Return a part, between slashes, of a table's column name: printable, different for different texts."""
     return "".join(c if c.isprintable() and c not in "%/" else _percent(c) for c in text)
 
 
 def file_name(text: str) -> str:
-    """A part of a file's name in ASCII, different for different texts, without separators, not long."""
+    """Return a part of a file's name in ASCII, different for different texts, short, without separators."""
     safe = _percent(text)
     if len(safe) <= LONGEST_NAME:
         return safe
@@ -155,7 +161,7 @@ def file_name(text: str) -> str:
 
 
 def file_names(names: Iterable[str]) -> list[str]:
-    """The same names, numbered where one would be another's on a file system that takes A for a."""
+    """Return the names, numbered where two would be one on a file system that takes A for a."""
     used: set[str] = set()
     made = []
     for name in names:
@@ -169,15 +175,15 @@ def file_names(names: Iterable[str]) -> list[str]:
 
 
 def _escape(character: str) -> str:
-    """As Python writes it in a string."""
+    """Return a character as Python writes it in a string."""
     return character.encode("unicode_escape").decode("ascii")
 
 
 def _percent(text: str) -> str:
-    """As an address writes it."""
+    """Return a text as an address on the web writes it."""
     return quote(text, safe="", errors="surrogatepass")
 
 
 def _unicode(character: str) -> str:
-    """As JSON and JavaScript write it in a string."""
+    """Return a character as JSON and JavaScript write it in a string."""
     return json.dumps(character)[1:-1] if not character.isascii() else f"\\u{ord(character):04x}"

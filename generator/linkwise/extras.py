@@ -27,7 +27,8 @@ BROUGHT_BY = {
 """The extra of pyproject.toml that installs each library."""
 
 LEAST_ADDRESSES = {"numpy": 4 * 10**8, "pyarrow": 10**9, "torch": 10**9}
-"""Bytes; with fewer, these may end the process in the midst of their work, and say nothing of memory."""
+"""Least bytes of address space: with fewer, these may end the process in the midst of their work, and say
+nothing of memory."""
 
 
 def extra(module: str) -> Any:
@@ -43,10 +44,10 @@ def extra(module: str) -> Any:
 
 
 def spare_addresses(library: str) -> None:
-    """Have libraries reserve few addresses where these are bounded, as by `ulimit -v`.
+    """Make libraries reserve few addresses where these are bounded, as by `ulimit -v`.
 
-    Arrow reserves a gigabyte otherwise, and OpenBLAS, when NumPy is imported, some for each thread.
-    Raises LinkwiseError where they are too few for this library at all.
+    Arrow reserves a gigabyte otherwise, and OpenBLAS, when NumPy is imported, some for each thread. Raises
+    LinkwiseError where they are too few for this library at all.
     """
     with suppress(ImportError):  # Windows, which has no such bound
         resource: Any = importlib.import_module("resource")

@@ -1,4 +1,4 @@
-"""A file that a user names, before it is opened: one that is there, and that has an end."""
+"""Checks of a file that a user names, before it is opened: it must be there, and have an end."""
 
 import os
 import stat
@@ -18,8 +18,8 @@ KINDS = {
 def require_file(path: Path, missing: str = "no such file", wanted: str = "a file") -> None:
     """Raise LinkwiseError, without the path, unless `path` is a regular file or a link to one.
 
-    Whatever else can be opened may never end, or keep its reader waiting. `missing` is said where nothing
-    is; `wanted` is what else to give.
+    Whatever else can be opened may never end, or keep its reader waiting. `missing` is the message where
+    nothing is; `wanted` is what else to give.
     """
     try:
         mode = path.stat().st_mode
@@ -27,7 +27,7 @@ def require_file(path: Path, missing: str = "no such file", wanted: str = "a fil
         raise LinkwiseError(missing) from error
     except OSError as error:
         raise LinkwiseError(f"cannot be read: {error.strerror}") from error
-    except ValueError as error:  # a zero byte
+    except ValueError as error:  # a path with a zero byte
         raise LinkwiseError(f"cannot be read: {error}") from error
     if not stat.S_ISREG(mode):
         pipe = ", which cannot be read twice" if stat.S_ISFIFO(mode) else ""
@@ -35,12 +35,12 @@ def require_file(path: Path, missing: str = "no such file", wanted: str = "a fil
 
 
 def kind_of(mode: int) -> str:
-    """What is no regular file, in words."""
+    """Return in words the kind of a file that is not regular."""
     return KINDS.get(stat.S_IFMT(mode), "not a file")
 
 
 def is_file(path: Path) -> bool:
-    """Whether `path` is a regular file, for any text that might be a path."""
+    """Return whether `path` is a regular file, for any text that might be a path."""
     try:
         require_file(path)
     except LinkwiseError:
@@ -49,7 +49,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_inside(path: Path, folder: Path) -> bool:
-    """Whether `path` lies somewhere in `folder`, whatever either is called: by links, or in other letters."""
+    """Return whether `path` lies somewhere in `folder`, also by links or with letters in another case."""
     parents = Path(os.path.realpath(path)).parents
     if folder.exists():
         return any(parent.exists() and parent.samefile(folder) for parent in parents)
@@ -57,6 +57,6 @@ def is_inside(path: Path, folder: Path) -> bool:
 
 
 def is_same(path: Path, other: Path) -> bool:
-    """Whether two paths are of one file, or will be."""
+    """Return whether two paths are of one file, or will be."""
     there = path.exists() and other.exists()
     return path.samefile(other) if there else path.resolve() == other.resolve()

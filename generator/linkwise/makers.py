@@ -1,4 +1,4 @@
-"""What packages are made by: every file of linkwise counts, for whoever changes one.
+"""Files that packages are made by: a change in any file of linkwise counts.
 
 For an upgrade there is the record that installers keep of a version: its path has the version in it, and so
 is gone afterwards, whatever times the new files bring along. The same goes for SymPy, and for MuJoCo where it
@@ -15,13 +15,13 @@ from pathlib import Path
 SUFFIXES = (".py", ".j2", ".toml", ".h", ".c")
 HOMES = ("linkwise", "linkwise.templates", "linkwise_runtime")
 BUILT = "build"
-"""Where building the runtime's own wheel leaves a copy of it."""
+"""Folder where building the runtime's own wheel leaves a copy of it."""
 MAKERS = ("linkwise", "sympy", "mujoco")
 
 
 @cache
 def fingerprint() -> str:
-    """Hash of linkwise's own files by content: the same on every machine that has this linkwise."""
+    """Return the hash of linkwise's own files by content: the same on every machine with this linkwise."""
     digest = sha256()
     for path in _own_files():
         digest.update(path.read_bytes())
@@ -40,7 +40,7 @@ def _own_files() -> tuple[Path, ...]:
 
 
 def generator_files() -> Iterator[str]:
-    """Paths of linkwise's own files, and of the records of what took part."""
+    """Yield the paths of linkwise's own files, and of the records of the packages that took part."""
     yield from (path.as_posix() for path in _own_files())
     for name in MAKERS:
         if name in sys.modules:
@@ -49,7 +49,7 @@ def generator_files() -> Iterator[str]:
 
 @cache
 def _record(distribution: str) -> tuple[str, ...]:
-    """METADATA of an installed package; nothing of one that was never installed.
+    """Return the paths of METADATA of an installed package; none for one that was never installed.
 
     Beside the record there may be what setuptools leaves in a source tree, which has none.
     """

@@ -1,4 +1,4 @@
-"""Work that a fault of compiled code may end, or that may not end, done in a process of its own."""
+"""Work in a process of its own, where a fault of compiled code may end it, or where it may not end."""
 
 import faulthandler
 import os
@@ -16,36 +16,39 @@ from linkwise_runtime.native.native_system import system_here
 T = TypeVar("T")
 
 ON_THE_CLOCK = 10
-"""Seconds of the clock for each of processor time: so much slower is a machine that many share."""
+"""Seconds of the clock for each of processor time: a machine that many share is so much slower."""
 
 
 class Ended(Exception):
-    """The process ended before it answered; the message says by what."""
+    """Error where the process ended before it answered; the message says by what."""
 
 
 class OutOfTime(Ended):
-    """It took more time than it had."""
+    """Error where the work took more time than it had."""
 
 
 @dataclass(frozen=True)
 class ProcessLimits:
-    """What work may take: s of processor time, and bytes of memory beyond what this process holds."""
+    """Limits of work: s of processor time, and bytes of memory beyond what this process holds."""
 
     seconds: int
     memory: int
 
 
 def in_own_process(work: Callable[[], T], limits: ProcessLimits | None = None) -> T:
-    """Answer of `work`, from a fork of this process; raises Ended where a signal ends that one.
+    """Return the answer of `work`, from a fork of this process; raises Ended where a signal ends that one.
 
-    What `work` raises comes back too, a MemoryError where it wants more than the limits have. Where a fork
-    cannot compute, it is done in this process, without limits.
+    Whatever `work` raises is raised here too, a MemoryError where it needs more than the limits have. Where a
+    fork cannot compute, it is done in this process, without limits.
     """
     return begun(work, limits)()
 
 
 def begun(work: Callable[[], T], limits: ProcessLimits | None = None) -> Callable[[], T]:
-    """The same, of which the answer is waited for later: by calling what this returns, once."""
+    """Start `work` as `in_own_process` does, and return a call that waits for its answer.
+
+    It is to be called once, and raises as `in_own_process` does.
+    """
     if not system_here().forks:
         return work
     reader, writer = os.pipe()
@@ -80,7 +83,7 @@ def _waited(child: int, reader: int, limits: ProcessLimits | None) -> Any:
 
 
 def _answer(work: Callable[[], T], writer: int, limits: ProcessLimits | None) -> None:
-    """Write what `work` gives or raises, and end this process without more ado."""
+    """Write what `work` gives or raises, and end this process at once."""
     faulthandler.disable()  # the parent tells by what signal it ended, in a line
     try:
         if limits:
@@ -96,15 +99,15 @@ def _answer(work: Callable[[], T], writer: int, limits: ProcessLimits | None) ->
 
 
 def _hold(limits: ProcessLimits) -> None:
-    """Have the system end this process, or refuse it memory, where it would take more than the limits."""
-    import resource  # is there where forks are
+    """Make the system end this process, or refuse it memory, where it would take more than the limits."""
+    import resource  # available wherever forks are
 
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # what C++ says of its end; the parent says it in a line
     for number in (signal.SIGXCPU, signal.SIGALRM):
         signal.signal(number, signal.SIG_DFL)
     signal.alarm(ON_THE_CLOCK * limits.seconds)
     most = {resource.RLIMIT_CORE: 0, resource.RLIMIT_CPU: limits.seconds}
-    with suppress(OSError):  # no /proc, as on BSD: there the limit would not be of memory that is mapped
+    with suppress(OSError):  # no /proc, as on BSD, where the limit would not count mapped memory
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5])
         most[resource.RLIMIT_DATA] = pages * resource.getpagesize() + limits.memory
     for kind, wanted in most.items():

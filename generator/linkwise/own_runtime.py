@@ -1,4 +1,4 @@
-"""The runtime that linkwise brings along, and works with: its own, and no other."""
+"""The runtime that linkwise brings along and works with: its own, and no other."""
 
 from contextlib import suppress
 from functools import cache

@@ -1,4 +1,4 @@
-"""A package of a robot's file, for who has none yet: made once, and kept in the user's cache.
+"""A package of a robot's file, for users who have none yet: made once, and kept in the user's cache.
 
 It is made again when the file changes or one that it includes, or linkwise itself.
 """
@@ -22,15 +22,15 @@ from linkwise.robot import Options, is_description, robot_files
 from linkwise.robot.notes import effects
 
 USUAL = ("numpy", "native")
-"""Back ends that an analysis asks for by itself."""
+"""Back ends that an analysis asks for by default."""
 WARNINGS = "warnings.json"
 
 
 @dataclass(frozen=True)
 class KeptPackage:
-    """A package, and what touches the torques of the robot that it was made of.
+    """A package, and warnings of what affects the torques of the robot that it was made of.
 
-    It stands where the path of a package may: `analyze(log, kept_package(file))`.
+    It may stand wherever the path of a package may: `analyze(log, kept_package(file))`.
     """
 
     directory: Path
@@ -46,10 +46,10 @@ def kept_package(
     options: Options | None = None,
     progress: Progress = silent,
 ) -> KeptPackage:
-    """The package itself where `robot` is a directory; else that of the robot's file or built-in robot.
+    """Return the package itself where `robot` is a directory; else that of a robot's file or built-in robot.
 
-    Made for `backend`, or for those of analyses if not given. Raises LinkwiseError for a file that cannot be
-    read or generated, for options of a package, and for a cache that cannot be written.
+    It is made for `backend`, or for those of analyses if not given. Raises LinkwiseError for a file that
+    cannot be read or generated, for options of a package, and for a cache that cannot be written.
     """
     options = options or Options()
     if Path(robot).is_dir() or not (is_description(robot) or Path(robot).is_file()):
@@ -68,7 +68,7 @@ def kept_package(
 
 
 def _all_kept() -> Path:
-    """The folder of all packages, made if need be; raises RuntimeError where it cannot be."""
+    """Return the folder of all packages, made if need be; raises RuntimeError where it cannot be."""
     kept = cache_directory() / "packages"
     try:
         kept.mkdir(exist_ok=True)
@@ -94,7 +94,7 @@ def _kept(
 
 
 def _key(robot: str | Path, backends: Sequence[str], options: Options) -> str:
-    """Hash of all that the package depends on."""
+    """Return the hash of all that the package depends on."""
     return hashlib.sha256("\0".join(_parts(robot, backends, options)).encode()).hexdigest()[:32]
 
 
@@ -102,12 +102,12 @@ def _parts(robot: str | Path, backends: Sequence[str], options: Options) -> Iter
     yield from (Path(robot).name, *backends, repr(options))
     for path in robot_files(robot, options):
         if path.is_file():
-            # What no package could be made of is left to its reader to refuse, at once.
+            # A file too large for a package is left to its reader to refuse, at once.
             yield _told(path) if is_too_large(path) else hashlib.sha256(path.read_bytes()).hexdigest()
     yield from map(_told, map(Path, generator_files()))
 
 
 def _told(path: Path) -> str:
-    """What changes when a file does, without reading it."""
+    """Return a text that changes when a file does, without reading it."""
     found = path.stat()
     return f"{path} {found.st_size} {found.st_mtime_ns}"

@@ -18,14 +18,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from linkwise.constraints.constrained_system import constrained_system
 from linkwise.dynamics.derive import Method, derive
 from linkwise.emit.assemble import checked_identifier, package_files
 from linkwise.emit.backend import BackendFiles, chosen_backends, usual_backends
-from linkwise.emit.constrained_system import constrained_system
 from linkwise.emit.derivation import Derivation
-from linkwise.emit.kernel_choice import check_size, chosen_kernel
 from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import is_file
+from linkwise.kernel_choice import check_size, chosen_kernel
 from linkwise.package.entries import KernelKind
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, read_robot, told_name
@@ -37,12 +37,15 @@ PYTHON = ".py"
 
 
 def is_program(spec: str | Path) -> bool:
-    """Whether a robot is a Python file of energies, which is run to read it."""
+    """Return whether a robot is a Python file of energies, which is run to read it."""
     return Path(spec).suffix == PYTHON and is_file(Path(spec))
 
 
 def read_system(spec: str | Path, options: Options | None = None) -> System:
-    """System of a built-in robot, a robot's file, or a Python file of energies; raises LinkwiseError."""
+    """Return the system of a built-in robot, a robot's file, or a Python file of energies.
+
+    Raises LinkwiseError.
+    """
     options = options or Options()
     if is_program(spec):
         with within(str(spec)):
@@ -60,7 +63,7 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
 
 @dataclass(frozen=True)
 class PackagePlan:
-    """A package that can be made: what of, with which back ends, and how it was asked for.
+    """A package that can be made: its system, its back ends, and how it was asked for.
 
     kernel: the kind that was chosen
     name: of the package
@@ -76,7 +79,7 @@ class PackagePlan:
     vendor_runtime: bool
 
     def files(self, progress: Progress = silent) -> dict[str, str]:
-        """Files of the package, {path inside the package: text}."""
+        """Return the files of the package, {path inside the package: text}."""
         kernels = derive(self.system, progress, self.derivation) if self.kernel == "straight" else ()
         derivation = Derivation(self.system, kernels, self.name, self.request, self.vendor_runtime)
         return package_files(derivation, self.backends, progress)
@@ -90,7 +93,7 @@ def plan(
     derivation: Method = "rule",
     vendor_runtime: bool = False,
 ) -> PackagePlan:
-    """What `generate` does with the same arguments, before anything is derived; raises as it does."""
+    """Return what `generate` does with the same arguments, before anything is derived; raises as it does."""
     asked = None if backends is None else (backends,) if isinstance(backends, str) else tuple(backends)
     system = constrained_system(rigid_system(robot) if isinstance(robot, Robot) else robot)
     kind = chosen_kernel(system, kernel, asked, derivation)
@@ -117,13 +120,13 @@ def generate(
     derivation: Method = "rule",
     vendor_runtime: bool = False,
 ) -> dict[str, str]:
-    """Files of a package, {path inside the package: text}.
+    """Return the files of a package, {path inside the package: text}.
 
     `backends`, several or one, are all that the robot can have if not given. `kernel` is straight, loops, or
     auto, which chooses by the robot's size; with loops no closed forms are derived, and `formulas` are not
-    there. `derivation` says how those of rigid links are: rule, which is cheaper, or energy, by
-    Euler-Lagrange from SymPy energies. With `vendor_runtime` the package carries a copy of what it imports of
-    linkwise_runtime, and stands alone.
+    there. `derivation` says how closed forms of rigid links are derived: rule, which is cheaper, or energy,
+    by Euler-Lagrange from SymPy energies. With `vendor_runtime` the package carries a copy of what it imports
+    of linkwise_runtime, and stands alone.
 
     The manifest keeps these arguments, and the options that the robot was read with: how to make the package
     again. Raises LinkwiseError for a name, back end or kernel that cannot be, before anything is derived.

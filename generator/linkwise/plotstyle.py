@@ -1,4 +1,4 @@
-"""How every plot looks: legible on paper, in grey and to the colour-blind; the same on each run."""
+"""Style of every plot: legible on paper, in grey and to the colour-blind; the same on each run."""
 
 import io
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from linkwise.extras import extra
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31")
 VERMILION, BLUE, GREEN, PURPLE, _, SKY, BROWN = COLOURS
 ON_DARK = ("#FF8B3D", "#3D9BE0", "#2ECC9B", "#E59AC7", "#F5B942", "#9BDCFF", "#C9A66B")
-"""The same colours, light enough for a dark page."""
+"""Colours like COLOURS, light enough for a dark page."""
 
 GRAVITY = "#7F7F7F"
 INK, PALE = "#222222", "#E0E3E7"
@@ -47,24 +47,24 @@ SETTINGS = {
 
 
 def colour(index: int) -> str:
-    """Colour of the index-th joint, link or cause."""
+    """Return the colour of the index-th joint, link or cause."""
     return COLOURS[index % len(COLOURS)]
 
 
 def tone(index: int) -> str:
-    """The same for areas, which have no dashes: darker where the colours begin again, and then paler."""
+    """Return the colour of an area, which has no dashes: darker where the colours begin again, then paler."""
     toward, much = ((0, 0.0), (0, 0.45), (255, 0.45))[index // len(COLOURS) % 3]
     parts = (int(colour(index)[at : at + 2], 16) for at in (1, 3, 5))
     return "#" + "".join(f"{round(part * (1 - much) + toward * much):02X}" for part in parts)
 
 
 def dash(index: int) -> str:
-    """Line style, for the indices that share a colour."""
+    """Return the line style, which differs for the indices that share a colour."""
     return DASHES[index // len(COLOURS) % len(DASHES)]
 
 
 def drawn(name: str, most: int = 24) -> str:
-    """A name as a plot shows it: literally, what the font has no picture of as an escape, at most so long.
+    """Return a name as a plot shows it: literally, with escapes for what the font lacks, at most so long.
 
     One that begins with _, which hides a line from legends, begins with a blank that nobody sees.
     """
@@ -85,7 +85,10 @@ def styled() -> Iterator[Any]:
 
 
 def saved(figure: Any, kind: str, dpi: int = 200) -> bytes:
-    """Bytes of a figure as "svg", "pdf" or "png", without date or program, which would tell runs apart."""
+    """Return the bytes of a figure as "svg", "pdf" or "png".
+
+    They have no date or program, which would make runs differ.
+    """
     out = io.BytesIO()
     nameless = {
         "svg": {"Date": None, "Creator": None},

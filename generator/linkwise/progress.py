@@ -1,7 +1,7 @@
 """Progress of long work on stderr: a bar with rate and time left on a terminal, plain lines elsewhere.
 
-The bar goes when the work ends, and the lines begin only where it takes long: what is said then, above
-all an error, stands alone.
+The bar goes when the work ends, and the lines begin only where it takes long: what is printed then, above all
+an error, stands alone.
 """
 
 import sys
@@ -15,10 +15,10 @@ from rich.progress import Progress as Bar
 from rich.text import Text
 
 QUIET = 10.0
-"""Seconds of work that no plain line tells of."""
+"""Seconds of work before the first plain line."""
 
 Progress = Callable[[str, int, int], None]
-"""Called with the name of a stage, how much of it is done, and how much there is."""
+"""Function called with the name of a stage, how much of it is done, and how much there is."""
 
 
 def silent(stage: str, done: int, whole: int) -> None:
@@ -27,7 +27,7 @@ def silent(stage: str, done: int, whole: int) -> None:
 
 @contextmanager
 def progress(units: Mapping[str, str] | None = None) -> Iterator[Progress]:
-    """Yield what to report progress to; `units` gives the unit of a stage's rate, by default steps."""
+    """Yield a function to report progress to; `units` gives the unit of a stage's rate, by default steps."""
     if not sys.stderr.isatty():
         yield _lines()
         return
@@ -66,7 +66,10 @@ class _Rate(ProgressColumn):
 
 
 def _lines() -> Progress:
-    """Print a line for each tenth of a stage, for its end alone where it has few steps, once work is long."""
+    """Return a function that prints a line for each tenth of a stage, once work is long.
+
+    A stage of few steps has a line for its end alone.
+    """
     last: dict[str, int] = {}
     start = time.monotonic()
 

@@ -1,12 +1,13 @@
-"""What every back end takes for motion and what stands beside it, and in which precision it then computes.
+"""Reading of the arguments that every back end accepts, motion and those beside it, and their precision.
 
-    float32, float64    computed in as they are; where both occur, in float64
-    integers, lists     have no precision of their own: that of the others, float64 if there is none
-    arrays              where tensors are computed: become tensors, on the device of the others
-    CPU tensors         where arrays are computed: become arrays, unless a gradient would be lost
+    float32, float64    are computed in as they are; in float64 where both occur
+    integers, lists     have no precision of their own: they take that of the others, float64 if there is none
+    arrays              become tensors, on the device of the others, where tensors are computed
+    CPU tensors         become arrays, where arrays are computed, unless a gradient would be lost
 
-The rest is refused by name: booleans, complex numbers, other floats, gaps, tensors that are not dense, or on
-different devices. Numbers that belong to a robot or to a controller, and masks, are taken in that precision.
+All else is refused, and the argument is named: booleans, complex numbers, other floats, masked arrays,
+tensors that are not dense, or on different devices. Numbers that belong to a robot or to a controller, and
+masks, are converted to that precision.
 """
 
 import sys
@@ -25,34 +26,37 @@ if TYPE_CHECKING:
 FLOATS = ("float32", "float64")
 INTEGERS = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 REAL = ("bool", "int", "uint", "float", "bfloat")
-"""How names of dtypes of real numbers begin."""
+"""Prefixes of the names of dtypes of real numbers."""
 ANY = -1
-"""An axis of any size."""
+"""Size that stands for an axis of any size."""
 
 
 class Beside(NamedTuple):
-    """What is given beside motion, of shape (..., *axes), samples as the motion has them."""
+    """An argument given beside the motion, of shape (..., *axes), with samples as the motion has them."""
 
     value: object
     axes: tuple[int, ...]
-    """Sizes of its own axes."""
+    """Sizes of the argument's own axes."""
     meaning: str
-    """What stands along them."""
+    """Description of the entries along these axes."""
     joints: Sequence[str] = ()
-    """Names along the first of them, where these are joints."""
+    """Names of the entries along the first of these axes, where they are joints."""
 
 
 NOTHING: Mapping[str, Beside] = {}
 
 
 def has_tensors(values: Iterable[object]) -> bool:
-    """Whether one of the values is a torch tensor; torch isn't imported to find out."""
+    """Return whether one of the values is a torch tensor, without importing torch."""
     torch = sys.modules.get("torch")
     return torch is not None and any(isinstance(v, torch.Tensor) for v in values)
 
 
 def as_array(name: str, value: object) -> NDArray[Any]:
-    """Anything that reads as an array; raises TypeError or ValueError for what does not, or not wholly."""
+    """Return a value of any kind as an array.
+
+    Raises TypeError or ValueError for a value that does not read as an array, or not without a loss.
+    """
     if has_tensors([value]):
         return _array_of_tensor(name, cast("Tensor", value))
     if value is None:
@@ -68,13 +72,13 @@ def as_array(name: str, value: object) -> NDArray[Any]:
 
 
 def refuse_gradient(name: str, value: object) -> None:
-    """Raise TypeError for a tensor whose gradient would be lost where numbers are settled once."""
+    """Raise TypeError for a tensor whose gradient would be lost, as its numbers are read once and kept."""
     if getattr(value, "requires_grad", False):
         raise TypeError(f"{name} requires a gradient, which nothing carries from there; give {name}.detach()")
 
 
 def shape_of(value: object) -> tuple[int, ...]:
-    """Shape of what will be read as an array or a tensor; none where that is not clear yet."""
+    """Return the shape of a value that will be read as an array or tensor; () where it is not clear yet."""
     try:
         return tuple(value.shape) if hasattr(value, "shape") else np.shape(cast(ArrayLike, value))
     except (TypeError, ValueError, RuntimeError):
@@ -82,7 +86,10 @@ def shape_of(value: object) -> tuple[int, ...]:
 
 
 def as_weights(name: str, value: object) -> Numbers:
-    """A tensor as it is, or an array, of real numbers or truth values; raises as `as_array` does."""
+    """Return a tensor as it is, or any other value as an array, of real numbers or truth values.
+
+    Raises TypeError for other numbers, and otherwise as `as_array` does.
+    """
     if has_tensors([value]):
         weights = cast(Numbers, value)
     elif value is None:
@@ -95,7 +102,12 @@ def as_weights(name: str, value: object) -> Numbers:
 
 
 def precision(given: Mapping[str, object], read: Mapping[str, Numbers]) -> str:
-    """float32 or float64: what to compute in, for values as they were given, and as arrays or tensors."""
+    """Return the precision to compute in: float32 or float64.
+
+    given: the values as they were given; read: the same as arrays or tensors
+
+    Raises TypeError, which names the argument, for dtypes other than float32, float64 and integers.
+    """
     for name, a in read.items():
         if _dtype(a) not in (*FLOATS, *INTEGERS):
             raise TypeError(f"{name} has dtype {_dtype(a)}; give float32, float64 or integers")
@@ -104,7 +116,7 @@ def precision(given: Mapping[str, object], read: Mapping[str, Numbers]) -> str:
 
 
 def check_dense(values: Mapping[str, object]) -> None:
-    """Raise TypeError, which names the argument, for a tensor that is sparse, nested or the like."""
+    """Raise TypeError, which names the argument, for a tensor that is not dense, such as a sparse one."""
     for name, value in values.items():
         if has_tensors([value]):
             tensor = cast("Tensor", value)
@@ -115,7 +127,7 @@ def check_dense(values: Mapping[str, object]) -> None:
 
 
 def as_given(named: Mapping[str, object], beside: Mapping[str, Beside]) -> Mapping[str, object]:
-    """Motion and what stands beside it, by name."""
+    """Return the motion and the arguments beside it, by name."""
     return {**named, **{name: about.value for name, about in beside.items()}} if beside else named
 
 
@@ -125,9 +137,10 @@ def check_axes(
     joints: Sequence[FileJoint] = (),
     beside: Mapping[str, Beside] = NOTHING,
 ) -> None:
-    """Raise ValueError, which names the argument, where the axes behind those of samples are others.
+    """Raise ValueError, which names the argument, where the axes after those of the samples have wrong sizes.
 
-    That of motion is n; joints: those of the file, by which positions of simulators have more numbers
+    n: size of the last axis of motion; joints: those of the file, which explain why positions of a simulator
+    have more than n numbers
     """
     for name, a in arrays.items():
         if name in beside:
@@ -151,7 +164,7 @@ def _check_own_axes(name: str, a: Numbers, about: Beside) -> None:
 
 
 def samples_of(name: str, a: Numbers, beside: Mapping[str, Beside]) -> tuple[int, ...]:
-    """Shape of the samples of an argument whose own axes have been checked."""
+    """Return the shape of the samples of an argument whose own axes have been checked."""
     own = len(beside[name].axes) if name in beside else 1
     return tuple(a.shape[: a.ndim - own])
 
@@ -159,7 +172,7 @@ def samples_of(name: str, a: Numbers, beside: Mapping[str, Beside]) -> tuple[int
 def no_common_shape(
     arrays: Mapping[str, Numbers], n: int, beside: Mapping[str, Beside] = NOTHING
 ) -> ValueError:
-    """What to raise for arrays (..., n), and what stands beside them, whose samples do not broadcast."""
+    """Return the error for arrays (..., n), and arguments beside them, whose samples do not broadcast."""
     shapes = ", ".join(f"{name} {tuple(a.shape)}" for name, a in arrays.items())
     own = "".join(f", {len(about.axes)} of {name}" for name, about in beside.items())
     last = f"the last axes, 1 of motion{own}," if own else f"the last axis, {n} for the joints,"
@@ -167,7 +180,7 @@ def no_common_shape(
 
 
 def too_many_axes(arrays: Mapping[str, Numbers], n: int) -> ValueError:
-    """What to raise where NumPy has no room for the axes of arrays (..., n), or of answers to them."""
+    """Return the error for arrays (..., n) that have, or whose answers have, too many axes for NumPy."""
     most = max(a.ndim for a in arrays.values())
     names = [name for name, a in arrays.items() if a.ndim == most]
     return ValueError(
@@ -217,7 +230,7 @@ def _array_of_tensor(name: str, tensor: "Tensor") -> NDArray[Any]:
 
 
 def _dtype(a: Numbers) -> str:
-    """Name of an array's or a tensor's dtype, whatever its byte order."""
+    """Return the name of an array's or a tensor's dtype, whatever its byte order."""
     return a.dtype.name if isinstance(a, np.ndarray) else str(a.dtype).removeprefix("torch.")
 
 

@@ -1,6 +1,6 @@
-"""The table of calls: what each takes of a robot and what it answers, in Python, in C and on every page.
+"""Table of the calls: what each is given and what it answers, in Python, in C and on all pages of the docs.
 
-Axes stand in the order of arrays, behind those of the samples: i the joint that is loaded, j the link
+Axes are listed in the order of the arrays, after those of the samples: i the joint that is loaded, j the link
 through which it is loaded, k the coordinate that moves, which here is called the cause.
 """
 
@@ -23,20 +23,22 @@ from .quantities import (
 
 
 class Quantity(NamedTuple):
-    """An array of an answer."""
+    """An array in the answer of a call."""
 
     name: str
     axes: tuple[str, ...]
-    """Names of `robot_axes.NamedAxis`, such as joint; `moved` is what an induced acceleration is of."""
+    """Names of the axes, by which `robot_axes` has a NamedAxis, such as joint; `moved` is the axis of
+    whatever an induced acceleration accelerates."""
     unit: str
-    """Factors of it over factors below: symbols, or what is measured along which axis."""
+    """Factors of the unit, with divisors after a slash: symbols, or quantity:axis for what is measured along
+    an axis."""
     meaning: str
     beside: tuple[str, str] | None = None
-    """Where several arrays are entries of one along an axis more: its name, and the name of the entry."""
+    """Name of a further axis, and of this array's entry along it, where several arrays are entries of one."""
 
 
 ORDER = "order"
-"""The axis along which shares by acceleration stand beside those by velocity."""
+"""Name of the axis along which shares by acceleration stand beside those by velocity."""
 TORQUE = "torque:joint"
 PASSIVE_KINDS = ("spring", "damping", "friction", "armature")
 IJK = ("joint", "link", "cause")
@@ -50,7 +52,10 @@ def _one(name: str, axes: str, unit: str, meaning: str) -> tuple[Quantity]:
 def _by_order(
     name: str, unit: tuple[str, str], gravity: tuple[str, str], meaning: str, more: str = ""
 ) -> tuple[Quantity, ...]:
-    """Shares by acceleration, by velocity, and those of gravity, which have no cause: (name, unit)."""
+    """Return the quantities of shares by acceleration, by velocity and, without a cause, by gravity.
+
+    unit: those by acceleration and by velocity; gravity: (name, unit); more: names of further axes
+    """
     extra = tuple(more.split())
     return (
         Quantity(name, (*IJK, *extra), unit[0], meaning, (ORDER, "acceleration")),
@@ -60,7 +65,7 @@ def _by_order(
 
 
 COEFFICIENT_UNITS = "~torque:joint / acceleration:cause", "torque:joint / velocity:cause"
-"""Of c2 and c1; a ~ is for units that are told in kg, m and s."""
+"""Units of c2 and c1; ~ marks units that are written in kg, m and s."""
 PROPAGATION = _by_order("propagation", (TORQUE, TORQUE), ("gravity", TORQUE), f"torque {TAU_IJK}")
 POWER = _by_order("power_propagation", ("W", "W"), ("power_gravity", "W"), f"power {TAU_IJK}")
 COEFFICIENTS = _by_order("coefficient", COEFFICIENT_UNITS, ("gravity", TORQUE), f"coefficient {TAU_IJK}")
@@ -70,49 +75,49 @@ PASSIVE = tuple(
 )
 QDD_OF_JOINTS = _one("forward_dynamics", "joint", "acceleration:joint", "joint acceleration")
 REQUIRED = object()
-"""Of an option that has to be given."""
+"""Value of an option that has to be given."""
 BY_LINK: Mapping[str, object] = {"by_link": True}
 
 
 class Call(NamedTuple):
-    """A row of the table."""
+    """A row of the table: a call, or one variant of a call."""
 
     key: str
-    """The call, and what is chosen of it: "mass_matrix_by_link", "kinematics.pose", "constraints.forces"."""
+    """Name of the call and its variant: "mass_matrix_by_link", "kinematics.pose", "constraints.forces"."""
     motion: tuple[str, ...]
-    """What it is given of shape (..., n), or (..., m) where that is of the independent joints, in order."""
+    """Names of the arguments of shape (..., n), or (..., m) for those of the independent joints, in order."""
     answers: tuple[Quantity, ...]
     record: type | None = None
-    """What it answers with, of several arrays."""
+    """NamedTuple that holds an answer of several arrays; None for an answer of one."""
     call: str = ""
-    """Its name, where that is not the key."""
+    """Name of the call, where it is not the key."""
     chosen: Mapping[str, object] = {}
-    """Options with which it is this row."""
+    """Options that select this row among the variants of the call."""
     options: Mapping[str, object] = {}
-    """What else may be given, and what counts unless it is."""
+    """Further options and their defaults."""
     own: str = "not"
-    """Whether joints' springs, damping, friction and armature count: "not", "alone", "passive" if asked."""
+    """Treatment of joints' springs, damping, friction and armature: "not", "alone", or "passive" if asked."""
     ties: str = "cut"
-    """Of loops and couplings: "cut", as the open tree's; "kept"; "refused" with the call that keeps them."""
+    """Treatment of loops and couplings: "cut" as in the open tree, "kept", or "refused" for another call."""
     rigid: bool = False
-    """Whether it is there for rigid links alone, and refused for links that are energies."""
+    """True if the call exists for rigid links alone, and is refused for links given by energies."""
     lacking: tuple[str, ...] = ()
-    """Back ends that refuse it."""
+    """Back ends that refuse the call."""
     out: bool = True
-    """Whether `out` says where the answer goes."""
+    """True if the call has an argument `out`, which says where the answer is written."""
     c: str = ""
-    """The function of C that has it, without the robot's name; none where arrays alone have it."""
+    """Name of the C function without the robot's name; empty where the call exists for arrays alone."""
     one: bool = False
-    """Whether that takes one sample and no count."""
+    """True if the C function accepts one sample and no count."""
 
     @property
     def name(self) -> str:
-        """As robot has it, or robot.kinematics, or robot.constraints."""
+        """Name of the call as an attribute of the robot, such as mass_matrix or kinematics.pose."""
         return self.call or self.key
 
     @property
     def is_named(self) -> bool:
-        """Whether the axes of the answer have names; packed values have one of indices."""
+        """True if the axes of the answer have names; packed values have an axis of indices instead."""
         return not any(axis in PACKED for quantity in self.answers for axis in quantity.axes)
 
 
@@ -124,7 +129,7 @@ PACKED = ("c2", "c1", "g", "tau", "h1")
 def _by_link(
     name: str, motion: tuple[str, ...], axes: str, unit: str, meaning: str, c: str = ""
 ) -> tuple[Call, Call]:
-    """A sum over the links, and with the axis of links behind the first one."""
+    """Return two rows: a sum over the links, and the same quantity by link, as its second axis."""
     first, *rest = axes.split()
     by_link = _one(name, " ".join([first, "link", *rest]), unit, f"{meaning}, by link")
     return (
@@ -267,7 +272,7 @@ DYNAMICS = (
         NaturalImpedance,
     ),
 )
-"""Calls of `Dynamics` whose answers have one shape a sample."""
+"""Calls of `Dynamics` whose answers have a fixed shape for each sample."""
 
 SOURCES = (
     ("actuators", "cause", "by what the actuator of the cause gives"),
@@ -285,7 +290,7 @@ def _induced(unit: str, what: str) -> tuple[Quantity, ...]:
 
 
 DRIVEN = {"tau": None, "qdd": None, "loads": (), "passive": True}
-"""What drives a motion, as calls on its causes are told."""
+"""Options that say what drives a motion, for the calls on its causes, and their defaults."""
 MOTIONS = (
     Call(
         "induced_accelerations",
@@ -336,7 +341,7 @@ MOTIONS = (
         out=False,
     ),
 )
-"""Calls of `Dynamics` on motion, whose axes hang on what is asked."""
+"""Calls of `Dynamics` on motion, whose axes depend on the arguments."""
 
 OF_FRAME: Mapping[str, object] = {"frame": REQUIRED}
 OF_POINT: Mapping[str, object] = {"frame": REQUIRED, "point": None}
@@ -386,11 +391,11 @@ KINEMATICS = (
         "centre_of_mass_jacobian_rate", QD, "axis cause", "velocity:axis / position:cause", "rate of that"
     ),
 )
-"""Those of `Kinematics`; the axis of frames is as long as the robot has frames."""
+"""Calls of `Kinematics`; the axis of frames is as long as the robot has frames."""
 
 
 def _driven(quantity: Quantity) -> Quantity:
-    """The same of the joints that constraints leave independent."""
+    """Return a quantity of all joints as one of the joints that constraints leave independent."""
     named = {"joint": "independent", "cause": "independent_cause"}
     unit = quantity.unit.replace("joint", "independent").replace("cause", "independent_cause")
     return quantity._replace(axes=tuple(named.get(axis, axis) for axis in quantity.axes), unit=unit)
@@ -514,7 +519,7 @@ CONSTRAINTS = (
         own="passive",
     ),
 )
-"""Those of `Constraints`."""
+"""Calls of `Constraints`."""
 
 CALLS: Mapping[str, Call] = {row.key: row for row in (*DYNAMICS, *MOTIONS, *KINEMATICS, *CONSTRAINTS)}
-"""Every row by its key."""
+"""Rows of all calls by their keys."""

@@ -1,4 +1,4 @@
-"""Joints, links and others chosen by number or by name, and what to offer where there is no such name."""
+"""Joints, links and others chosen by number or by name, and suggestions where a name does not exist."""
 
 import difflib
 from collections.abc import Collection, Iterable, Sequence
@@ -8,11 +8,11 @@ from typing import Any
 MOST_NAMES = 6
 LONGEST = 60
 STATES = ("value", "speed")
-"""How OpenSim ends a coordinate's path where it is a state: /jointset/JOINT/COORDINATE/value."""
+"""Ends of the path of a coordinate's state in OpenSim: /jointset/JOINT/COORDINATE/value."""
 
 
 def known_as(given: str, names: Collection[str]) -> str | None:
-    """The name that is given, or the one at the end of a path of OpenSim's; None for neither.
+    """Return the name that is given, or the one at the end of an OpenSim path; None where neither is known.
 
     /jointset/hip_r/hip_flexion_r/value is hip_flexion_r, /bodyset/foot_r is foot_r.
     """
@@ -23,7 +23,7 @@ def known_as(given: str, names: Collection[str]) -> str | None:
 
 
 def end_of_path(given: str) -> str:
-    """What a path of OpenSim's leads to, by its own name; any other text as it is."""
+    """Return the name of what an OpenSim path leads to; any other text as it is."""
     parts = given.split("/")
     state = parts[-1] in STATES
     if len(parts) < 3 or not (state or given.startswith("/")):
@@ -32,7 +32,7 @@ def end_of_path(given: str) -> str:
 
 
 def nearest_first(given: object, names: Iterable[str]) -> list[str]:
-    """The names, those first whose letters and digits are most like those of a text that is given."""
+    """Return the names, first those whose letters and digits are most like those of the given text."""
     if not isinstance(given, str):
         return list(names)
     wanted = difflib.SequenceMatcher(b=_letters(given))
@@ -45,7 +45,10 @@ def nearest_first(given: object, names: Iterable[str]) -> list[str]:
 
 
 def known_kind(given: object, kind: type) -> str:
-    """How errors call what is not of a kind, and whose it is where another copy of the runtime has it."""
+    """Return how errors describe a value that is not of the class `kind`.
+
+    For an instance of the same class in another copy of the runtime they name the package it comes from.
+    """
     found = type(given)
     package, copied, _ = found.__module__.partition(".linkwise_runtime.")
     if found.__name__ == kind.__name__ and (copied or ".linkwise_runtime." in kind.__module__):
@@ -55,9 +58,11 @@ def known_kind(given: object, kind: type) -> str:
 
 
 def position_of(given: object, names: Sequence[str], kind: str, argument: str) -> int:
-    """Position from 0 of what is given by number or by name; raises ValueError, which names the argument.
+    """Return the position, counted from 0, of what is given by number or by name.
 
-    kind: what there are names of, such as joint; joint_names then lists them
+    kind: what the names are names of, such as joint; joint_names then lists them
+
+    Raises ValueError, which names the argument, for what is neither.
     """
     if isinstance(given, str) and (name := known_as(given, names)) is not None:
         return names.index(name)
@@ -71,7 +76,7 @@ def position_of(given: object, names: Sequence[str], kind: str, argument: str) -
 
 
 def whole_number(given: Any) -> int | None:
-    """An integer of any kind, NumPy's too, as such; None for all else, truth values among it."""
+    """Return an integer of any kind, also of NumPy, as int; None for all else, also for truth values."""
     try:
         return None if isinstance(given, bool) else index(given)
     except TypeError:
@@ -83,7 +88,10 @@ def _letters(name: str) -> str:
 
 
 def choice(given: object, names: Iterable[str], whole: str) -> str:
-    """The names, those nearest the given one first; of many these alone, and where all of them are."""
+    """Return the names as text, nearest to the given one first.
+
+    Of many names only the nearest are listed, and `whole` says where to find all of them.
+    """
     known = nearest_first(given, names)
     near = ", ".join(map(plain, known[:MOST_NAMES]))
     if len(known) <= MOST_NAMES:
@@ -92,22 +100,22 @@ def choice(given: object, names: Iterable[str], whole: str) -> str:
 
 
 def plain(name: str) -> str:
-    """A name as one line may hold it."""
+    """Return a name such that it fits into one line."""
     return name if name.isprintable() and len(name) <= LONGEST else short(name)
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names in one line."""
+    """Return names joined in one line, the first few of many."""
     shown = ", ".join(plain(name) for name in names[:MOST_NAMES])
     return shown + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
 
 
 def sample_of(place: Sequence[int]) -> str:
-    """Where in a batch."""
+    """Return the place in a batch in words; "" where there is no batch."""
     return f" at sample {', '.join(map(str, place))}" if len(place) else ""
 
 
 def short(value: object) -> str:
-    """Any value in one line."""
+    """Return any value as text in one line, cut off where it is long."""
     text = repr(value).replace("\n", " ")
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."

@@ -1,4 +1,4 @@
-"""Where calls come in: what is given is read in one library, and places are taken for the answer."""
+"""Entry of all calls: arguments are read in one library, and places for the answer are checked."""
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,16 +18,16 @@ Read = TypeVar("Read", covariant=True)
 
 
 class Reads(Protocol[Read]):
-    """A back end, which chooses the library that it then computes with."""
+    """A back end that reads arguments, and so chooses the library that it then computes with."""
 
     def read(
         self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside]
     ) -> tuple[Read, Sequence[Numbers]]:
-        """What computes, and motion (..., n), then what is beside it, as it computes with them."""
+        """Return the back end to compute with, the motion (..., n), and what is beside it, in its library."""
 
 
 class Door(Generic[Read]):
-    """What every call of a robot goes through."""
+    """Entry that every call of a robot passes through."""
 
     def __init__(self, structure: Structure, backend: Reads[Read], check_finite: bool) -> None:
         self._structure, self._backend, self.check_finite = structure, backend, check_finite
@@ -38,10 +38,12 @@ class Door(Generic[Read]):
         joints: Sequence[str] | None = None,
         beside: Mapping[str, Beside] = NOTHING,
     ) -> tuple[Read, Sequence[Numbers]]:
-        """What computes, and motion of these joints, all unless given, then what is beside it.
+        """Return the back end to compute with, the motion of these joints, and the arguments beside it.
+
+        joints: names of the joints of the motion, all unless given
 
         All are broadcast to one shape of samples. Raises ValueError and TypeError, which name the argument,
-        for what cannot be taken.
+        for what is not accepted.
         """
         names = self._structure.joint_names if joints is None else joints
         read = self._backend.read(named, len(names), beside)
@@ -58,11 +60,12 @@ def accepted(
     beside: Iterable[object],
     contiguous: bool,
 ) -> list[Numbers]:
-    """The arrays or tensors of `out` in order, which an answer of these shapes a sample may be written to.
+    """Return the arrays or tensors of `out`, in order, after checking that the answer can be written to them.
 
-    fields: names of the results where there are several; motion: what is read, in one shape (..., n);
-    beside: what else is read; contiguous: whether places must be so, in C's order.
-    Raises ValueError or TypeError, which names what cannot be written to and why.
+    fields: names of the results where there are several; shapes: their shapes for one sample; motion: what is
+    read, in one shape (..., n); beside: what else is read; contiguous: whether places must be contiguous, in
+    C's order.
+    Raises ValueError or TypeError, which names the place that cannot be written to and says why.
     """
     like = next(iter(motion.values()))
     given: Sequence[object] = [out]
@@ -111,7 +114,7 @@ def _checked(name: str, one: object, shape: tuple[int, ...], like: Numbers) -> N
 
 
 def _overlaps_itself(one: Numbers) -> bool:
-    """Whether steps along one axis are smaller than what the others cover, or nothing at all."""
+    """Return whether the step along an axis is zero, or smaller than what axes with smaller steps cover."""
     if 0 in one.shape:
         return False
     array = isinstance(one, np.ndarray)
@@ -137,7 +140,7 @@ def _recorded(tensors: Iterable[object]) -> bool:
 
 
 def _overlap(a: Numbers, b: Numbers) -> bool:
-    """Whether two arrays, or two tensors, lie in the same stretch of memory."""
+    """Return whether two arrays, or two tensors, lie in the same stretch of memory."""
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
         return np.may_share_memory(a, b)
     one, other = cast("Tensor", a), cast("Tensor", b)
@@ -146,7 +149,7 @@ def _overlap(a: Numbers, b: Numbers) -> bool:
 
 
 def _stretch(tensor: "Tensor") -> tuple[int, int]:
-    """Where in memory a tensor's numbers begin and end."""
+    """Return where in memory a tensor's numbers begin and end."""
     first = tensor.data_ptr()
     if not tensor.numel():
         return first, first

@@ -1,13 +1,12 @@
-"""The calls that every back end answers.
+"""Calls that every back end answers.
 
 Index i is the joint that is loaded, j the link through which it is loaded (by the link's motion and weight),
 k the coordinate that moves.
 
     tau_ij = sum_k c2_ijk qdd_k + sum_k c1_ijk qd_k + g_ij
 
-tau_ij is zero off the path of link j, so results are kept packed, beside a list of their indices; dense
-tensors are a view that is built on request. What a call takes of a robot, and what it answers, is a row of
-`call_table.CALLS`.
+tau_ij is zero off the path of link j, so results are kept packed, with a list of their indices; dense tensors
+are built on request. The arguments and the answer of each call are a row of `call_table.CALLS`.
 """
 
 import warnings
@@ -49,24 +48,25 @@ from .targets import FrameImpedance, Natural
 
 
 class Dynamics:
-    """Partial torques of a robot on one back end; made by the package's `load`.
+    """Partial torques and other dynamics of a robot on one back end; made by the package's `load`.
 
-    The robot is the open tree of its joints: of one with ties, which close loops, or with contacts, calls are
-    as if these were cut, and `constraints` has what they leave.
+    The robot is the open tree of its joints: unless they say otherwise, calls compute as if ties, which close
+    loops, and contacts were cut; `constraints` has the calls on the motion that these leave.
 
     q, qd, qdd: positions, velocities and accelerations of shape (..., n): rad, rad/s, rad/s^2 for a revolute
     joint, m, m/s, m/s^2 for a prismatic one. They are arrays, tensors, lists or tuples, as `load` says; the
     shapes before the last axis broadcast.
 
-    Answers are arrays or tensors, as the back end computes with, of float32 or float64 as the motion is, on
-    its device; torques in N m, or N where joint i is prismatic.
+    Answers are arrays or tensors, whichever the back end computes with, in float32 or float64 as the motion
+    is, on its device; torques are in N m, or N where joint i is prismatic.
 
-    out: where the answer is written, and what is then returned: an array or tensor of its shape and dtype,
-    writable, apart from the motion and, for native, contiguous; several of them, in order, where there are
-    several results. What cannot hold the answer is refused by name, as is any where a gradient is recorded.
+    out: array or tensor that the answer is written to, and that is then returned: of the answer's shape and
+    dtype, writable, in memory apart from the motion and, for native, contiguous; several of them, in order,
+    where there are several results. One that cannot hold the answer is refused by name, and so is any where a
+    gradient is recorded.
 
-    Every call raises ValueError for a wrong shape, and TypeError for what cannot be taken without a doubt;
-    the message names the argument.
+    Every call raises ValueError for a wrong shape, and TypeError for an argument that cannot be read without
+    ambiguity; the message names the argument.
     """
 
     name: str
@@ -80,17 +80,17 @@ class Dynamics:
     joint_units: tuple[str, ...]
     """Unit of each joint's position: rad or m."""
     joint_limits: JointLimits
-    """Each joint's lower, upper, velocity and effort limit, as its file has it; no call keeps to them."""
+    """Lower, upper, velocity and effort limit of each joint, as in its file; no call enforces them."""
     link_names: tuple[str, ...]
     """Names of the links, in the order of j."""
     layout: Layout
-    """Indices that packed values belong to."""
+    """Indices of the packed values."""
     structure: Structure
-    """Names, paths and parameters, as the package's names.py has them."""
+    """Names, paths and parameters, as in the package's names.py."""
     backend: ArrayBackend
-    """What computes; of the native one `threads` may be set."""
+    """Back end that computes; `threads` may be set on the native one."""
     door: Door[ArrayBackend]
-    """Where the motion of every call comes in."""
+    """Entry at which the motion of every call is read."""
 
     def __init__(
         self,
@@ -100,7 +100,7 @@ class Dynamics:
         asked: tuple[Any, ...],
         check_finite: bool = False,
     ) -> None:
-        """`load` makes this robot again from the arguments that it was `asked` with."""
+        """Set up the robot; `load` makes it again from the arguments that it was `asked` with."""
         self.name, self.n, self.N = structure.name, structure.n, structure.N
         self.joint_names, self.joint_units = structure.joint_names, structure.joint_units
         self.joint_limits = structure.joint_limits
@@ -111,9 +111,9 @@ class Dynamics:
         self._bind()
 
     def _bind(self) -> None:
-        """Have calls go at once to functions that the back end has: these pass on what they do not take.
+        """Bind calls directly to functions of the back end, which pass on what they do not accept.
 
-        They stand before the methods of the class, and look at no numbers.
+        They precede the methods of the class, and do not check whether numbers are finite.
         """
         for name, call in self.backend.direct.items():
             if self.door.check_finite:
@@ -123,7 +123,7 @@ class Dynamics:
 
     @property
     def check_finite(self) -> bool:
-        """Whether every call looks for NaN and infinity in the motion first; it may be set."""
+        """True if every call first looks for NaN and infinity in the motion; it may be set."""
         return self.door.check_finite
 
     @check_finite.setter
@@ -132,26 +132,26 @@ class Dynamics:
         self._bind()
 
     def __dir__(self) -> Iterable[str]:
-        """Names of what this robot has: torch.jit reads each of them, whose values may not raise."""
+        """Return the names of this robot's attributes: torch.jit reads each of them, and none may raise."""
         tree = self.backend.tree
         absent = {"kinematics", "constraints"} if tree is None else set() if tree.tied else {"constraints"}
         return sorted(set(super().__dir__()) - absent)
 
     @property
     def parameters(self) -> Mapping[str, Any]:
-        """Values of the run-time parameters."""
+        """Values of the run-time parameters by name."""
         return self.backend.parameters
 
     @cached_property
     def kinematics(self) -> Kinematics[Any]:
-        """Poses, Jacobians and their rates of the robot's frames; raises ValueError for links of energies."""
+        """Poses, Jacobians and their rates of the robot's frames; ValueError for links given by energies."""
         return Kinematics(self, self.backend.frames.names)
 
     @cached_property
     def constraints(self) -> Constraints[Any]:
-        """What the ties and couplings of the robot's file leave of its motion, see `Constraints`.
+        """Calls on the motion that the ties and couplings of the robot's file allow, see `Constraints`.
 
-        Raises ValueError for a robot without any, and for links of energies.
+        Raises ValueError for a robot without any, and for links given by energies.
         """
         return constraints_of(self, None, (), None, None)
 
@@ -162,53 +162,56 @@ class Dynamics:
         at: Array | None = None,
         tolerance: float | None = None,
     ) -> Constraints[Any]:
-        """`constraints` with contacts besides, or other independent joints; of a robot without ties too.
+        """Return `constraints` with contacts or other independent joints, also of a robot without ties.
 
-        independent: joints by number or by name; unless given, the file's where there are no contacts, and
-        else those that pivoting leaves, of a floating base as few as can be
-        at: positions (n,) in which loops close, where joints are chosen; unless given, some that were found
-        tolerance: largest violation of a tie, in m or rad, that calls take; unless given, 1e-6, in float32
-        1e-4, of what joints could close, and 1e-4 of the rest: right angles of 1.5708 in files leave some
+        independent: joints by number or by name; unless given, those of the file where there are no contacts,
+        and else joints chosen by pivoting, as few as possible of a floating base
+        contacts: frames that the ground holds
+        at: positions (n,) at which loops close, where the joints are chosen; unless given, some that are
+        found
+        tolerance: largest violation of a tie, in m or rad, that calls accept; unless given, 1e-6 (1e-4 in
+        float32) of what joints could close, and 1e-4 of the rest: right angles of 1.5708 in files leave some
         micrometres that nothing closes
 
-        Raises ValueError for what is not there, for joints on which the others do not hang at `at`, and
-        where nothing is left to move.
+        Raises ValueError for a joint or frame that does not exist, for independent joints that do not
+        determine the others at `at`, and where nothing is left to move.
         """
         return constraints_of(self, independent, contacts, at, tolerance)
 
     def module(self, call: str, **fixed: Any) -> Any:
-        """One call as a torch.nn.Module, such as torch.export, ONNX and containers take.
+        """Return one call as a torch.nn.Module, as accepted by torch.export, ONNX and containers.
 
         call: its name, such as "partial_torque" or "kinematics.jacobian"
-        fixed: what every call is given besides: frame="tool", passive=True
+        fixed: arguments that are the same in every call: frame="tool", passive=True
 
-        The module takes the rest by the call's own names, and answers with a dict by name where there are
-        several results. Run-time parameters, and bodies that were given, are in its state_dict. For torch and
-        autograd; raises TypeError on another back end, ValueError for a call or argument that is not there.
+        The module accepts the other arguments by the call's own names, and returns a dict by name where there
+        are several results. Run-time parameters, and bodies that were given, are in its state_dict. For torch
+        and autograd; raises TypeError on another back end, ValueError for a call or argument that does not
+        exist.
         """
         return self.backend.module(self, call, fixed)
 
     def labelled(self, call: str, *given: Any, along: Any = None, **named: Any) -> Any:
-        """The answer of a call with names along its axes: an xarray DataArray, or a Dataset of several.
+        """Return the answer of a call with named axes: an xarray DataArray, or a Dataset of several.
 
         call: its name, such as "partial_torque", "kinematics.jacobian" or "constraints.forces"; the call's
-        own arguments follow. Arguments may be DataArrays: joints are then found by their names, whatever
-        their order, and the other axes, such as time, are those of the answer.
+        own arguments follow. Arguments may be DataArrays: joints are then matched by their names, in any
+        order, and the other axes, such as time, are those of the answer.
         along: names of the axes of samples without names: "time", ("trial", "time") or {"time": instants};
         sample unless given
 
         labelled("partial_torque", q, qd, qdd).sel(joint="knee", link="foot") is tau_ij. Axes are joint i,
-        link j, cause k; `order` tells shares by acceleration from those by velocity. The attribute `units`
-        has the unit; where joints of angles and of lengths differ, `units_from` names the coordinate with it.
-        Values are NumPy's arrays, without gradients.
+        link j, cause k; `order` separates shares by acceleration from those by velocity. The attribute
+        `units` has the unit; where it differs, as between joints with angles and with lengths, `units_from`
+        names the coordinate that has it. Values are NumPy arrays, without gradients.
 
-        Raises ImportError without xarray, ValueError for a call without such axes, such as packed, or a joint
-        that an argument lacks, and what the call raises.
+        Raises ImportError without xarray, ValueError for a call without named axes, such as packed, or for a
+        joint that an argument lacks, and whatever the call raises.
         """
         return labelled(self, None, call, given, named, along)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: joints with unit and limits, links with the joints that move them."""
+        """Return HTML for notebooks: joints with unit and limits, links with the joints that move them."""
         return robot_table(self.structure, repr(self).strip("<>"))
 
     def __repr__(self) -> str:
@@ -217,48 +220,49 @@ class Dynamics:
         return f"<{self.name} on {self.backend.name}: {', '.join(parts)}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled, copied or sent to another process, it is loaded again there; what was set here stays."""
+        """Return what loads this robot again in a copy or another process, and the settings made here."""
         return self._load, self._asked, (self.backend.threads_set, self.check_finite)
 
     def __setstate__(self, state: tuple[int | None, bool]) -> None:
-        """Set what was set of the robot that this one is a copy of."""
+        """Restore the settings of the robot of which this one is a copy."""
         threads, self.check_finite = state
         if threads is not None:
             self.backend.threads_set = threads
 
     def packed(self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None) -> Packed[Array]:
-        """Full decomposition without the zeros: c2, c1 (closing), g, tau, h1, (..., count) each."""
+        """Return the full decomposition without zeros: c2, c1 (closing), g, tau, h1, (..., count) each."""
         answer: Packed[Array] = self._call("packed", (q, qd, qdd), out)
         return answer
 
     def packed_torque(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
-        """tau_ij on the paths only, (..., count); its indices are `layout.torque`."""
+        """Return tau_ij on the paths only, (..., count); its indices are `layout.torque`."""
         tau: Array = self._call("packed_torque", (q, qd, qdd), out)
         return tau
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
-        """tau_ij, the torque on joint i through link j, shape (..., n, N)."""
+        """Return tau_ij, the torque on joint i through link j, shape (..., n, N), in N m or N."""
         tau: Array = self._call("partial_torque", (q, qd, qdd), out)
         return tau
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
-        """tau_i = sum_j tau_ij, shape (..., n): of the links, without what `passive_torque` has."""
+        """Return tau_i = sum_j tau_ij, shape (..., n): of the links alone, without `passive_torque`."""
         tau: Array = self._call("inverse_dynamics", (q, qd, qdd), out)
         return tau
 
     def passive_torque(
         self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None
     ) -> PassiveTorque[Array]:
-        """What joints take for their own springs, damping, Coulomb friction and armature, (..., n) each.
+        """Return the torques that springs, damping, Coulomb friction and armature require, (..., n) each.
 
-        No tau_ij holds it: actuators give inverse_dynamics(q, qd, qdd) + passive_torque(q, qd, qdd).total.
-        Zeros where the robot's description has none.
+        No tau_ij contains them: actuators give
+        inverse_dynamics(q, qd, qdd) + passive_torque(q, qd, qdd).total. Zeros where the robot's description
+        has none.
         """
         answer: PassiveTorque[Array] = self._call("passive_torque", (q, qd, qdd), out)
         return answer
 
     def coefficients(self, q: Array, qd: Array, out: Sequence[Array] | None = None) -> Coefficients[Array]:
-        """c2, c1 (..., n, N, n) and g (..., n, N) of the closing convention."""
+        """Return c2, c1 (..., n, N, n) and g (..., n, N) of the closing convention."""
         answer: Coefficients[Array] = self._call("coefficients", (q, qd), out)
         return answer
 
@@ -288,11 +292,11 @@ class Dynamics:
         convention: str = "closing",
         out: Sequence[Array] | None = None,
     ) -> Propagation[Array] | GradientPropagation[Array]:
-        """Motion propagation torques c2_ijk qdd_k and c1_ijk qd_k (..., n, N, n), and g_ij (..., n, N).
+        """Return motion propagation torques c2_ijk qdd_k, c1_ijk qd_k (..., n, N, n) and g_ij (..., n, N).
 
-        closing: over all coordinates and orders they sum to tau_ij. gradient: c1 = d(tau_ij)/d(qd_k), the
-        paper's Eq. 1 to the letter, whose velocity part sums to twice the velocity force. Any other word
-        raises ValueError.
+        convention: closing: over all coordinates and orders they sum to tau_ij. gradient: c1 =
+        d(tau_ij)/d(qd_k), the paper's Eq. 1 to the letter, whose velocity part sums to twice the velocity
+        force. Any other word raises ValueError.
         """
         answer: Propagation[Array] | GradientPropagation[Array]
         if convention not in ("closing", "gradient"):
@@ -302,17 +306,17 @@ class Dynamics:
         return answer
 
     def position_gradient(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
-        """c0_ijk = d(tau_ij)/d(q_k), the partial stiffness, shape (..., n, N, n)."""
+        """Return c0_ijk = d(tau_ij)/d(q_k), the partial stiffness, shape (..., n, N, n)."""
         c0: Array = self._call("position_gradient", (q, qd, qdd), out)
         return c0
 
     def regressor(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
-        """Y_ij, what tau_ij multiplies link j's inertial parameters by, shape (..., n, N, 10).
+        """Return Y_ij, which maps link j's inertial parameters to tau_ij, shape (..., n, N, 10).
 
         tau_ij = Y_ij . pi_j, whatever the link carries: pi_j = (m, mc_x, mc_y, mc_z, I_xx, I_xy, I_yy, I_xz,
-        I_yz, I_zz) in kg, kg m and kg m^2, I about the origin of the link's frame and in its axes, as the
-        package's inertial_parameters(bodies()) are. For numpy, torch and native, and for rigid links; raises
-        ValueError for others.
+        I_yz, I_zz) in kg, kg m and kg m^2, I about the origin of the link's frame and in its axes, as
+        returned by the package's inertial_parameters(bodies()). For numpy, torch and native, and for rigid
+        links; raises ValueError for others.
         """
         rows: Array = self._call("regressor", (q, qd, qdd), out)
         return rows
@@ -320,9 +324,10 @@ class Dynamics:
     def coefficient_regressors(
         self, q: Array, qd: Array, out: Sequence[Array] | None = None
     ) -> Coefficients[Array]:
-        """The same of c2 and c1 (..., n, N, n, 10) and of g (..., n, N, 10), closing: Y split by k and order.
+        """Return the regressors of c2 and c1 (..., n, N, n, 10) and of g (..., n, N, 10), closing convention.
 
-        c2_ijk = Y_ijk . pi_j, c1_ijk and g_ij likewise. Raises as `regressor` does.
+        They are Y split by k and order: c2_ijk = Y_ijk . pi_j, c1_ijk and g_ij likewise. Raises as
+        `regressor` does.
         """
         answer: Coefficients[Array] = self._call("coefficient_regressors", (q, qd), out)
         return answer
@@ -330,10 +335,10 @@ class Dynamics:
     def masked(
         self, q: Array, qd: Array, qdd: Array, mask: ArrayLike | Array, out: Array | None = None
     ) -> Array:
-        """sum over m, k of mask_mk c_m,ijk q_k^(m) (the paper's Eq. 21-23), shape (..., n, N).
+        """Return sum over m, k of mask_mk c_m,ijk q_k^(m) (the paper's Eq. 21-23), shape (..., n, N).
 
-        mask: shape (3, n), zeros and ones, or weights between; row m is the order: 0 position, 1 velocity,
-        2 acceleration. Gravity is in no row: a mask of ones in rows 1 and 2 gives tau_ij - g_ij.
+        mask: shape (3, n), zeros and ones, or weights between; row m is the order: 0 position, 1 velocity, 2
+        acceleration. Gravity is in no row: a mask of ones in rows 1 and 2 gives tau_ij - g_ij.
         """
         engine, motion = self.door.read({"q": q, "qd": qd, "qdd": qdd})
         weights = engine.weights("the mask", mask, motion[0])
@@ -347,21 +352,22 @@ class Dynamics:
         return torque
 
     def graph(self, i: Any, j: Any = None, k: Any = None, m: int | None = None) -> Any:
-        """Autograd's graph of tau_ij, or of a part of it, as a `TorqueGraph`; on the autograd back end only.
+        """Return autograd's graph of tau_ij, or of a part of it, as a `TorqueGraph`; autograd back end only.
 
-        i, j, k: joint, link and joint by number from 0 or by name; several links, or without
-        j all of them, are summed
-        k and m: the part c_m,ijk q_k^(m) of the closing convention, m = 2 acceleration, 1 velocity, and for 0
-        the stiffness c0 times the position; k alone is both shares of a motion, m alone all of an order, 0
-        gravity
+        i, j, k: joint, link and joint by number from 0 or by name; several links, or all of them without j,
+        are summed
+        k and m: the part c_m,ijk q_k^(m) of the closing convention: m is 2 for acceleration, 1 for velocity,
+        and 0 for the stiffness c0 times the position; k alone is both shares of a motion, m alone all shares
+        of an order, 0 gravity
 
-        What torch computes while it differentiates the energies is recorded; nothing was derived beforehand.
-        Raises TypeError on another back end, ValueError for a joint, a link or an order that is not there.
+        The graph records what torch computes while it differentiates the energies; nothing was derived
+        beforehand.
+        Raises TypeError on another back end, ValueError for a joint, a link or an order that does not exist.
         """
         return self._recording("graph")(i, j, k, m)
 
     def graph_parts(self, i: Any, j: Any = None) -> Any:
-        """Graphs of all parts (k, m) of tau_ij that are not zero, and of gravity: they sum to it."""
+        """Return the graphs of all nonzero parts (k, m) of tau_ij, and of gravity: they sum to tau_ij."""
         return self._recording("graph_parts")(i, j)
 
     def _recording(self, call: str) -> Callable[..., Any]:
@@ -371,15 +377,15 @@ class Dynamics:
         return found
 
     def joint_index(self, joint: int | str) -> int:
-        """Index i or k of a joint by number from 0 or by name; raises ValueError for what is neither."""
+        """Return index i or k of a joint by number from 0 or by name; raise ValueError for any other."""
         return self.structure.joint_index(joint)
 
     def link_index(self, link: int | str) -> int:
-        """Index j of a link by number from 0 or by name; raises ValueError for what is neither."""
+        """Return index j of a link by number from 0 or by name; raise ValueError for any other."""
         return self.structure.link_index(link)
 
     def mass_matrix(self, q: Array, by_link: bool = False, out: Array | None = None) -> Array:
-        """M_ik = sum_j c2_ijk, shape (..., n, n); by link c2_ijk, (..., n, N, n).
+        """Return the mass matrix M_ik = sum_j c2_ijk, shape (..., n, n); by link c2_ijk, (..., n, N, n).
 
         In kg m^2, kg m or kg, where none, one or both of i and k are prismatic.
         """
@@ -387,10 +393,10 @@ class Dynamics:
         return mass
 
     def coriolis_matrix(self, q: Array, qd: Array, by_link: bool = False, out: Array | None = None) -> Array:
-        """C_ik = sum_j c1_ijk of the closing convention, shape (..., n, n); by link c1_ijk, (..., n, N, n).
+        """Return the Coriolis matrix C_ik = sum_j c1_ijk, shape (..., n, n); by link c1_ijk, (..., n, N, n).
 
-        C qd is the velocity force. Of rigid links it is the matrix of Christoffel symbols: dM/dt - 2 C is
-        skew-symmetric.
+        C qd is the velocity force; c1 is that of the closing convention. For rigid links C is the matrix of
+        Christoffel symbols: dM/dt - 2 C is skew-symmetric.
         """
         coriolis: Array = self._call(
             "coriolis_matrix_by_link" if by_link else "coriolis_matrix", (q, qd), out
@@ -398,24 +404,24 @@ class Dynamics:
         return coriolis
 
     def gravity_torque(self, q: Array, by_link: bool = False, out: Array | None = None) -> Array:
-        """g_i = sum_j g_ij, the torque of gravity and other potentials, (..., n); by link (..., n, N)."""
+        """Return g_i = sum_j g_ij, torque of gravity and other potentials, (..., n); by link (..., n, N)."""
         gravity: Array = self._call("gravity_torque_by_link" if by_link else "gravity_torque", (q,), out)
         return gravity
 
     def forward_dynamics(
         self, q: Array, qd: Array, tau: Array, passive: bool = True, out: Array | None = None
     ) -> Array:
-        """qdd of M qdd + C qd + g + p = tau, shape (..., n), in rad/s^2 or m/s^2; tau (..., n) in N m or N.
+        """Return qdd of M qdd + C qd + g + p = tau, shape (..., n), in rad/s^2 or m/s^2.
 
-        p is the total of `passive_torque`, which has armature times qdd in it.
-
-        passive: whether joints have their springs, damping, friction and armature; False leaves p away: tau
-        is then for the links alone, and this the inverse of `inverse_dynamics`
+        tau: torques of the actuators, (..., n), in N m or N
+        p: total of `passive_torque`, which contains armature times qdd
+        passive: whether joints have their springs, damping, friction and armature; False leaves p out: tau is
+        then for the links alone, and this call the inverse of `inverse_dynamics`
 
         Raises ValueError for a robot with ties, whose joints move as `constraints.forward_dynamics` says, and
         for a singular mass matrix, with the sample and the joints that can move without moving any mass;
         inside torch.func and torch.compile, qdd is then not finite. Warns where rounding leaves fewer than
-        half of the digits of M^-1, as near 90 degrees of a floating base's pitch, and how many are left.
+        half of the digits of M^-1, as near 90 degrees of a floating base's pitch, and says how many are left.
         """
         if self.backend.ties_joints:
             raise ValueError(
@@ -427,7 +433,7 @@ class Dynamics:
         return qdd
 
     def energy(self, q: Array, qd: Array, out: Sequence[Array] | None = None) -> Energy[Array]:
-        """Kinetic and potential energy of each link in J, (..., N) each.
+        """Return the kinetic and potential energy of each link in J, (..., N) each.
 
         The potential energy of rigid links is zero at the world's origin; hand-written energies are as they
         were written.
@@ -436,20 +442,21 @@ class Dynamics:
         return answer
 
     def power(self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None) -> Power[Array]:
-        """P_ij = tau_ij qd_i, the power in W that joint i sends into link j, by whose motion, of which order.
+        """Return P_ij = tau_ij qd_i, the power in W that joint i sends into link j.
 
-        Shapes (..., n, N, n) twice and (..., n, N); `.total` is P_ij. sum_i P_ij is the rate of link j's
-        energy, sum_j P_ij what actuator i gives.
+        It is split by the motion k that causes it and by order, with shapes (..., n, N, n) twice and (..., n,
+        N); `.total` is P_ij. sum_i P_ij is the rate of link j's energy, sum_j P_ij the power of actuator i.
         """
         answer: Power[Array] = self._call("power", (q, qd, qdd), out)
         return answer
 
     def christoffel(self, q: Array, by_link: bool = False, out: Array | None = None) -> Array:
-        """Gamma_ikl, the velocity share of every pair of motions, (..., n, n, n); by link (..., n, N, n, n).
+        """Return Gamma_ikl, the velocity share of every pair of motions, shape (..., n, n, n).
 
-        sum_kl Gamma_ikl qd_k qd_l is the velocity force: Gamma_ikk qd_k^2 comes of joint k's motion alone,
-        (Gamma_ikl + Gamma_ilk) qd_k qd_l of the motions of k and l together. Symmetric in k and l. Terms of
-        energies linear in the velocities, as on a moving base, are no part of it.
+        By link, the shape is (..., n, N, n, n). sum_kl Gamma_ikl qd_k qd_l is the velocity force: Gamma_ikk
+        qd_k^2 comes from joint k's motion alone, (Gamma_ikl + Gamma_ilk) qd_k qd_l from the motions of k and
+        l together. Symmetric in k and l. Terms of energies linear in the velocities, as on a moving base, are
+        not part of it.
         """
         symbols: Array = self._call("christoffel_by_link" if by_link else "christoffel", (q,), out)
         return symbols
@@ -463,22 +470,22 @@ class Dynamics:
         order: Order = "mujoco",
         joints: Sequence[str] | None = None,
     ) -> Any:
-        """q of positions as MuJoCo or Pinocchio has them, and qd, qdd and torques of what else is given.
+        """Return q for positions as MuJoCo or Pinocchio has them, and qd, qdd and torques if given.
 
         qpos: (..., nq), in which a joint that turns in space has a quaternion: MuJoCo's w, x, y, z, or
-        Pinocchio's x, y, z, w, which has a cosine and a sine besides for an angle without ends
-        qvel, qacc, tau: (..., n), for which a tuple (q, qd), (q, qd, qdd), ... is the answer: velocities,
-        accelerations and generalized forces of that simulator. Angular velocities are along the body's axes,
-        a floating body's linear one along the world's with MuJoCo, along its own with Pinocchio
-        order: whose numbers these are; joints stand as the file's order has them, or Pinocchio's own
+        Pinocchio's x, y, z, w, which also has a cosine and a sine for an angle without limits
+        qvel, qacc, tau: (..., n), for which the answer is a tuple (q, qd), (q, qd, qdd), ...: velocities,
+        accelerations and generalized forces of that simulator. Angular velocities are along the body's axes;
+        a floating body's linear one is along the world's with MuJoCo, along its own with Pinocchio
+        order: simulator whose numbers these are; the joints are in the file's order, or in Pinocchio's own
         joints: their names in the order of qpos, where it is another: list(model.names)[1:], say
 
-        Joints that are locked or follow others have no numbers here. Angles go on without leaps along the
-        samples, the last axis but one: whole turns are added, and beyond a pitch of 90 degrees it grows on.
-        Arrays of float64 in, or what becomes such, and out; gradients are not carried.
+        Joints that are locked or follow others have no numbers here. Angles do not jump along the samples,
+        the last axis but one: whole turns are added, and beyond 90 degrees the pitch continues to grow.
+        Arguments are read as arrays of float64, which the answers are too; gradients are not carried.
 
-        Raises ValueError for a quaternion whose length is not 1 within 0.01, for velocities at a pitch of
-        90 degrees, and for a wrong shape, with what stands where; warns next to such a pitch.
+        Raises ValueError for a quaternion whose length is not 1 within 0.01, for velocities at a pitch of 90
+        degrees, and for a wrong shape, saying which number belongs where; warns next to such a pitch.
         """
         found = self.structure.qpos(order, joints).motion(qpos, qvel, qacc, tau)
         for told in found.warnings:
@@ -498,21 +505,21 @@ class Dynamics:
         point: Array | None = None,
         constraints: Any = None,
     ) -> InducedAccelerations[Array]:
-        """What each source accelerates, the others away: shares that sum to the acceleration.
+        """Return the acceleration that each source causes alone: shares that sum to the acceleration.
 
-        tau: what the actuators give, (..., n); or in its place
-        qdd: a motion's acceleration: the actuators then give what it asks of them, less what loads do
-        loads: what acts from outside, each an `AppliedLoad`, or a list of them for one source, such as a
-        muscle's two ends
+        tau: torques of the actuators, (..., n); or in its place
+        qdd: a motion's acceleration: the actuators then give what it requires of them, less what loads do
+        loads: external loads, each an `AppliedLoad`, or a list of them for one source, such as a muscle's two
+        ends
         passive: as in `forward_dynamics`
-        frame: what accelerates: the coordinates unless given, or a frame, with its `point`, as
-        `robot.kinematics` takes them, or "centre of mass"
-        constraints: what the motion keeps, the file's ties unless given, else what `robot.constrained`
-        makes, or False for the open tree; q, qd are then as `Constraints` has them, and the actuators that a
-        qdd asks for are those of the independent joints
+        frame: what is accelerated: the coordinates unless given, or a frame, with its `point`, as
+        `robot.kinematics` accepts them, or "centre of mass"
+        constraints: constraints that the motion keeps: the file's ties unless given, else what
+        `robot.constrained` returns, or False for the open tree; q, qd are then as for `Constraints`, and the
+        actuators that a qdd requires are those of the independent joints
 
-        The frame's own dJ/dt qd is the share `kinematic`. Sources of acceleration are forces: what gravity
-        accelerates at rest is there even where it is held, and an actuator's share cancels it.
+        The frame's own dJ/dt qd is the share `kinematic`. Sources of acceleration are forces: the
+        acceleration by gravity at rest is there even where it is held, and an actuator's share cancels it.
 
         Raises as forward_dynamics does, and names the load that is wrong.
         """
@@ -534,22 +541,23 @@ class Dynamics:
         atol: float = 1e-12,
         constraints: Any = None,
     ) -> Trajectory[Array]:
-        """How the robot moves from q and qd on, (..., n), at the instants `time`, (T,), in s.
+        """Return the motion of the robot from q and qd on, (..., n), at the instants `time`, (T,), in s.
 
-        tau: what the actuators give: nothing unless given; (..., n), or a function of (t, q, qd) that is
-        called wherever the method evaluates, also between steps; what functions give is taken in the library
-        and the precision of q and qd, and is of no more samples
-        loads: as in `induced_accelerations`, or a function of (t, q, qd) that gives them
+        tau: torques of the actuators: none unless given; (..., n), or a function of (t, q, qd) that is called
+        wherever the method evaluates, also between steps; what functions return is converted to the library
+        and the precision of q and qd, and has no more samples than these
+        loads: as in `induced_accelerations`, or a function of (t, q, qd) that returns them
         passive: as in `forward_dynamics`
-        step: of RK4 the longest, in s; from instant to instant unless given; of the others a bound
+        step: longest step of RK4, in s; from instant to instant unless given; for the other methods a bound
         method: "RK4", of fixed steps, order 4, through which gradients flow; or one of SciPy's solve_ivp,
-        RK45, DOP853, Radau, ..., whose steps keep rtol and atol, and with which all starts step together
+        RK45, DOP853, Radau, ..., whose steps keep to rtol and atol, and with which all starts step together
         constraints: as in `induced_accelerations`; q is closed first, and q and qd may be (..., m), of the
-        independent joints alone, as `Constraints.closed` takes them. Independent joints are integrated; the
+        independent joints alone, as `Constraints.closed` accepts them. Independent joints are integrated; the
         others are closed by Newton's method at each evaluation and after each step, and follow with G yd
 
-        The answer's energy_drift is the energy that the integration made or lost. Raises ValueError where the
-        motion ceases to be finite, and as forward_dynamics and `Constraints` do; ImportError without SciPy.
+        The answer's energy_drift is the energy that the integration added or lost. Raises ValueError where
+        the motion is no longer finite, and as forward_dynamics and `Constraints` do; ImportError without
+        SciPy, for its methods.
         """
         given = Simulated(q, qd, time, tau, loads, passive, step, method, rtol, atol, constraints)
         trajectory: Trajectory[Array] = simulated(self, given)
@@ -565,7 +573,7 @@ class Dynamics:
         passive: bool = True,
         constraints: Any = None,
     ) -> InducedAccelerations[Array]:
-        """What each source puts on the constraints: shares of lambda, (..., C, ...), by their rows.
+        """Return the constraint force that each source causes: shares of lambda, (..., C, ...), by the rows.
 
         Arguments are those of `induced_accelerations`. Raises ValueError without constraints.
         """
@@ -576,10 +584,10 @@ class Dynamics:
     def natural_impedance(
         self, q: Array, qd: Array, qdd: Array, out: Sequence[Array] | None = None
     ) -> NaturalImpedance[Array]:
-        """How each tau_ij changes with the motion of k: c2_ijk, 2 c1_ijk - h1_ijk and c0_ijk, (..., n, N, n).
+        """Return the changes of tau_ij with the motion of k: c2_ijk, 2 c1_ijk - h1_ijk and c0_ijk.
 
-        d(tau_ij) = sum_k c2_ijk d(qdd_k) + (2 c1_ijk - h1_ijk) d(qd_k) + c0_ijk d(q_k), h1 being the part of
-        c1 that comes of energies linear in the velocities.
+        Each has the shape (..., n, N, n): d(tau_ij) = sum_k c2_ijk d(qdd_k) + (2 c1_ijk - h1_ijk) d(qd_k) +
+        c0_ijk d(q_k), where h1 is the part of c1 that comes from energies linear in the velocities.
         """
         answer: NaturalImpedance[Array] = self._call("natural_impedance", (q, qd, qdd), out)
         return answer
@@ -593,50 +601,50 @@ class Dynamics:
         passive: bool = True,
         friction_width: float | None = None,
     ) -> PartialImpedance[Array]:
-        """A controller under which shares of inertia, damping and stiffness are as asked.
+        """Return a controller under which shares of inertia, damping and stiffness are as asked.
 
         inertia, damping, stiffness: targets, each one of
             Natural(scale, plus)            c2_ijk or c1_ijk as they are, or scaled by alpha_ij, and more
             {(joint, link, coordinate): x}  these entries in place of the natural ones, by name or number
             (n, N, n)                       all entries
             (n, n), (n,) or a number        their sum over the links; a diagonal; the same at every joint
-        in kg m^2, N m s/rad and N m/rad, or as prismatic joints have them. Stiffness has no natural part:
-        positions meet gravity, which is compensated.
-        frame: what a frame is to feel like; the joints' targets are then for what it leaves free
+        in kg m^2, N m s/rad and N m/rad, or the units of prismatic joints. Stiffness has no natural part:
+        the torques that depend on positions alone are those of gravity, which is compensated.
+        frame: target impedance of a frame; the joints' targets are then for the motion that it leaves free
         passive: whether the joints' own springs and damping are compensated, and their armature kept as part
-        of the inertia, beside the links; else they are as if not there, which is right only where the
-        description has none. An inertia that is given as a sum is the whole, armature included.
+        of the inertia, beside the links; else they are ignored, which is right only where the description has
+        none. An inertia that is given as a sum is the whole, armature included.
         friction_width: None, and the joints' Coulomb friction is not compensated: it jumps at rest, and so
-        would torques, with the noise of a sensor. Else a velocity w in rad/s or m/s: friction tanh(qd / w)
-        is, 0.76 of the friction at w and 0.999 of it at 3.8 w.
+        would torques, with the noise of a sensor. Else a velocity w in rad/s or m/s: friction tanh(qd / w) is
+        compensated, 0.76 of the friction at w and 0.999 of it at 3.8 w.
 
-        Tensors among the targets are taken anew at each call, so that gains can be learned, and are refused
-        there where they are positive no more.
+        Tensors among the targets are read anew at each call, so that gains can be learned, and are refused
+        there where they are no longer positive.
 
-        Raises ValueError for names or shapes that are not there, and for a target that is not positive: an
-        inertia that is not positive definite or not symmetric, a stiffness or a damping that gives energy
-        away; and for robots with ties, whose joints are not free.
+        Raises ValueError for names that do not exist or wrong shapes, and for a target that is not positive:
+        an inertia that is not positive definite or not symmetric, a stiffness or a damping that adds energy;
+        and for robots with ties, whose joints are not free.
         """
         return partial_impedance(self, inertia, damping, stiffness, frame, passive, friction_width)
 
     def cancel(
         self, entries: Iterable[Any], passive: bool = True, friction_width: float | None = None
     ) -> Cancellation[Array]:
-        """A controller that cancels chosen motion propagation torques and no others, gravity apart.
+        """Return a controller that cancels gravity and chosen motion propagation torques, and no others.
 
         entries: (joint, link, coordinate, order): c2_ijk qdd_k for the order 2 and c1_ijk qd_k for 1 (closing
-        convention), by name or number; None in a place is all that there are. "What link 3's motion does to
-        the root": {("joint1", "link3", None, None)}.
+        convention), by name or number; None in a place stands for all. The effect of link 3's motion on the
+        root is {("joint1", "link3", None, None)}.
         passive, friction_width: as in `partial_impedance`
 
-        Raises ValueError for what is not there, such as a joint that is not on the path of the link, or what
-        is named twice. Calls raise it where what is left has no regular mass matrix, and warn where rounding
-        leaves fewer than half of the digits of what follows from it, unless they are given qdd.
+        Raises ValueError for an entry that does not exist, such as a joint that is not on the path of the
+        link, or that is given twice. Calls raise it where what is left has no regular mass matrix, and warn
+        where rounding leaves fewer than half of the digits of the acceleration, unless they are given qdd.
         """
         return cancellation(self, entries, passive, friction_width)
 
     def _call(self, key: str, given: tuple[object, ...], out: object) -> Any:
-        """Answer to motion as it was given, by the row of the table with this key."""
+        """Return the answer to motion as it was given, by the row of the table with this key."""
         row = CALLS[key]
         if out is None:
             at_once = self.backend.at_once
@@ -660,7 +668,7 @@ class Dynamics:
         out: object,
         beside: Sequence[Numbers] = (),
     ) -> Any:
-        """The same for motion that has been read, and what the row is given beside it."""
+        """Return the answer to motion that has been read, and to what the row is given beside it."""
         row, answers = CALLS[key], engine.answers
         if row.rigid:
             answers.check_regresses()

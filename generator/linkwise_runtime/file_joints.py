@@ -1,7 +1,7 @@
-"""Joints as the robot's file has them, of which some are several coordinates, and numbers that simulators
-keep for their positions: of a joint that turns in space a quaternion, four numbers for three angles.
+"""Joints of the robot's file, some of them with several coordinates, and their positions in simulators.
 
-The angles are yaw, pitch and roll, about the moved z, y and x, and their rates those of angular velocities:
+Simulators keep a quaternion for a joint that turns in space: four numbers for three angles. The angles are
+yaw, pitch and roll, about the moved z, y and x; E maps their rates to the angular velocity w:
 
 R = Rz(yaw) Ry(pitch) Rx(roll)      w = E (yaw', pitch', roll'), w along the body's axes
 
@@ -21,7 +21,7 @@ from .chosen_names import MOST_NAMES, choice, plain, short
 Floats = NDArray[np.float64]
 Order = Literal["mujoco", "pinocchio"]
 FLOATING_ROOT = "root_joint"
-"""What Pinocchio calls the joint by which the whole robot floats."""
+"""Name that Pinocchio gives to the joint by which the whole robot floats."""
 
 
 class FileJoint(NamedTuple):
@@ -29,34 +29,34 @@ class FileJoint(NamedTuple):
 
     name: str
     kind: str
-    """What it is, by the coordinates that it has:
+    """Kind of the joint, by the coordinates that it has:
 
     single      1, an angle or a length
-    continuous  1, an angle without ends; Pinocchio has its cosine and sine
+    continuous  1, an angle without limits; Pinocchio has its cosine and sine
     planar      3: x, y and yaw
     ball        3: yaw, pitch and roll, about the moved z, y and x
     floating    6: x, y, z of the parent, then those of a ball
     """
     coordinates: tuple[int, ...]
-    """Fewer than the kind has where some are locked."""
+    """Indices of its coordinates; fewer than the kind has where some are locked."""
 
 
 COORDINATES = {"single": 1, "continuous": 1, "planar": 3, "ball": 3, "floating": 6}
-"""Of each kind; as many velocities has either simulator."""
+"""Number of coordinates of each kind; both simulators have as many velocities."""
 POSITIONS: dict[str, dict[str, int]] = {
     "mujoco": COORDINATES | {"ball": 4, "floating": 7},
     "pinocchio": COORDINATES | {"continuous": 2, "planar": 4, "ball": 4, "floating": 7},
 }
-"""How many numbers of a qpos each kind has, by whose it is."""
+"""Number of values that each kind has in a qpos, by simulator."""
 
 
 def positions_of(joints: Sequence[FileJoint], order: str) -> int:
-    """How many numbers a qpos has."""
+    """Return the number of values in a qpos."""
     return sum(POSITIONS[order][joint.kind] for joint in joints)
 
 
 def layout(joints: Sequence[FileJoint], order: str) -> str:
-    """Which numbers of a qpos are which joint's, in words: base 0..6, knee 7."""
+    """Return in words which values of a qpos belong to which joint: base 0..6, knee 7."""
     told, at = [], 0
     for joint in joints:
         last = at + POSITIONS[order][joint.kind] - 1
@@ -66,7 +66,7 @@ def layout(joints: Sequence[FileJoint], order: str) -> str:
 
 
 def why_wider(joints: Sequence[FileJoint], width: int, n: int) -> str:
-    """Why positions have more numbers than n, if they are a qpos; else nothing."""
+    """Return the reason why positions have more numbers than n, if they are a qpos; else ""."""
     for order in POSITIONS:
         wider = [joint for joint in joints if POSITIONS[order][joint.kind] > COORDINATES[joint.kind]]
         if wider and positions_of(joints, order) == width:
@@ -84,7 +84,7 @@ def why_wider(joints: Sequence[FileJoint], width: int, n: int) -> str:
 
 
 def in_given_order(joints: Sequence[FileJoint], names: Sequence[str]) -> list[FileJoint]:
-    """The joints in the order of names; raises ValueError for names that are not those of all of them."""
+    """Return the joints in the order of names; raise ValueError unless names has each joint once."""
     known = {joint.name: joint for joint in joints}
     floats = [joint for joint in joints if joint.kind == "floating"]
     if FLOATING_ROOT not in known and floats and floats[0].name not in names:
@@ -106,7 +106,7 @@ def in_given_order(joints: Sequence[FileJoint], names: Sequence[str]) -> list[Fi
 
 
 def angles_of(quaternion: Floats) -> Floats:
-    """Yaw, pitch and roll (..., 3), pitch within a right angle, of unit quaternions w, x, y, z (..., 4)."""
+    """Return yaw, pitch (within 90 degrees) and roll (..., 3) of unit quaternions w, x, y, z (..., 4)."""
     w, x, y, z = np.moveaxis(quaternion, -1, 0)
     yaw = np.arctan2(2.0 * (x * y + w * z), w * w + x * x - y * y - z * z)
     roll = np.arctan2(2.0 * (y * z + w * x), w * w - x * x - y * y + z * z)
@@ -116,32 +116,32 @@ def angles_of(quaternion: Floats) -> Floats:
 
 
 def continued(given: Floats, before: Floats | None = None) -> Floats:
-    """The same attitudes (..., T, 3) by angles without leaps from sample to sample.
+    """Return the same attitudes (..., T, 3) by angles that do not jump from sample to sample.
 
-    before: angles (..., 3) of the sample before the first, from which they go on
+    before: angles (..., 3) of the sample before the first, from which they continue
 
     Each attitude has two triples up to whole turns, (yaw, pitch, roll) and (yaw + pi, pi - pitch, roll + pi):
-    every sample takes that which is nearer to the sample's before it.
+    every sample takes the one that is nearer to that of the sample before it.
     """
     if before is not None:
         return continued(np.concatenate([before[..., None, :], given], -2))[..., 1:, :]
     other = np.stack([given[..., 0] + np.pi, np.pi - given[..., 1], given[..., 2] + np.pi], -1)
     same, crossed = (_apart(triple[..., 1:, :], given[..., :-1, :]) for triple in (given, other))
-    # From the one to the other and back, a step costs the same.
+    # A change from either triple to the other is equally long, so that changes can be counted.
     switches = np.concatenate([np.zeros((*given.shape[:-2], 1), int), crossed < same], -1)
     found = np.where((np.cumsum(switches, -1) % 2)[..., None].astype(bool), other, given)
     return np.asarray(np.unwrap(found, axis=-2))
 
 
 def _apart(one: Floats, other: Floats) -> Floats:
-    """The sum of the squares of how far angles are apart, whole turns aside."""
+    """Return the sum of the squared differences between angles (..., 3), up to whole turns."""
     turned = np.remainder(one - other + np.pi, 2.0 * np.pi) - np.pi
     apart: Floats = (turned * turned).sum(-1)
     return apart
 
 
 def rates_map(angles: Floats) -> Floats:
-    """E, (..., 3, 3)."""
+    """Return the matrix E, (..., 3, 3), of angles (..., 3)."""
     (_, sp, sr), (_, cp, cr) = (np.moveaxis(f(angles), -1, 0) for f in (np.sin, np.cos))
     zero = 0.0 * sp
     rows = [[-sp, zero, zero + 1.0], [sr * cp, cr, zero], [cr * cp, -sr, zero]]
@@ -149,7 +149,7 @@ def rates_map(angles: Floats) -> Floats:
 
 
 def rates_of(angles: Floats, turning: Floats) -> Floats:
-    """E^-1 w: rates of the angles for angular velocities along the body's axes, (..., 3) each."""
+    """Return E^-1 w: the rates of the angles for angular velocities along the body's axes, (..., 3) each."""
     (_, sp, sr), (_, cp, cr) = (np.moveaxis(f(angles), -1, 0) for f in (np.sin, np.cos))
     x, y, z = np.moveaxis(turning, -1, 0)
     yaw = (y * sr + z * cr) / cp
@@ -157,7 +157,7 @@ def rates_of(angles: Floats, turning: Floats) -> Floats:
 
 
 def turning_of_rates(angles: Floats, rates: Floats) -> Floats:
-    """dE/dt times the rates, what w' has besides E times their change, (..., 3)."""
+    """Return dE/dt times the rates, (..., 3): the part of w' beside E times the change of the rates."""
     (_, sp, sr), (_, cp, cr) = (np.moveaxis(f(angles), -1, 0) for f in (np.sin, np.cos))
     yaw, pitch, roll = np.moveaxis(rates, -1, 0)
     x = -yaw * cp * pitch
@@ -167,7 +167,7 @@ def turning_of_rates(angles: Floats, rates: Floats) -> Floats:
 
 
 def turned(angles: Floats, vectors: Floats) -> Floats:
-    """Vectors along the body's axes, (..., 3), along those that it turns in."""
+    """Return vectors along the body's axes, (..., 3), along the axes in which the body turns."""
     (sy, sp, sr), (cy, cp, cr) = (np.moveaxis(f(angles), -1, 0) for f in (np.sin, np.cos))
     x, y, z = np.moveaxis(vectors, -1, 0)
     y, z = cr * y - sr * z, sr * y + cr * z

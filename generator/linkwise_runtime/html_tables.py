@@ -1,4 +1,4 @@
-"""Small tables for notebooks, in light and dark: they bring no colours of their own; among them a robot."""
+"""Small HTML tables for notebooks, with one of a robot; they have no colours, to fit light and dark pages."""
 
 import html
 from collections.abc import Iterable, Sequence
@@ -7,7 +7,7 @@ from math import isinf
 from .structure import Structure
 
 MOST_ROWS, LONGEST = 60, 80
-"""Of a table, and of a cell in letters; of rows beyond the number is told."""
+"""Most rows of a table, beyond which their number is given, and most letters of a cell."""
 CELL = "text-align:left;vertical-align:top;padding:.15em 1em .15em 0;white-space:nowrap"
 HEAD = f"{CELL};font-weight:normal;opacity:.65"
 LINE = "border-bottom:1px solid;border-color:color-mix(in srgb,currentColor 25%,transparent)"
@@ -15,7 +15,7 @@ TITLE = "margin:0 0 .4em;font-weight:600"
 
 
 def page_part(title: str, *tables: str) -> str:
-    """A title, and tables side by side as far as there is room."""
+    """Return HTML of a title, and of tables side by side as far as there is room."""
     beside = "".join(tables)
     return (
         f'<div><p style="{TITLE}">{text(title)}</p>'
@@ -24,7 +24,7 @@ def page_part(title: str, *tables: str) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of texts."""
+    """Return HTML of a table of texts."""
     every = list(rows)
     more = [[f"and {len(every) - MOST_ROWS} more", *[""] * (len(head) - 1)]] if len(every) > MOST_ROWS else []
     heads = "".join(f'<th style="{HEAD};{LINE}">{text(cell)}</th>' for cell in head)
@@ -37,12 +37,12 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def text(cell: str) -> str:
-    """Text of HTML, in which what cannot be seen is written out."""
+    """Return text as HTML, in which characters that cannot be seen are written out."""
     return html.escape(cell if cell.isprintable() else repr(cell))
 
 
 def remark(*lines: str) -> str:
-    """Small lines below."""
+    """Return HTML of small lines below a table."""
     told = "<br>".join(map(text, lines))
     return f'<p style="margin:.5em 0 0;font-size:.85em;opacity:.7">{told}</p>'
 
@@ -52,7 +52,7 @@ def _short(cell: str) -> str:
 
 
 def robot_table(structure: Structure, title: str) -> str:
-    """HTML of joints with their units and limits, and of links with the joints that move them."""
+    """Return HTML of joints with their units and limits, and of links with the joints that move them."""
     links = [
         (str(j), name, ", ".join(structure.joint_names[i] for i in path))
         for j, (name, path) in enumerate(zip(structure.link_names, structure.paths, strict=True))
@@ -68,7 +68,10 @@ def robot_table(structure: Structure, title: str) -> str:
 
 
 def joint_table(names: Sequence[str], units: Sequence[str], limits: Iterable[Sequence[float]]) -> str:
-    """HTML of joints; limits: lower, upper, velocity and effort of each, infinite or not there at all."""
+    """Return HTML of a table of joints.
+
+    limits: lower, upper, velocity and effort of each joint, infinite where it has none; or empty
+    """
     of_joint = list(limits)
     limited = any(not isinf(limit) for row in of_joint for limit in row)
     told = [_limits(*row) if limited else () for row in of_joint] or [()] * len(names)

@@ -1,4 +1,4 @@
-"""What the parts of a package say to each other: arrays, closed forms, back ends."""
+"""Interfaces between the parts of a package: arrays, libraries, closed forms."""
 
 # ruff: noqa: D102 - functions that NumPy and torch document
 
@@ -9,23 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    # A package that needs no torch is read without it; then tensors are Any.
+    # Packages that need no torch are type-checked without it: tensors are then Any.
     from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
 
 Array = TypeVar("Array", NDArray[np.float64], NDArray[np.float32], NDArray[Any], "Tensor")
-"""NumPy array or torch tensor, of float32 or float64; answers are what the motion is, device included."""
+"""NumPy array or torch tensor, of float32 or float64; answers are as the motion is, device included."""
 
 
 class Dtype(Protocol):
-    """That of an array or a tensor."""
+    """Dtype of an array or a tensor."""
 
     @property
     def itemsize(self) -> int:
-        """Bytes of a number."""
+        """Size of a number in bytes."""
 
 
 class Numbers(Protocol):
-    """An array or a tensor, as all code computes with it that does not ask which of the two it is."""
+    """An array or a tensor, in code that need not know which of the two it is."""
 
     @property
     def shape(self) -> tuple[int, ...]: ...
@@ -73,7 +73,7 @@ class Numbers(Protocol):
 
 
 class Namespace(Protocol):
-    """What NumPy and torch have under one name: `xp` wherever it is passed on."""
+    """Functions that NumPy and torch have under one name; `xp` wherever it is passed on."""
 
     __name__: str
     linalg: Any
@@ -104,36 +104,39 @@ class Namespace(Protocol):
 
 
 class Library(Protocol):
-    """NumPy or torch, as a call computes with it: chosen once, where its motion comes in."""
+    """NumPy or torch, as a call computes with it: chosen once, where its motion is read."""
 
     @property
     def xp(self) -> Namespace:
-        """Its functions."""
+        """Functions of the library."""
 
     @property
     def fuses(self) -> bool:
-        """Whether a compiler makes one loop of many operations, to which a matrix product is a wall."""
+        """True if a compiler makes one loop of many operations, which a matrix product would split."""
 
     def constant(self, values: Any, like: Numbers) -> Numbers:
-        """A table of numbers, to compute with `like`."""
+        """Return a table of numbers, to compute with `like`."""
 
     def index(self, values: Any, like: Numbers) -> Numbers:
-        """A table of positions, to take from `like`."""
+        """Return a table of positions, to index `like` with."""
 
     def weights(self, name: str, value: Any, like: Numbers) -> Numbers:
-        """Real numbers in anything array-like, of the kind and dtype of `like`; errors name the argument."""
+        """Return real numbers, from anything array-like, with the kind and dtype of `like`.
+
+        Raises TypeError or ValueError, which names the argument.
+        """
 
     def zeros(self, like: Numbers, count: int) -> Numbers:
-        """Zeros of shape (..., count) for `like` of shape (..., m)."""
+        """Return zeros of shape (..., count) for `like` of shape (..., m)."""
 
     def concatenate(self, parts: Iterable[Numbers]) -> Numbers:
-        """The parts joined along the last axis."""
+        """Return the parts joined along the last axis."""
 
     def few(self, samples: int, links: int) -> bool:
-        """Whether spatial matrices are quicker for so many samples of a robot of so many links."""
+        """Return whether spatial matrices are faster for so many samples of a robot of so many links."""
 
     def chunk(self, motion: Sequence[Numbers], most: int) -> int | None:
-        """Samples to compute at once, of which so many stay in the cache; None for all."""
+        """Return the number of samples to compute at once, if `most` fit in the cache; None for all."""
 
 
 Entries = tuple[Any, ...]
@@ -141,27 +144,27 @@ Entries = tuple[Any, ...]
 
 
 class ClosedForms(Protocol):
-    """forms/link_k.py: the closed forms of one link over its path, for arrays of the namespace `xp`.
+    """Closed forms of one link over its path, forms/link_k.py, for arrays of the namespace `xp`.
 
     q, qd, qdd have shape (..., n); `p` maps names of parameters to values; entries are in the order of
     `Layout`.
     """
 
     OPERATIONS: Mapping[str, int]
-    """Operations of each of the functions, sines and the like included: so many there are on arrays."""
+    """Number of operations of each function on arrays, sines and the like included."""
 
     def decomposition(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Entries, ...]:
-        """(c2, c1, g, tau), and h1 after them for a link whose energy has terms linear in the velocities."""
+        """Return (c2, c1, g, tau), and h1 after them where energy has terms linear in the velocities."""
 
     def torque(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> Entries:
-        """tau_ij, by i."""
+        """Return tau_ij, in the order of i."""
 
     def position_gradient(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> Entries:
-        """c0_ijk = d(tau_ij)/d(q_k), by i, then k."""
+        """Return c0_ijk = d(tau_ij)/d(q_k), in the order of i, then k."""
 
 
 class EnergyForms(ClosedForms, Protocol):
-    """Those of a link that is energies; the rule has the energies of rigid links."""
+    """Closed forms of a link given by its energies; for rigid links the rule has the energies."""
 
     def energy(self, xp: Any, q: Any, qd: Any, p: Mapping[str, Any]) -> Entries:
-        """Kinetic and potential energy in J."""
+        """Return the kinetic and potential energy in J."""

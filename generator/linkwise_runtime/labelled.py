@@ -1,4 +1,4 @@
-"""Any call of a robot, answered with names along the axes."""
+"""Answers of any call of a robot with names along the axes."""
 
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,13 +17,16 @@ from .robot_axes import NamedAxis, axes_of, tied_axes
 
 TIED = "constraints."
 ALONE = ("constraints.closed", "simulate")
-"""Calls that take the independent joints alone in place of all."""
+"""Calls that accept the independent joints alone in place of all joints."""
 
 
 def labelled(
     robot: Any, ties: Any, call: str, given: Sequence[object], named: Mapping[str, object], along: Any
 ) -> Any:
-    """See `Dynamics.labelled`; ties: constraints whose calls are meant, None for those of the robot."""
+    """Return the answer of a call as `Dynamics.labelled` says.
+
+    ties: constraints whose calls are meant, None for those of the robot
+    """
     xarray()
     rows = _rows(ties is not None, call)
     function = attrgetter(call)(robot if ties is None else ties)
@@ -50,7 +53,7 @@ def labelled(
 
 
 def _rows(of_ties: bool, call: str) -> list[Call]:
-    """What a call may be, by what is chosen of it; raises ValueError for one that is not there."""
+    """Return the rows of a call, one for each variant; raise ValueError for a call that does not exist."""
     known: dict[str, list[Call]] = {}
     for row in CALLS.values():
         if row.is_named and (not of_ties or row.key.startswith(TIED)):
@@ -64,7 +67,7 @@ def _rows(of_ties: bool, call: str) -> list[Call]:
 
 
 def _chosen(rows: Sequence[Call], arguments: Mapping[str, object]) -> Call:
-    """The row that arguments choose; the first has what counts unless they do."""
+    """Return the row that the arguments choose; the first one is the default."""
     for row in rows[1:]:
         if all(_is_so(arguments, name, value) for name, value in row.chosen.items()):
             return row
@@ -72,7 +75,7 @@ def _chosen(rows: Sequence[Call], arguments: Mapping[str, object]) -> Call:
 
 
 def _is_so(arguments: Mapping[str, object], name: str, value: object) -> bool:
-    """Whether an option is chosen, as the call sees it: any true value for True."""
+    """Return whether an option has this value, as the call sees it: any true value is True."""
     given = arguments.get(name, not value)
     return bool(given) == value if isinstance(value, bool) else given == value
 
@@ -80,7 +83,7 @@ def _is_so(arguments: Mapping[str, object], name: str, value: object) -> bool:
 def _before(
     part: Part, instants: NDArray[Any] | None, samples: SampleAxes | None, along: Any
 ) -> tuple[list[str], dict[str, Any]]:
-    """Dimensions before those of the quantities, and what stands along them."""
+    """Return the dimensions before those of the quantities, and the coordinates along them."""
     quantity, values = part
     first = [] if instants is None else ["time"]
     shape = values.shape[len(first) : values.ndim - len(quantity.axes)]
@@ -98,7 +101,7 @@ def _before(
 
 
 def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict[str, NamedAxis]:
-    """Axes by the names that quantities have for them."""
+    """Return the axes by the names that quantities have for them."""
     axes = axes_of(robot.joint_names, robot.joint_units, robot.link_names)
     if key.startswith("kinematics.poses"):
         axes["frame"] = NamedAxis("frame", robot.kinematics.frames)
@@ -115,7 +118,7 @@ def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict
 
 
 def _names_of(loads: Any, robot: Any) -> tuple[str, ...]:
-    """Names of loads: those of their frames, numbered where one has several."""
+    """Return the names of loads: those of their frames, numbered where a frame has several."""
     names: list[str] = []
     for load in [loads] if isinstance(loads, AppliedLoad) else loads:
         several: Iterable[Any] = [load] if isinstance(load, AppliedLoad) else load
@@ -129,7 +132,7 @@ def _names_of(loads: Any, robot: Any) -> tuple[str, ...]:
 
 
 def _array(value: Any) -> NDArray[Any]:
-    """An array, or what a tensor holds; raises TypeError for one that gradients are asked of."""
+    """Return an array, or the numbers of a tensor; raise TypeError for one that requires a gradient."""
     if not has_tensors([value]):
         return np.asarray(value)
     if value.requires_grad:

@@ -1,6 +1,6 @@
-"""Arrays with names along their axes, as xarray has them: answers become such, arguments may be such.
+"""Arrays with names along their axes, as in xarray: answers are made such arrays, and arguments may be such.
 
-Answers are a Dataset, made of quantities and their values. Of arguments the joints are brought into the
+Answers are a Dataset, made of quantities and their values. The joints of arguments are brought into the
 robot's order, and the axes of their samples are those of the answer.
 """
 
@@ -23,42 +23,42 @@ Part = tuple[Quantity, Values]
 """A quantity, and its values (..., *axes) in an array."""
 Texts = NDArray[np.object_]
 Variable = tuple[Sequence[str], Values, dict[str, str]]
-"""Dimensions, values and what is told of them, as xarray takes it."""
+"""Dimensions, values and attributes of a variable, as xarray accepts them."""
 LAST = ("joint", "component", "axis")
-"""Dimensions that are none of the samples."""
+"""Dimensions that are not those of samples."""
 OTHER_UNITS = ("deg", "\u00b0", "mm", "cm")
-"""How units begin that are none of SI."""
+"""Prefixes of units that are refused, as they are not those of SI."""
 OF_INDEPENDENT = ("yd", "ydd")
-"""Arguments of constraints that are of the independent joints."""
+"""Arguments of constraints that are given for the independent joints."""
 
 
 class NamedArray(Protocol):
-    """A DataArray as far as arguments are asked: the runtime imports no xarray, not even for types."""
+    """Part of a DataArray that arguments need: the runtime imports no xarray, not even for types."""
 
     @property
     def dims(self) -> tuple[str, ...]:
-        """Names of its axes."""
+        """Names of the axes."""
 
     @property
     def coords(self) -> Mapping[str, "NamedArray"]:
-        """What stands along these."""
+        """Coordinates along the axes."""
 
     @property
     def attrs(self) -> Mapping[str, object]:
-        """What is told of it, such as its units."""
+        """Attributes, such as the units."""
 
     def isel(self, *, joint: Sequence[int]) -> "NamedArray":
-        """The joints at these places."""
+        """Return the array with the joints at these places."""
 
     def transpose(self, *dims: object) -> "NamedArray":
-        """The same with its axes in this order."""
+        """Return the array with its axes in this order."""
 
     def to_numpy(self) -> NDArray[np.generic]:
-        """Its values."""
+        """Return the values of the array."""
 
 
 class SampleAxes(NamedTuple):
-    """Dimensions before those of a quantity, and what stands along them, as xarray takes it."""
+    """Dimensions before those of a quantity, and the coordinates along them, as xarray accepts them."""
 
     dimensions: Sequence[str]
     coordinates: dict[str, object]
@@ -66,7 +66,7 @@ class SampleAxes(NamedTuple):
 
 
 def xarray() -> ModuleType:
-    """The library; raises ImportError that says how to install it."""
+    """Return the module xarray; raise ImportError, which says how to install it, where it is missing."""
     try:
         return import_module("xarray")
     except ImportError:
@@ -83,11 +83,11 @@ def dataset(
     coordinates: Mapping[str, object],
     attributes: Mapping[str, object],
 ) -> Any:
-    """A Dataset of all quantities; entries of one stand side by side along an axis behind the others.
+    """Return a Dataset of all quantities; entries of one stand side by side along a further axis, the last.
 
-    before: dimensions before those of the quantities; coordinates: along these, as xarray takes them
+    before: dimensions before those of the quantities; coordinates: those along these, as xarray accepts them
 
-    A unit is an attribute, `units`; where it hangs on the entry, the attribute `units_from` names the
+    A unit is an attribute, `units`; where it depends on the entry, the attribute `units_from` names the
     coordinate that has it, which quantities of the same units share.
     """
     taken = [axes[axis].dimension for quantity, _ in parts for axis in quantity.axes]
@@ -113,7 +113,7 @@ def dataset(
 def _with_units(
     parts: Sequence[Part], axes: Mapping[str, NamedAxis], variables: Mapping[str, Variable]
 ) -> dict[str, object]:
-    """Coordinates of units that hang on the entry; the others are put among what the variables say."""
+    """Return the coordinates of units that depend on the entry; add other units to the attributes."""
     shared: dict[tuple[tuple[object, ...], ...], str] = {}
     found: dict[str, object] = {}
     for name, given in _by_name(parts).items():
@@ -129,12 +129,12 @@ def _with_units(
 
 
 def names_array(names: Iterable[str]) -> Texts:
-    """Names along an axis, such as files hold: text of one width is none of Zarr's types."""
+    """Return names along an axis as objects, which files can hold: Zarr has no text of fixed width."""
     return np.array(list(names), dtype=object)
 
 
 def units_of(entries: Sequence[Quantity], axes: Mapping[str, NamedAxis]) -> tuple[list[str], Texts]:
-    """Dimensions along which the unit of a quantity changes, and how it is written along these."""
+    """Return the dimensions along which a quantity's unit changes, and the unit as text along these."""
     factors = [_factors(entry.unit) for entry in entries]
     named = {axis for some in factors for _, axis, _ in some if axis}
     over = [axis for axis in entries[0].axes if axis in named and len(set(axes[axis].units)) > 1]
@@ -154,14 +154,17 @@ def units_of(entries: Sequence[Quantity], axes: Mapping[str, NamedAxis]) -> tupl
 
 
 def _factors(unit: str) -> list[tuple[str, str, int]]:
-    """What is measured along which axis, and its power; of a symbol the symbol, and no axis."""
+    """Return the factors of a unit: what is measured, along which axis, and the power.
+
+    For a symbol these are the symbol, no axis, and the power.
+    """
     above, _, below = unit.removeprefix("~").partition("/")
     words = [(word, 1) for word in above.split()] + [(word, -1) for word in below.split()]
     return [(*word.partition(":")[::2], power) for word, power in words]
 
 
 def _written(quantity: Quantity, factors: Sequence[tuple[str, str, int]], places: Mapping[str, str]) -> str:
-    """The unit of the entries that are measured so along each axis."""
+    """Return the unit, as text, of the entries whose places are measured so along each axis."""
     unit: Unit = {}
     for what, axis, power in factors:
         unit = product(unit, measured(what, places[axis]) if axis else {what: 1}, power)
@@ -176,7 +179,10 @@ def _by_name(parts: Sequence[Part]) -> dict[str, list[Part]]:
 
 
 def alone(made: Any) -> Any:
-    """The only quantity of a Dataset as a DataArray, which says what the Dataset says of itself."""
+    """Return the only quantity of a Dataset as a DataArray, with the Dataset's attributes.
+
+    A Dataset of several quantities is returned as it is.
+    """
     if len(made.data_vars) > 1:
         return made
     (name,) = made.data_vars
@@ -186,11 +192,11 @@ def alone(made: Any) -> Any:
 def taken(
     arguments: Mapping[str, object], joints: Sequence[str], independent: Sequence[str], alone: bool = False
 ) -> tuple[dict[str, object], SampleAxes | None]:
-    """The arguments as arrays, joints in the robot's order; and their samples, where some have names.
+    """Return the arguments as arrays, joints in the robot's order; and their samples, where some have names.
 
     alone: whether an argument of all joints may have the independent ones alone
 
-    Raises ValueError for a joint that an argument lacks, and where arguments are of other samples.
+    Raises ValueError for a joint that an argument lacks, and where the samples of arguments differ.
     """
     xr = xarray()
     arguments = {name: _of_frame(a, xr) for name, a in arguments.items()}
@@ -223,7 +229,10 @@ def taken(
 
 
 def _of_frame(value: object, xr: ModuleType) -> object:
-    """A table or row of pandas or polars as an array with its columns' names; any other value itself."""
+    """Return a table or row of pandas or polars as an array with the names of its columns.
+
+    Any other value is returned as it is.
+    """
     if not hasattr(value, "to_numpy") or isinstance(value, xr.DataArray):
         return value
     index = getattr(value, "index", None)
@@ -250,10 +259,10 @@ def _check_named(name: str, array: NamedArray) -> None:
 
 
 def samples_along(along: object, shape: tuple[int, ...]) -> SampleAxes:
-    """The axes of samples without names, as `along` names them.
+    """Return the axes of samples without names, as `along` names them.
 
-    Raises TypeError for what is no names, ValueError where they are more or fewer, and where what stands
-    along an axis is.
+    Raises TypeError for values that are not names, ValueError where there are more or fewer of them than
+    axes, or of the values along an axis than samples.
     """
     count = len(shape)
     if along is None:
@@ -280,14 +289,17 @@ def _along(name: str, values: object) -> tuple[str, object, dict[str, str]]:
 
 
 def _joints_of(array: NamedArray) -> list[str]:
-    """Names of an array's joints; none where they have none."""
+    """Return the names of an array's joints; [] where they have none."""
     if "joint" not in array.dims or "joint" not in array.coords:
         return []
     return [str(name) for name in array.coords["joint"].to_numpy()]
 
 
 def _in_order(argument: str, array: NamedArray, joints: Sequence[str]) -> NamedArray:
-    """An array whose joints, where they have names, are these."""
+    """Return the array with these joints, in this order, where its joints have names.
+
+    Raises ValueError for a joint that it lacks or has more than once.
+    """
     there = _joints_of(array)
     if not there:
         return array

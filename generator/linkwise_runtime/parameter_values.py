@@ -1,4 +1,4 @@
-"""Values of the run-time parameters: known by name, real numbers, and such as a body can have."""
+"""Values of the run-time parameters: checked to be known by name, real numbers, and possible for a body."""
 
 import math
 import sys
@@ -18,29 +18,31 @@ if TYPE_CHECKING:
     from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
 
 Value = float | NDArray[np.float64]
-"""One number for all samples, or one for each."""
+"""A number for all samples, or an array with one for each."""
 
 TRIANGLE = 1e-6
 """Relative slack of the triangle inequality: files round flat bodies' moments to about six digits."""
 SPECK = 1e-14
-"""m^2: moments below mass times this count as zero; a point mass has only what rounding leaves of them."""
+"""In m^2: moments of inertia below mass times this count as zero; those of a point mass are rounding
+errors."""
 
 
 @dataclass(frozen=True)
 class ParametricBody:
-    """A link whose mass and inertia hang on parameters."""
+    """A link whose mass and inertia depend on parameters."""
 
     link: str
     parameters: tuple[str, ...]
-    """Those that they hang on."""
+    """Names of the parameters on which they depend."""
     mass_and_inertia: Callable[[Mapping[str, Any]], Sequence[Any]]
-    """Mass in kg; xx, yy, zz, xy, xz, yz of the inertia about the centre of mass in kg m^2, in any axes."""
+    """Function of the parameters that returns the mass in kg and xx, yy, zz, xy, xz, yz of the inertia about
+    the centre of mass in kg m^2, in any axes."""
 
 
 def checked_values(
     own: Mapping[str, float], given: Mapping[str, object], bodies: Sequence[ParametricBody]
 ) -> dict[str, float | Numbers]:
-    """All parameters, those `given` in place of their `own` values; raises what the package's `load` says."""
+    """Return all parameters, `given` values in place of `own` ones; raise as the package's `load` says."""
     if not given:
         return dict(own)
     if not isinstance(given, Mapping):
@@ -65,7 +67,7 @@ def checked_values(
 
 
 def _number(name: str, value: object) -> Value:
-    """A value as a float or an array of them.
+    """Return a value as a float or an array of floats.
 
     Raises TypeError for what is not a real number or an array of them, ValueError for NaN and infinity.
     """
@@ -99,7 +101,7 @@ def fits(name: str, shape: Sequence[int], batch: Sequence[int]) -> None:
 
 
 def faults(values: NDArray[np.float64]) -> NDArray[np.intp]:
-    """What is unphysical of bodies (..., 7), listed as by a `ParametricBody`: an index of REASONS each."""
+    """Return an index into REASONS for each of bodies (..., 7), which are listed as by a `ParametricBody`."""
     mass, (xx, yy, zz, xy, xz, yz) = values[..., 0], np.moveaxis(values[..., 1:], -1, 0)
     broken: NDArray[np.bool_] = np.logical_not(np.isfinite(values).all(-1))
     tensor = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], -1)
@@ -157,15 +159,15 @@ def _unknown(name: str, own: Mapping[str, float]) -> str:
 
 
 def _is_tensor(value: object) -> "TypeGuard[Tensor]":
-    """Whether a value is a torch tensor; torch isn't imported to find out."""
+    """Return whether a value is a torch tensor, without importing torch."""
     torch = sys.modules.get("torch")
     return torch is not None and isinstance(value, torch.Tensor)
 
 
 def _looked_at(tensors: "Mapping[str, Tensor]") -> dict[str, object]:
-    """Values that tensors have now, without gradients, in one transfer a kind.
+    """Return the values that tensors have now, without gradients, in one transfer for each kind.
 
-    Those inside torch.func and torch.compile, and those without data, cannot be looked at and are left out.
+    Tensors inside torch.func and torch.compile, and those without data, cannot be looked at and are left out.
     """
     torch = sys.modules.get("torch")
     if (
@@ -188,7 +190,7 @@ def _looked_at(tensors: "Mapping[str, Tensor]") -> dict[str, object]:
 
 
 def _listed(names: Collection[str], values: Mapping[str, Value]) -> str:
-    """The first few parameters with their values."""
+    """Return the first few parameters with their values, as text."""
     shown = [
         plain(name) if np.ndim(values[name]) else f"{plain(name)} = {values[name]:g}"
         for name in list(names)[:MOST_NAMES]

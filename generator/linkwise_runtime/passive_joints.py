@@ -1,7 +1,7 @@
-"""What joints have of their own, beside the links that they carry: springs, damping, friction, armature.
+"""Passive properties of joints, beside the links that they carry: springs, damping, friction, armature.
 
-A joint at p = ratio q takes stiffness (p - rest) + damping pd + friction sign(pd) + armature pdd to move, and
-its coordinate ratio times as much; joints of one coordinate sum up:
+Moving a joint at p = ratio q requires stiffness (p - rest) + damping pd + friction sign(pd) + armature pdd,
+and moving its coordinate ratio times as much; joints of one coordinate sum up:
 
     spring    sum r k (r q - rest)        damping   sum r^2 b  qd
     friction  sum |r| f  sign(qd)         armature  sum r^2 a  qdd
@@ -14,37 +14,37 @@ from .interface import Library, Numbers
 
 
 class PassiveJoint(NamedTuple):
-    """A joint on a coordinate, which is counted from 0; rest is the p at which its spring gives nothing."""
+    """A joint on a coordinate, counted from 0; rest is the p at which its spring is without load."""
 
     joint: str
     coordinate: int
     ratio: float
-    """dp/dq; other than 1 where the joint follows another one."""
+    """dp/dq; not 1 where the joint follows another one."""
     stiffness: float = 0.0
-    """In N m/rad or N/m."""
+    """Stiffness of the spring in N m/rad or N/m."""
     rest: float = 0.0
-    """In rad or m."""
+    """Rest position of the spring in rad or m."""
     damping: float = 0.0
-    """In N m s/rad or N s/m."""
+    """Damping in N m s/rad or N s/m."""
     friction: float = 0.0
-    """Coulomb's, in N m or N."""
+    """Coulomb friction in N m or N."""
     armature: float = 0.0
-    """Inertia of what turns behind a gear, as the joint feels it, in kg m^2 or kg."""
+    """Inertia of what turns behind a gear, as seen by the joint, in kg m^2 or kg."""
 
 
 class PassiveSums(NamedTuple):
-    """By coordinate, n numbers each."""
+    """Passive properties summed up by coordinate, n numbers each."""
 
     stiffness: tuple[float, ...]
     pull: tuple[float, ...]
-    """What springs give at q = 0."""
+    """Torques or forces of the springs at q = 0, with the sign of `passive_torques`."""
     damping: tuple[float, ...]
     friction: tuple[float, ...]
     armature: tuple[float, ...]
 
 
 def passive_sums(joints: Sequence[PassiveJoint], n: int) -> PassiveSums:
-    """The joints of each of n coordinates summed up."""
+    """Return the properties of the joints, summed up for each of n coordinates."""
 
     def summed(of: Callable[[PassiveJoint], float]) -> tuple[float, ...]:
         return tuple(sum((of(joint) for joint in joints if joint.coordinate == k), 0.0) for k in range(n))
@@ -61,11 +61,11 @@ def passive_sums(joints: Sequence[PassiveJoint], n: int) -> PassiveSums:
 def passive_torques(
     library: Library, sums: PassiveSums, q: Numbers, qd: Numbers, qdd: Numbers
 ) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-    """Spring, damping, friction, armature, (..., n) each."""
+    """Return the torques for spring, damping, friction and armature, (..., n) each."""
     stiffness, pull, damping, friction, armature = (library.constant(numbers, q) for numbers in sums)
     return stiffness * q + pull, damping * qd, friction * library.xp.sign(qd), armature * qdd
 
 
 def smooth_friction(library: Library, sums: PassiveSums, qd: Numbers, width: float) -> Numbers:
-    """Friction tanh(qd / width), (..., n): what a controller gives, which must not jump at rest."""
+    """Return friction tanh(qd / width), (..., n): for controllers, whose torque must not jump at rest."""
     return library.constant(sums.friction, qd) * library.xp.tanh(qd / width)

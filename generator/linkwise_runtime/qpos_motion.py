@@ -1,8 +1,8 @@
-"""Positions, velocities, accelerations and torques as MuJoCo and Pinocchio have them, in coordinates q.
+"""Conversion of positions, velocities, accelerations and torques of MuJoCo and Pinocchio to coordinates q.
 
-Either has the angular velocity of a body that turns along its own axes. The linear one of a body that floats
-MuJoCo has along the world's, Pinocchio along the body's; accelerations are the changes of these numbers.
-Torques are what the same power takes: tau^T qd = tau_v^T v.
+Both have the angular velocity of a body that turns along its own axes. The linear velocity of a body that
+floats is along the world's axes in MuJoCo, along the body's in Pinocchio; accelerations are the rates of
+these numbers. Torques keep the power: tau^T qd = tau_v^T v.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,15 +29,15 @@ from .file_joints import (
 )
 
 UNIT = 1e-2
-"""By which a quaternion's length, or that of a cosine and a sine, may miss 1."""
+"""Tolerance of the length, 1, of a quaternion, or of a cosine and a sine."""
 STEEP = 0.05
-"""Cosine of a pitch next to a right angle, some 3 degrees."""
+"""Cosine of a pitch next to a right angle, some 3 degrees away."""
 UPRIGHT = 1e-6
-"""One at which yaw and roll have no rates."""
+"""Cosine of a pitch at which yaw and roll have no rates."""
 
 
 class QposMotion(NamedTuple):
-    """Arrays (..., n) in SI units; None for what was not given."""
+    """Converted motion, arrays (..., n) in SI units; None for what was not given."""
 
     q: Floats
     qd: Floats | None
@@ -47,18 +47,18 @@ class QposMotion(NamedTuple):
 
 
 class Earlier(NamedTuple):
-    """What comes before the samples, where a motion is converted piece by piece."""
+    """Samples before the given ones, where a motion is converted piece by piece."""
 
     samples: int = 0
     q: Floats | None = None
-    """At the last of them, (n,)."""
+    """Positions at the last of them, (n,)."""
 
 
 NOTHING = Earlier()
 
 
 class _JointNumbers(NamedTuple):
-    """A joint, and where its numbers stand in a qpos and in velocities."""
+    """A joint, and the places of its numbers in a qpos and in velocities."""
 
     joint: FileJoint
     positions: slice
@@ -66,7 +66,7 @@ class _JointNumbers(NamedTuple):
 
 
 class Qpos:
-    """How numbers of one order become coordinates."""
+    """Conversion of numbers in the order of one simulator to coordinates."""
 
     def __init__(
         self,
@@ -75,7 +75,9 @@ class Qpos:
         order: object = "mujoco",
         names: Sequence[str] | None = None,
     ) -> None:
-        """`pinocchio`: the joints in its order; names: those of the joints in that of qpos, if it is another.
+        """Set up the conversion.
+
+        pinocchio: the joints in its order; names: those of the joints in that of qpos, if it is another.
 
         Raises ValueError for another order, for names that are not those of the joints, and for a joint of
         which some coordinates are locked.
@@ -100,7 +102,10 @@ class Qpos:
         tau: object = None,
         earlier: Earlier = NOTHING,
     ) -> QposMotion:
-        """See `MotionCalls.from_qpos`; angles and numbers of samples go on from what is earlier."""
+        """Return the motion as `Dynamics.from_qpos` does.
+
+        earlier: samples before these, from which angles, and the numbers of samples in messages, continue
+        """
         if qacc is not None and qvel is None:
             raise ValueError("qacc is given without qvel, on which accelerations of angles depend; give both")
         positions = self._read("qpos", qpos, self.width)
@@ -122,7 +127,7 @@ class Qpos:
         return found._replace(warnings=tuple(warnings))
 
     def why_not(self, width: int) -> str:
-        """What a qpos has, in words, for positions that have another number of columns than `width`."""
+        """Return in words what a qpos has, for positions with another number of columns, `width`."""
         other = next((o for o in POSITIONS if positions_of(self.joints, o) == width), None)
         hint = f"; in {other}'s it would have {width}" if other not in (None, self.order) else ""
         return (
@@ -156,17 +161,17 @@ class Qpos:
 
 
 class _Piece(NamedTuple):
-    """A joint, in whose numbers it is given, and what there was of its motion before."""
+    """A joint, the simulator whose numbers are given for it, and its motion before."""
 
     joint: FileJoint
     order: str
     before: Floats | None
-    """Its coordinates at the sample before the first."""
+    """Coordinates of the joint at the sample before the first."""
     samples: int
     warnings: list[str]
 
     def at(self, place: Sequence[SupportsInt]) -> str:
-        """Which sample of all, in words."""
+        """Return in words which of all samples this is."""
         return sample_of([*map(int, place[:-1]), *(self.samples + int(last) for last in place[-1:])])
 
 
@@ -175,7 +180,7 @@ Given = Sequence[Floats | None]
 
 
 def _converted(piece: _Piece, p: Floats, given: Given) -> tuple[Floats | None, ...]:
-    """Coordinates of one joint, and the velocities, accelerations and torques of them that are given."""
+    """Return the coordinates of one joint, and their velocities, accelerations and torques if given."""
     kind, is_mujocos = piece.joint.kind, piece.order == "mujoco"
     if kind == "single" or (is_mujocos and kind in ("continuous", "planar")):
         return (p, *given)
@@ -189,7 +194,10 @@ def _converted(piece: _Piece, p: Floats, given: Given) -> tuple[Floats | None, .
 
 
 def _in_plane(piece: _Piece, p: Floats, given: Given) -> tuple[Floats | None, ...]:
-    """Of Pinocchio's joints whose angle is a cosine and a sine; a planar one moves along the body's axes."""
+    """Return the motion of a joint of Pinocchio's whose angle is a cosine and a sine.
+
+    The numbers of a planar one are along the body's axes.
+    """
     cosine, sine = p[..., -2], p[..., -1]
     _check_unit(piece, np.hypot(cosine, sine), "a cosine and a sine")
     angle = np.arctan2(sine, cosine)[..., None]
@@ -207,14 +215,14 @@ def _in_plane(piece: _Piece, p: Floats, given: Given) -> tuple[Floats | None, ..
         flat = np.concatenate([values[..., :2], still], -1)
         return np.concatenate([turned(yaw, flat)[..., :2], values[..., 2:]], -1)
 
-    if a is not None and v is not None:  # what the axes turn by
+    if a is not None and v is not None:  # as the body's axes turn
         a = a + np.stack([-v[..., 2] * v[..., 1], v[..., 2] * v[..., 0], 0.0 * v[..., 2]], -1)
     q = np.concatenate([p[..., :2], angle], -1)
     return (q, *(None if x is None else along(x) for x in (v, a, f)))
 
 
 def _floating(q: Floats, given: Given, is_local: bool) -> tuple[Floats | None, ...]:
-    """Velocities, accelerations and torques of x, y, z and the angles q."""
+    """Return the velocities, accelerations and torques of x, y, z and the angles q."""
     v, a, f = given
     if is_local and a is not None and v is not None:
         a = np.concatenate([a[..., :3] + np.cross(v[..., 3:], v[..., :3]), a[..., 3:]], -1)
@@ -227,7 +235,7 @@ def _floating(q: Floats, given: Given, is_local: bool) -> tuple[Floats | None, .
 
 
 def _turning(q: Floats, given: Given) -> tuple[Floats | None, ...]:
-    """Rates and changes of angles q, and the torques that do the same work on them."""
+    """Return the first and second rates of angles q, and the torques that do the same work on them."""
     v, a, f = given
     rates = None if v is None else rates_of(q, v)
     changes = torque = None
@@ -248,7 +256,7 @@ def _angles(piece: _Piece, quaternion: Floats) -> Floats:
 
 
 def _check_unit(piece: _Piece, size: Floats, what: str) -> None:
-    """Raise ValueError for the first sample at which numbers of length 1 have another."""
+    """Raise ValueError for the first sample at which numbers that must have length 1 have another."""
     wrong = np.argwhere(~(np.abs(size - 1.0) <= UNIT))
     if len(wrong):
         place = tuple(wrong[0].tolist())
@@ -259,7 +267,7 @@ def _check_unit(piece: _Piece, size: Floats, what: str) -> None:
 
 
 def _say_steepness(piece: _Piece, q: Floats, given: Given) -> None:
-    """Say where yaw and roll are about nearly the same axis; raise ValueError where they have no rates."""
+    """Warn where yaw and roll are about nearly the same axis; raise ValueError where they have no rates."""
     level = np.abs(np.cos(q[..., 1]))
     if not level.size or not level.min() < STEEP:
         return

@@ -1,7 +1,7 @@
-"""Names along the axes of what a robot computes, and in what entries along them are measured.
+"""Names along the axes of a robot's answers, and the units of the entries along them.
 
-Units are products of powers: mappings from symbols to these, N m/rad for one is {"N": 1, "m": 1, "rad": -1}.
-They are written such that udunits and pint read them.
+Units are products of powers, as mappings from symbols to powers: {"N": 1, "m": 1, "rad": -1} is N m/rad. They
+are written such that udunits and pint read them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,28 +19,29 @@ PARAMETER_UNITS = {
     "I_yz": "kg m^2",
     "I_zz": "kg m^2",
 }
-"""Inertial parameters of a link, in the order of regressors."""
+"""Inertial parameters of a link and their units, in the order of regressors."""
 TURNS, MOVES = ("angular_x", "angular_y", "angular_z"), ("x", "y", "z")
-"""Rows of a frame: turns about the world's axes, then its point along them."""
+"""Rows of a frame: rotations about the world's axes, then translations of its point along them."""
 HOMOGENEOUS = ("m", "m", "m", "1")
-"""Units of the coordinates that a pose takes and gives."""
+"""Units of the homogeneous coordinates that a pose maps from and to."""
 LOSSES = ("spring", "damping", "friction")
-"""What joints have of their own that accelerates, in the order of induced accelerations."""
+"""Passive sources of acceleration in the joints, in the order of induced accelerations."""
 
 
 class NamedAxis(NamedTuple):
     """An axis of an answer."""
 
     dimension: str
-    """Its name there; axes of different lengths may share one, as all joints and the independent ones do."""
+    """Name of the axis in the answer; axes of different lengths may share one, as all joints and the
+    independent ones do."""
     names: tuple[str, ...]
-    """Of its entries; none where they have none."""
+    """Names of the entries; empty where they have none."""
     units: tuple[str, ...] = ()
-    """Of what entries are places of, such as rad and m for joints; none where that means nothing."""
+    """Units of the places that the entries stand for, such as rad and m for joints; empty without places."""
 
 
 def axes_of(joints: Sequence[str], units: Sequence[str], links: Sequence[str]) -> dict[str, NamedAxis]:
-    """Axes of a robot's answers, by the names that `Quantity` has for them."""
+    """Return the axes of a robot's answers, by the names that `Quantity` has for them."""
     along = tuple(joints), tuple(units)
     return {
         "joint": NamedAxis("joint", *along),
@@ -59,7 +60,10 @@ def axes_of(joints: Sequence[str], units: Sequence[str], links: Sequence[str]) -
 def tied_axes(
     independent: Sequence[str], units: Sequence[str], rows: Sequence[str], row_units: Sequence[str]
 ) -> dict[str, NamedAxis]:
-    """Axes that constraints add: those of the independent joints, which `units` are of, and of the rows."""
+    """Return the axes that constraints add: those of the independent joints and of the rows.
+
+    units: those of the independent joints; row_units: those of the rows
+    """
     along = tuple(independent), tuple(units)
     return {
         "independent": NamedAxis("joint", *along),
@@ -72,9 +76,9 @@ def tied_axes(
 Unit = Mapping[str, int]
 
 SYMBOLS = ("kg", "N", "W", "J", "m", "s", "rad")
-"""In the order in which they are written; J and W stand alone."""
+"""Symbols in the order in which they are written; J and W stand alone."""
 UNKNOWN: Unit = {"?": 1}
-"""Of what a row of a coupling sums."""
+"""Unknown unit, such as that of the sum in a row of a coupling."""
 OF_PLACES: dict[str, Unit] = {
     "1": {},
     "rad": {"rad": 1},
@@ -83,13 +87,13 @@ OF_PLACES: dict[str, Unit] = {
     "kg m": {"kg": 1, "m": 1},
     "kg m^2": {"kg": 1, "m": 2},
 }
-"""What entries along an axis are measured in: joints, rows, inertial parameters."""
+"""Units of the entries along an axis, by their text: joints, rows, inertial parameters."""
 RATES = {"place": 0, "position": 0, "velocity": -1, "acceleration": -2}
-"""Powers of s in which the motion along an axis is measured."""
+"""Powers of s in the unit of each kind of motion along an axis."""
 
 
 def measured(what: str, place: str) -> Unit:
-    """Unit of a torque, or of one of `RATES`, where places are measured in `place`, such as rad."""
+    """Return the unit of a torque, or of one of `RATES`, for places measured in `place`, such as rad."""
     if place not in OF_PLACES:
         return UNKNOWN
     if what == "torque":
@@ -98,20 +102,20 @@ def measured(what: str, place: str) -> Unit:
 
 
 def product(unit: Unit, other: Unit, power: int = 1) -> Unit:
-    """The first times a power of the other."""
+    """Return the first unit times a power of the other."""
     symbols = dict.fromkeys((*unit, *other))
     return {symbol: unit.get(symbol, 0) + power * other.get(symbol, 0) for symbol in symbols}
 
 
 def inertial(unit: Unit) -> Unit:
-    """The same in kg, m and s, as inertia is told: angles count as numbers."""
+    """Return a unit in kg, m and s, as inertia is written: angles count as numbers."""
     newtons = unit.get("N", 0)
     whole = product(unit, {"kg": 1, "m": 1, "s": -2}, newtons)
     return {symbol: power for symbol, power in whole.items() if symbol not in ("N", "rad")}
 
 
 def written(unit: Unit) -> str:
-    """N m s/rad, 1/(m s^2) and the like; "1" for a number, and nothing for what is unknown."""
+    """Return a unit as text, N m s/rad, 1/(m s^2) and the like; "1" for a number, "" for an unknown unit."""
     if unit.get("?"):
         return ""
     powers = {symbol: unit.get(symbol, 0) for symbol in SYMBOLS}

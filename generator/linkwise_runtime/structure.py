@@ -1,4 +1,4 @@
-"""What a robot consists of: names, units, paths, parameters, and where its packed values belong."""
+"""Structure of a robot: names, units, paths, parameters, and the indices of its packed values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ class Sizes(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Indices of packed values: (i, j, k) rows, or (i, j) rows for gravity and torque; all counted from 0."""
+    """Indices of packed values: rows (i, j, k), or rows (i, j) for gravity and torque; all counted from 0."""
 
     acceleration: Indices
     """c2: (i, j, k) with i <= k only, as c2 is symmetric in i and k."""
@@ -44,53 +44,53 @@ class Layout(NamedTuple):
 
 
 class JointLimits(NamedTuple):
-    """Limits of the joints as the robot's file has them, one number for each; infinite where it has none.
+    """Limits of the joints as in the robot's file, one number for each; infinite where the file has none.
 
-    No call keeps to them. Those of a joint that follows another are not among them.
+    No call enforces them. Joints that follow another one are not listed.
     """
 
     lower: tuple[float, ...]
-    """Of the position, in rad or m."""
+    """Lower limits of the position, in rad or m."""
     upper: tuple[float, ...]
     velocity: tuple[float, ...]
-    """Of the speed either way, in rad/s or m/s."""
+    """Limits of the speed in either direction, in rad/s or m/s."""
     effort: tuple[float, ...]
-    """Of the torque or force either way, in N m or N."""
+    """Limits of the torque or force in either direction, in N m or N."""
 
 
 NO_LIMITS = JointLimits((), (), (), ())
-"""Of a structure that was made without any."""
+"""Limits of a structure that was made without any."""
 
 
 @dataclass(frozen=True, eq=False)
 class Structure:
     """A robot in names and numbers: n joint coordinates that move N links.
 
-    Each is like itself alone: a package that was generated anew, and imported anew, is another robot.
+    Each instance equals itself alone: a package that was generated and imported again is another robot.
     """
 
     name: str
     """Name of the package."""
     joint_names: tuple[str, ...]
     joint_units: tuple[str, ...]
-    """rad or m, one for each joint."""
+    """Units of the joints' positions: rad or m, one for each joint."""
     link_names: tuple[str, ...]
     paths: tuple[tuple[int, ...], ...]
-    """For each link the coordinates that move it, ascending, counted from 0; tau_ij is zero off this path."""
+    """Coordinates that move each link, ascending, counted from 0; tau_ij is zero off this path."""
     linear: tuple[int, ...]
     """Links whose energy has terms linear in the velocities, as on a moving base."""
     parameters: Mapping[str, float]
-    """Run-time parameters and the values they have unless others are given."""
+    """Run-time parameters and their default values."""
     bodies: tuple[ParametricBody, ...] = ()
-    """Links that parameters may not make such as no body can be."""
+    """Links whose parameters are refused where no rigid body has such a mass and inertia."""
     passive: tuple[PassiveJoint, ...] = ()
-    """What joints have of their own: springs, damping, friction, armature."""
+    """Springs, damping, friction and armature of the joints."""
     joint_limits: JointLimits = NO_LIMITS
-    """What each joint may reach, by the robot's file."""
+    """Limits of each joint, as in the robot's file."""
     file_joints: tuple[FileJoint, ...] = ()
-    """The file's joints, in the order of their coordinates; none where each coordinate is one."""
+    """Joints of the file, in the order of their coordinates; empty where each coordinate is one joint."""
     pinocchio_order: tuple[int, ...] = ()
-    """These, by their numbers, in the order in which Pinocchio has them."""
+    """Indices of these joints in the order in which Pinocchio has them."""
 
     @cached_property
     def n(self) -> int:
@@ -120,26 +120,32 @@ class Structure:
         return Sizes(*map(len, self.layout))
 
     def qpos(self, order: object = "mujoco", names: Sequence[str] | None = None) -> Qpos:
-        """How positions of MuJoCo or Pinocchio are those here; raises as `Qpos` does."""
+        """Return the conversion from positions of MuJoCo or Pinocchio to q; raise as `Qpos` does."""
         single = [FileJoint(name, "single", (k,)) for k, name in enumerate(self.joint_names)]
         joints = self.file_joints or tuple(single)
         return Qpos(joints, self.pinocchio_order or range(len(joints)), order, names)
 
     def joint_index(self, given: int | str, argument: str = "joint") -> int:
-        """Index i or k of a joint by number from 0 or by name; raises ValueError with the argument's name."""
+        """Return index i or k of a joint, given by number from 0 or by name.
+
+        Raises ValueError, with the argument's name, for what is neither.
+        """
         return position_of(given, self.joint_names, "joint", argument)
 
     def link_index(self, given: int | str, argument: str = "link") -> int:
-        """Index j of a link by number from 0 or by name; raises ValueError with the argument's name."""
+        """Return index j of a link, given by number from 0 or by name.
+
+        Raises ValueError, with the argument's name, for what is neither.
+        """
         return position_of(given, self.link_names, "link", argument)
 
     @cached_property
     def passive_sums(self) -> PassiveSums:
-        """What joints have of their own, summed up for each coordinate."""
+        """Passive properties of the joints, summed up for each coordinate."""
         return passive_sums(self.passive, self.n)
 
     def only(self, link: int) -> "Structure":
-        """The robot as if this link alone were there, its parameters aside."""
+        """Return the robot as if it had this link alone, without parameters and passive torques."""
         return replace(
             self,
             link_names=self.link_names[link : link + 1],
@@ -153,7 +159,7 @@ class Structure:
     def values(
         self, given: Mapping[str, object] | None, allow_unphysical: bool = False
     ) -> dict[str, float | Numbers]:
-        """All parameters, those `given` in place of their own, checked as the package's `load` says."""
+        """Return all parameters, those `given` in place of their own, checked as by the package's `load`."""
         return checked_values(self.parameters, given or {}, () if allow_unphysical else self.bodies)
 
 

@@ -1,4 +1,4 @@
-"""The version of this runtime, which is that of linkwise too, and the packages that it runs."""
+"""Version of this runtime, which is also that of linkwise, and the check of the packages that it runs."""
 
 import re
 
@@ -8,7 +8,7 @@ VERSION = "0.1.0"
 def require(version: str) -> None:
     """Raise ImportError unless this runtime runs packages that linkwise `version` generated.
 
-    It runs those of its own minor version, up to its own patch; what is no such version is not run.
+    It runs packages of its own minor version, up to its own patch; a text that is no such version is refused.
     """
     own, asked = (_numbers(text) for text in (VERSION, version))
     is_later = own is not None and asked is not None and own[:2] == asked[:2] and own > asked

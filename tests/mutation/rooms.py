@@ -57,10 +57,12 @@ ROOMS: dict[str, Room] = {
     "analysis": _folder("analysis"),
     "graphs": _folder("graphs"),
     "check": _folder("check"),
+    "oracle": _folder("oracle"),
     "emit": _folder("emit"),
     "package": _folder("package"),
     "dynamics": _folder("dynamics"),
     "expression": _folder("expression"),
+    "constraints": _folder("constraints"),
     "symbolic": _folder("symbolic"),
     "robot": _folder("robot", "tests/test_robots_builtin.py", "tests/numeric/test_against_pinocchio.py"),
     "output": _folder("output"),
@@ -68,7 +70,8 @@ ROOMS: dict[str, Room] = {
         tuple(
             f"{HOUSE}{name}.py"
             for name in (
-                *("__init__", "__main__", "package_cache", "pipeline", "plotstyle", "extras"),
+                *("__init__", "__main__", "package_cache", "pipeline", "kernel_choice", "plotstyle"),
+                *("render", "extras"),
                 *("progress", "input_file", "makers", "errors", "escape", "own_process", "own_runtime"),
             )
         )

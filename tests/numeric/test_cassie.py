@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from linkwise import Options, generate, read_system, write_package
-from linkwise.check.loop_checks import loop_calls
-from linkwise.check.loop_reference import loop_reference
-from linkwise.check.states import random_states
+from linkwise.check.constraint_checks import loop_calls
+from linkwise.oracle.loop_reference import loop_reference
+from linkwise.oracle.states import random_states
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 

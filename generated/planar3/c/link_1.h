@@ -8,28 +8,27 @@
        axes    of the frame that joint 1 moves
        origin  the link's centre of mass, moving with it; lengths are times the square root of its mass, 0.6 kg
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 3 additions and multiplications, 1 sines and cosines apart. */
 KERNEL(link_1_decomposition)(
     const real *RESTRICT qdd, const real *RESTRICT cosine,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
         const real qdd1 = qdd[0 * W + b];
-        const real c1 = cosine[0 * W + b];
+        const real cos1 = cosine[0 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c2_out[0 * W + b] = R(0.014375); /* c2(1, 1, 1) */
-        c1_out[0 * W + b] = R(0.0); /* c1(1, 1, 1) */
-        const real g_1 = R(0.73549875) * c1;
-        g_out[0 * W + b] = g_1; /* g(1, 1) */
-        tau_out[0 * W + b] = g_1 + R(0.014375) * qdd1; /* tau(1, 1) */
+        c2[0 * W + b] = R(0.014375); /* c2(1, 1, 1) */
+        c1[0 * W + b] = R(0.0); /* c1(1, 1, 1) */
+        const real g_1 = R(0.73549875) * cos1;
+        g[0 * W + b] = g_1; /* g(1, 1) */
+        tau[0 * W + b] = g_1 + R(0.014375) * qdd1; /* tau(1, 1) */
     }
 }
 #endif
@@ -38,16 +37,16 @@ KERNEL(link_1_decomposition)(
 /* Torques alone: 6 additions and multiplications, 1 sines and cosines apart. */
 KERNEL(link_1_torque)(
     const real *RESTRICT qdd, const real *RESTRICT cosine,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
         const real qdd1 = qdd[0 * W + b];
-        const real c1 = cosine[0 * W + b];
+        const real cos1 = cosine[0 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real t1 = R(0.09682458365518543) * (R(7.596198426416993) * c1 + R(0.09682458365518543) * qdd1);
-        tau_out[0 * W + b] = R(0.005) * qdd1 + t1; /* tau(1, 1) */
+        const real t1 = R(0.09682458365518543) * (R(7.596198426416993) * cos1 + R(0.09682458365518543) * qdd1);
+        tau[0 * W + b] = R(0.005) * qdd1 + t1; /* tau(1, 1) */
     }
 }
 #endif
@@ -56,17 +55,17 @@ KERNEL(link_1_torque)(
 /* Position gradient: 8 additions and multiplications, 1 sines and cosines apart. */
 KERNEL(link_1_position_gradient)(
     const real *RESTRICT qd, const real *RESTRICT sine,
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
         const real qd1 = qd[0 * W + b];
-        const real s1 = sine[0 * W + b];
+        const real sin1 = sine[0 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real t1 = R(7.596198426416993) * s1;
+        const real t1 = R(7.596198426416993) * sin1;
         const real t2 = t1 - qd1 * (R(0.09682458365518543) * qd1);
-        c0_out[0 * W + b] = R(0.09682458365518543) * (t2 - t1) - R(0.09682458365518543) * t2; /* c0(1, 1, 1) */
+        c0[0 * W + b] = R(0.09682458365518543) * (t2 - t1) - R(0.09682458365518543) * t2; /* c0(1, 1, 1) */
     }
 }
 #endif

@@ -8,16 +8,15 @@
        axes    of the frame before joint 2 moves
        origin  where joint 2 is at the instant, at rest
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 40 additions and multiplications, 4 sines and cosines apart. */
 KERNEL(link_2_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -25,40 +24,40 @@ KERNEL(link_2_decomposition)(
         const real qd2 = qd[1 * W + b];
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
-        const real s1 = sine[0 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real c1 = cosine[0 * W + b];
-        const real c2 = cosine[1 * W + b];
+        const real sin1 = sine[0 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real cos1 = cosine[0 * W + b];
+        const real cos2 = cosine[1 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c1_out[3 * W + b] = R(0.0); /* c1(2, 2, 2) */
+        c1[3 * W + b] = R(0.0); /* c1(2, 2, 2) */
         const real w2_z = qd1 + qd2;
-        const real t1 = R(0.125) * c2;
-        const real t2 = R(0.125) * s2;
+        const real t1 = R(0.125) * cos2;
+        const real t2 = R(0.125) * sin2;
         const real v1_y = R(0.25) * qd1;
-        const real f2_c2_y = R(0.075) * c2;
-        const real t3 = R(0.075) * s2;
+        const real f2_c2_y = R(0.075) * cos2;
+        const real t3 = R(0.075) * sin2;
         const real n2_c2_z = R(0.005) + t1 * f2_c2_y + t2 * t3;
-        c2_out[2 * W + b] = n2_c2_z; /* c2(2, 2, 2) */
+        c2[2 * W + b] = n2_c2_z; /* c2(2, 2, 2) */
         const real n1_c1_z = v1_y * t3;
-        c1_out[2 * W + b] = n1_c1_z; /* c1(2, 2, 1) */
-        const real g_2 = t1 * (R(5.88399) * c1) - t2 * (R(5.88399) * s1);
-        g_out[1 * W + b] = g_2; /* g(2, 2) */
-        const real g_1 = g_2 + R(1.4709975) * c1;
-        g_out[0 * W + b] = g_1; /* g(1, 2) */
-        const real n1_c2_z = n2_c2_z + R(0.01875) * c2;
-        c2_out[1 * W + b] = n1_c2_z; /* c2(1, 2, 2) */
+        c1[2 * W + b] = n1_c1_z; /* c1(2, 2, 1) */
+        const real g_2 = t1 * (R(5.88399) * cos1) - t2 * (R(5.88399) * sin1);
+        g[1 * W + b] = g_2; /* g(2, 2) */
+        const real g_1 = g_2 + R(1.4709975) * cos1;
+        g[0 * W + b] = g_1; /* g(1, 2) */
+        const real n1_c2_z = n2_c2_z + R(0.01875) * cos2;
+        c2[1 * W + b] = n1_c2_z; /* c2(1, 2, 2) */
         const real f1_c2_y = f2_c2_y + R(0.15);
         const real c2_1_1 = n1_c2_z + R(0.25) * f1_c2_y;
-        c2_out[0 * W + b] = c2_1_1; /* c2(1, 2, 1) */
+        c2[0 * W + b] = c2_1_1; /* c2(1, 2, 1) */
         const real t4 = R(0.25) * (w2_z * t3);
-        c1_out[1 * W + b] = -t4; /* c1(1, 2, 2) */
+        c1[1 * W + b] = -t4; /* c1(1, 2, 2) */
         const real c1_1_1 = n1_c1_z - t4;
-        c1_out[0 * W + b] = c1_1_1; /* c1(1, 2, 1) */
+        c1[0 * W + b] = c1_1_1; /* c1(1, 2, 1) */
         const real tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1;
-        tau_out[0 * W + b] = tau1_1 + qdd2 * n1_c2_z - qd2 * t4; /* tau(1, 2) */
+        tau[0 * W + b] = tau1_1 + qdd2 * n1_c2_z - qd2 * t4; /* tau(1, 2) */
         const real tau2_1 = g_2 + qd1 * n1_c1_z;
-        tau_out[1 * W + b] = tau2_1 + qdd1 * n1_c2_z + qdd2 * n2_c2_z; /* tau(2, 2) */
+        tau[1 * W + b] = tau2_1 + qdd1 * n1_c2_z + qdd2 * n2_c2_z; /* tau(2, 2) */
     }
 }
 #endif
@@ -67,7 +66,7 @@ KERNEL(link_2_decomposition)(
 /* Torques alone: 33 additions and multiplications, 4 sines and cosines apart. */
 KERNEL(link_2_torque)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -75,23 +74,23 @@ KERNEL(link_2_torque)(
         const real qd2 = qd[1 * W + b];
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
-        const real s1 = sine[0 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real c1 = cosine[0 * W + b];
-        const real c2 = cosine[1 * W + b];
+        const real sin1 = sine[0 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real cos1 = cosine[0 * W + b];
+        const real cos2 = cosine[1 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
         const real w2_z = qd1 + qd2;
         const real wd2_z = qdd1 + qdd2;
         const real v1_y = R(0.25) * qd1;
-        const real t1 = R(9.80665) * c1 + R(0.25) * qdd1;
-        const real f2_c2_y = R(0.075) * c2;
-        const real t2 = R(0.075) * s2;
-        const real n2_c2_z = R(0.005) + R(0.125) * c2 * f2_c2_y + R(0.125) * s2 * t2;
+        const real t1 = R(9.80665) * cos1 + R(0.25) * qdd1;
+        const real f2_c2_y = R(0.075) * cos2;
+        const real t2 = R(0.075) * sin2;
+        const real n2_c2_z = R(0.005) + R(0.125) * cos2 * f2_c2_y + R(0.125) * sin2 * t2;
         const real n1_c1_z = v1_y * t2;
-        const real t3 = t1 * f2_c2_y - (R(9.80665) * s1 + qd2 * v1_y) * t2 + wd2_z * n2_c2_z + w2_z * n1_c1_z;
-        tau_out[0 * W + b] = t3 + R(0.25) * (R(0.6) * t1 + wd2_z * f2_c2_y - w2_z * (w2_z * t2)); /* tau(1, 2) */
-        tau_out[1 * W + b] = t3; /* tau(2, 2) */
+        const real t3 = t1 * f2_c2_y - (R(9.80665) * sin1 + qd2 * v1_y) * t2 + wd2_z * n2_c2_z + w2_z * n1_c1_z;
+        tau[0 * W + b] = t3 + R(0.25) * (R(0.6) * t1 + wd2_z * f2_c2_y - w2_z * (w2_z * t2)); /* tau(1, 2) */
+        tau[1 * W + b] = t3; /* tau(2, 2) */
     }
 }
 #endif
@@ -100,7 +99,7 @@ KERNEL(link_2_torque)(
 /* Position gradient: 37 additions and multiplications, 4 sines and cosines apart. */
 KERNEL(link_2_position_gradient)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -108,27 +107,27 @@ KERNEL(link_2_position_gradient)(
         const real qd2 = qd[1 * W + b];
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
-        const real s1 = sine[0 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real c1 = cosine[0 * W + b];
-        const real c2 = cosine[1 * W + b];
+        const real sin1 = sine[0 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real cos1 = cosine[0 * W + b];
+        const real cos2 = cosine[1 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real t1 = R(9.80665) * s1;
-        const real t2 = R(9.80665) * c1;
+        const real t1 = R(9.80665) * sin1;
+        const real t2 = R(9.80665) * cos1;
         const real w2_z = qd1 + qd2;
         const real wd2_z = qdd1 + qdd2;
         const real v1_y = R(0.25) * qd1;
         const real t3 = qd1 * v1_y - t1;
-        const real f2_c2_y = R(0.075) * c2;
-        const real t4 = R(0.075) * s2;
+        const real f2_c2_y = R(0.075) * cos2;
+        const real t4 = R(0.075) * sin2;
         const real t5 = R(0.6) * (t1 + qd2 * v1_y) - wd2_z * t4 - w2_z * (R(0.15) * qd1 + w2_z * f2_c2_y);
         const real t6 = t1 * f2_c2_y + t2 * t4;
-        c0_out[0 * W + b] = R(0.25) * (t5 - R(5.88399) * s1) - (t6 + R(0.25) * t5); /* c0(1, 2, 1) */
-        c0_out[2 * W + b] = -t6; /* c0(2, 2, 1) */
+        c0[0 * W + b] = R(0.25) * (t5 - R(5.88399) * sin1) - (t6 + R(0.25) * t5); /* c0(1, 2, 1) */
+        c0[2 * W + b] = -t6; /* c0(2, 2, 1) */
         const real t7 = t3 * f2_c2_y - (t2 + R(0.25) * qdd1) * t4;
-        c0_out[1 * W + b] = t7 + R(0.25) * (t5 + R(0.6) * t3); /* c0(1, 2, 2) */
-        c0_out[3 * W + b] = t7; /* c0(2, 2, 2) */
+        c0[1 * W + b] = t7 + R(0.25) * (t5 + R(0.6) * t3); /* c0(1, 2, 2) */
+        c0[3 * W + b] = t7; /* c0(2, 2, 2) */
     }
 }
 #endif

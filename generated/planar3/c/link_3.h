@@ -8,16 +8,15 @@
        axes    of the frame that joint 3 moves
        origin  the link's centre of mass, moving with it; lengths are times the square root of its mass, 0.6 kg
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 103 additions and multiplications, 6 sines and cosines apart. */
 KERNEL(link_3_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -27,59 +26,59 @@ KERNEL(link_3_decomposition)(
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
-        const real s1 = sine[0 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real c1 = cosine[0 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
+        const real sin1 = sine[0 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real cos1 = cosine[0 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c2_out[5 * W + b] = R(0.014375); /* c2(3, 3, 3) */
-        c1_out[8 * W + b] = R(0.0); /* c1(3, 3, 3) */
-        const real x1_x = c2 * c3 - s2 * s3;
-        const real y1_x = c2 * s3 + s2 * c3;
-        const real t1 = c1 * x1_x - s1 * y1_x;
-        g_out[2 * W + b] = R(0.73549875) * t1; /* g(3, 3) */
+        c2[5 * W + b] = R(0.014375); /* c2(3, 3, 3) */
+        c1[8 * W + b] = R(0.0); /* c1(3, 3, 3) */
+        const real x1_x = cos2 * cos3 - sin2 * sin3;
+        const real y1_x = cos2 * sin3 + sin2 * cos3;
+        const real t1 = cos1 * x1_x - sin1 * y1_x;
+        g[2 * W + b] = R(0.73549875) * t1; /* g(3, 3) */
         const real w2_z = qd1 + qd2;
         const real wd2_z = qdd1 + qdd2;
         const real w3_z = qd3 + w2_z;
         const real wd3_z = qdd3 + wd2_z;
-        const real t2 = R(7.596198426416993) * (c1 * y1_x + s1 * x1_x);
+        const real t2 = R(7.596198426416993) * (cos1 * y1_x + sin1 * x1_x);
         const real t3 = R(7.596198426416993) * t1;
-        const real t4 = R(0.19364916731037085) * c3;
-        const real s2_x = R(0.19364916731037085) * s3;
+        const real t4 = R(0.19364916731037085) * cos3;
+        const real s2_x = R(0.19364916731037085) * sin3;
         const real t5 = -R(0.09682458365518543) - t4;
-        c2_out[3 * W + b] = R(0.005) + s2_x * s2_x + t5 * t5; /* c2(2, 3, 2) */
-        c2_out[4 * W + b] = R(0.005) - R(0.09682458365518543) * t5; /* c2(2, 3, 3) */
-        g_out[1 * W + b] = t2 * s2_x - t3 * t5; /* g(2, 3) */
+        c2[3 * W + b] = R(0.005) + s2_x * s2_x + t5 * t5; /* c2(2, 3, 2) */
+        c2[4 * W + b] = R(0.005) - R(0.09682458365518543) * t5; /* c2(2, 3, 3) */
+        g[1 * W + b] = t2 * s2_x - t3 * t5; /* g(2, 3) */
         const real t6 = R(0.19364916731037085) * x1_x;
         const real t7 = R(0.19364916731037085) * y1_x;
         const real t8 = t5 - t6;
-        c2_out[2 * W + b] = R(0.005) - R(0.09682458365518543) * t8; /* c2(1, 3, 3) */
+        c2[2 * W + b] = R(0.005) - R(0.09682458365518543) * t8; /* c2(1, 3, 3) */
         const real s1_x = s2_x + t7;
-        c2_out[0 * W + b] = R(0.005) + s1_x * s1_x + t8 * t8; /* c2(1, 3, 1) */
-        c2_out[1 * W + b] = R(0.005) + s2_x * s1_x + t5 * t8; /* c2(1, 3, 2) */
-        g_out[0 * W + b] = t2 * s1_x - t3 * t8; /* g(1, 3) */
+        c2[0 * W + b] = R(0.005) + s1_x * s1_x + t8 * t8; /* c2(1, 3, 1) */
+        c2[1 * W + b] = R(0.005) + s2_x * s1_x + t5 * t8; /* c2(1, 3, 2) */
+        g[0 * W + b] = t2 * s1_x - t3 * t8; /* g(1, 3) */
         const real t9 = R(0.09682458365518543) * w3_z;
-        c1_out[2 * W + b] = -s1_x * t9; /* c1(1, 3, 3) */
-        c1_out[5 * W + b] = -s2_x * t9; /* c1(2, 3, 3) */
+        c1[2 * W + b] = -s1_x * t9; /* c1(1, 3, 3) */
+        c1[5 * W + b] = -s2_x * t9; /* c1(2, 3, 3) */
         const real sd2_y = w2_z * s2_x;
-        c1_out[7 * W + b] = R(0.09682458365518543) * sd2_y; /* c1(3, 3, 2) */
+        c1[7 * W + b] = R(0.09682458365518543) * sd2_y; /* c1(3, 3, 2) */
         const real t10 = t9 + w2_z * t4;
-        c1_out[1 * W + b] = -(s1_x * t10 + t8 * sd2_y); /* c1(1, 3, 2) */
-        c1_out[4 * W + b] = -(s2_x * t10 + t5 * sd2_y); /* c1(2, 3, 2) */
+        c1[1 * W + b] = -(s1_x * t10 + t8 * sd2_y); /* c1(1, 3, 2) */
+        c1[4 * W + b] = -(s2_x * t10 + t5 * sd2_y); /* c1(2, 3, 2) */
         const real sd1_y = sd2_y + qd1 * t7;
-        c1_out[6 * W + b] = R(0.09682458365518543) * sd1_y; /* c1(3, 3, 1) */
+        c1[6 * W + b] = R(0.09682458365518543) * sd1_y; /* c1(3, 3, 1) */
         const real t11 = t10 + qd1 * t6;
-        c1_out[0 * W + b] = -(s1_x * t11 + t8 * sd1_y); /* c1(1, 3, 1) */
-        c1_out[3 * W + b] = -(s2_x * t11 + t5 * sd1_y); /* c1(2, 3, 1) */
+        c1[0 * W + b] = -(s1_x * t11 + t8 * sd1_y); /* c1(1, 3, 1) */
+        c1[3 * W + b] = -(s2_x * t11 + t5 * sd1_y); /* c1(2, 3, 1) */
         const real t12 = qdd2 * s2_x + qdd1 * s1_x + t2 - qd1 * t11 - qd2 * t10 - qd3 * t9;
         const real t13 = t3 + qd1 * sd1_y - qdd1 * t8 + qd2 * sd2_y - qdd2 * t5 + R(0.09682458365518543) * qdd3;
         const real t14 = R(0.005) * wd3_z;
-        tau_out[0 * W + b] = t14 + s1_x * t12 - t8 * t13; /* tau(1, 3) */
-        tau_out[1 * W + b] = t14 + s2_x * t12 - t5 * t13; /* tau(2, 3) */
-        tau_out[2 * W + b] = t14 + R(0.09682458365518543) * t13; /* tau(3, 3) */
+        tau[0 * W + b] = t14 + s1_x * t12 - t8 * t13; /* tau(1, 3) */
+        tau[1 * W + b] = t14 + s2_x * t12 - t5 * t13; /* tau(2, 3) */
+        tau[2 * W + b] = t14 + R(0.09682458365518543) * t13; /* tau(3, 3) */
     }
 }
 #endif
@@ -88,7 +87,7 @@ KERNEL(link_3_decomposition)(
 /* Torques alone: 64 additions and multiplications, 6 sines and cosines apart. */
 KERNEL(link_3_torque)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -98,22 +97,22 @@ KERNEL(link_3_torque)(
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
-        const real s1 = sine[0 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real c1 = cosine[0 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
+        const real sin1 = sine[0 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real cos1 = cosine[0 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x1_x = c2 * c3 - s2 * s3;
-        const real y1_x = c2 * s3 + s2 * c3;
+        const real x1_x = cos2 * cos3 - sin2 * sin3;
+        const real y1_x = cos2 * sin3 + sin2 * cos3;
         const real w2_z = qd1 + qd2;
         const real wd2_z = qdd1 + qdd2;
         const real w3_z = qd3 + w2_z;
         const real wd3_z = qdd3 + wd2_z;
-        const real t1 = R(0.19364916731037085) * c3;
-        const real s2_x = R(0.19364916731037085) * s3;
+        const real t1 = R(0.19364916731037085) * cos3;
+        const real s2_x = R(0.19364916731037085) * sin3;
         const real t2 = -R(0.09682458365518543) - t1;
         const real t3 = R(0.19364916731037085) * x1_x;
         const real t4 = R(0.19364916731037085) * y1_x;
@@ -123,14 +122,14 @@ KERNEL(link_3_torque)(
         const real sd2_y = w2_z * s2_x;
         const real t7 = t6 + w2_z * t1;
         const real sd1_y = sd2_y + qd1 * t4;
-        const real t8 = qdd1 * s1_x + R(7.596198426416993) * (c1 * y1_x + s1 * x1_x) - qd1 * (t7 + qd1 * t3);
-        const real t9 = R(7.596198426416993) * (c1 * x1_x - s1 * y1_x) + qd1 * sd1_y - qdd1 * t5 + qd2 * sd2_y;
+        const real t8 = qdd1 * s1_x + R(7.596198426416993) * (cos1 * y1_x + sin1 * x1_x) - qd1 * (t7 + qd1 * t3);
+        const real t9 = R(7.596198426416993) * (cos1 * x1_x - sin1 * y1_x) + qd1 * sd1_y - qdd1 * t5;
         const real t10 = qdd2 * s2_x + t8 - qd2 * t7 - qd3 * t6;
-        const real t11 = t9 - qdd2 * t2 + R(0.09682458365518543) * qdd3;
+        const real t11 = t9 + qd2 * sd2_y - qdd2 * t2 + R(0.09682458365518543) * qdd3;
         const real t12 = R(0.005) * wd3_z;
-        tau_out[0 * W + b] = t12 + s1_x * t10 - t5 * t11; /* tau(1, 3) */
-        tau_out[1 * W + b] = t12 + s2_x * t10 - t2 * t11; /* tau(2, 3) */
-        tau_out[2 * W + b] = t12 + R(0.09682458365518543) * t11; /* tau(3, 3) */
+        tau[0 * W + b] = t12 + s1_x * t10 - t5 * t11; /* tau(1, 3) */
+        tau[1 * W + b] = t12 + s2_x * t10 - t2 * t11; /* tau(2, 3) */
+        tau[2 * W + b] = t12 + R(0.09682458365518543) * t11; /* tau(3, 3) */
     }
 }
 #endif
@@ -139,7 +138,7 @@ KERNEL(link_3_torque)(
 /* Position gradient: 104 additions and multiplications, 6 sines and cosines apart. */
 KERNEL(link_3_position_gradient)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -149,27 +148,27 @@ KERNEL(link_3_position_gradient)(
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
-        const real s1 = sine[0 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real c1 = cosine[0 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
+        const real sin1 = sine[0 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real cos1 = cosine[0 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x1_x = c2 * c3 - s2 * s3;
-        const real y1_x = c2 * s3 + s2 * c3;
-        const real t1 = c1 * y1_x + s1 * x1_x;
-        c0_out[6 * W + b] = -R(0.73549875) * t1; /* c0(3, 3, 1) */
+        const real x1_x = cos2 * cos3 - sin2 * sin3;
+        const real y1_x = cos2 * sin3 + sin2 * cos3;
+        const real t1 = cos1 * y1_x + sin1 * x1_x;
+        c0[6 * W + b] = -R(0.73549875) * t1; /* c0(3, 3, 1) */
         const real w2_z = qd1 + qd2;
         const real wd2_z = qdd1 + qdd2;
         const real w3_z = qd3 + w2_z;
         const real t2 = R(7.596198426416993) * t1;
-        const real t3 = R(7.596198426416993) * (c1 * x1_x - s1 * y1_x);
-        const real t4 = R(0.19364916731037085) * c3;
-        const real s2_x = R(0.19364916731037085) * s3;
+        const real t3 = R(7.596198426416993) * (cos1 * x1_x - sin1 * y1_x);
+        const real t4 = R(0.19364916731037085) * cos3;
+        const real s2_x = R(0.19364916731037085) * sin3;
         const real t5 = -R(0.09682458365518543) - t4;
-        c0_out[3 * W + b] = t3 * s2_x + t2 * t5; /* c0(2, 3, 1) */
+        c0[3 * W + b] = t3 * s2_x + t2 * t5; /* c0(2, 3, 1) */
         const real t6 = R(0.19364916731037085) * x1_x;
         const real t7 = R(0.19364916731037085) * y1_x;
         const real t8 = t5 - t6;
@@ -181,23 +180,23 @@ KERNEL(link_3_position_gradient)(
         const real t11 = qdd1 * s1_x + t2 - qd1 * (t10 + qd1 * t6);
         const real t12 = t3 + qd1 * sd1_y - qdd1 * t8;
         const real t13 = qdd1 * s2_x - t11 - qd1 * t10;
-        c0_out[7 * W + b] = R(0.09682458365518543) * t13; /* c0(3, 3, 2) */
+        c0[7 * W + b] = R(0.09682458365518543) * t13; /* c0(3, 3, 2) */
         const real t14 = qdd2 * s2_x + t11 - qd2 * t10;
         const real t15 = t12 + qd2 * sd2_y - qdd2 * t5;
         const real t16 = t14 - qd3 * t9;
         const real t17 = t15 + R(0.09682458365518543) * qdd3;
-        c0_out[0 * W + b] = s1_x * t17 + t8 * t16 + s1_x * (t3 - t17) - t8 * (t16 - t2); /* c0(1, 3, 1) */
+        c0[0 * W + b] = s1_x * t17 + t8 * t16 + s1_x * (t3 - t17) - t8 * (t16 - t2); /* c0(1, 3, 1) */
         const real t18 = s2_x * t17 + t5 * t16;
         const real t19 = t12 + qdd1 * t5 - qd1 * sd2_y - t17;
         const real t20 = t13 + t16;
-        c0_out[1 * W + b] = t18 + s1_x * t19 - t8 * t20; /* c0(1, 3, 2) */
-        c0_out[4 * W + b] = t18 + s2_x * t19 - t5 * t20; /* c0(2, 3, 2) */
+        c0[1 * W + b] = t18 + s1_x * t19 - t8 * t20; /* c0(1, 3, 2) */
+        c0[4 * W + b] = t18 + s2_x * t19 - t5 * t20; /* c0(2, 3, 2) */
         const real t21 = R(0.09682458365518543) * t16;
         const real t22 = t15 - R(0.09682458365518543) * wd2_z - t17;
         const real t23 = t16 - (t14 + w2_z * t9);
-        c0_out[2 * W + b] = s1_x * t22 - t8 * t23 - t21; /* c0(1, 3, 3) */
-        c0_out[5 * W + b] = s2_x * t22 - t5 * t23 - t21; /* c0(2, 3, 3) */
-        c0_out[8 * W + b] = R(0.09682458365518543) * t23 - t21; /* c0(3, 3, 3) */
+        c0[2 * W + b] = s1_x * t22 - t8 * t23 - t21; /* c0(1, 3, 3) */
+        c0[5 * W + b] = s2_x * t22 - t5 * t23 - t21; /* c0(2, 3, 3) */
+        c0[8 * W + b] = R(0.09682458365518543) * t23 - t21; /* c0(3, 3, 3) */
     }
 }
 #endif

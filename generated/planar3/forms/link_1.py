@@ -29,8 +29,8 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     qdd1 = qdd[..., 0]
 
     # intermediate values
-    c1 = xp.cos(q1)
-    g_1 = 0.73549875 * c1
+    cos1 = xp.cos(q1)
+    g_1 = 0.73549875 * cos1
 
     # outputs
     return (
@@ -59,8 +59,8 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     qdd1 = qdd[..., 0]
 
     # intermediate values
-    c1 = xp.cos(q1)
-    t1 = 0.09682458365518543 * (7.596198426416993 * c1 + 0.09682458365518543 * qdd1)
+    cos1 = xp.cos(q1)
+    t1 = 0.09682458365518543 * (7.596198426416993 * cos1 + 0.09682458365518543 * qdd1)
 
     # outputs
     return (
@@ -78,8 +78,8 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     qd1 = qd[..., 0]
 
     # intermediate values
-    s1 = xp.sin(q1)
-    t1 = 7.596198426416993 * s1
+    sin1 = xp.sin(q1)
+    t1 = 7.596198426416993 * sin1
     t2 = t1 - qd1 * (0.09682458365518543 * qd1)
 
     # outputs

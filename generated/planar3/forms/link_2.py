@@ -33,21 +33,21 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     qdd2 = qdd[..., 1]
 
     # intermediate values
-    s1 = xp.sin(q1)
-    c1 = xp.cos(q1)
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
+    sin1 = xp.sin(q1)
+    cos1 = xp.cos(q1)
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
     w2_z = qd1 + qd2
-    t1 = 0.125 * c2
-    t2 = 0.125 * s2
+    t1 = 0.125 * cos2
+    t2 = 0.125 * sin2
     v1_y = 0.25 * qd1
-    f2_c2_y = 0.075 * c2
-    t3 = 0.075 * s2
+    f2_c2_y = 0.075 * cos2
+    t3 = 0.075 * sin2
     n2_c2_z = 0.005 + t1 * f2_c2_y + t2 * t3
     n1_c1_z = v1_y * t3
-    g_2 = t1 * (5.88399 * c1) - t2 * (5.88399 * s1)
-    g_1 = g_2 + 1.4709975 * c1
-    n1_c2_z = n2_c2_z + 0.01875 * c2
+    g_2 = t1 * (5.88399 * cos1) - t2 * (5.88399 * sin1)
+    g_1 = g_2 + 1.4709975 * cos1
+    n1_c2_z = n2_c2_z + 0.01875 * cos2
     f1_c2_y = f2_c2_y + 0.15
     c2_1_1 = n1_c2_z + 0.25 * f1_c2_y
     t4 = 0.25 * (w2_z * t3)
@@ -93,19 +93,19 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     qdd2 = qdd[..., 1]
 
     # intermediate values
-    s1 = xp.sin(q1)
-    c1 = xp.cos(q1)
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
+    sin1 = xp.sin(q1)
+    cos1 = xp.cos(q1)
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
     w2_z = qd1 + qd2
     wd2_z = qdd1 + qdd2
     v1_y = 0.25 * qd1
-    t1 = 9.80665 * c1 + 0.25 * qdd1
-    f2_c2_y = 0.075 * c2
-    t2 = 0.075 * s2
-    n2_c2_z = 0.005 + 0.125 * c2 * f2_c2_y + 0.125 * s2 * t2
+    t1 = 9.80665 * cos1 + 0.25 * qdd1
+    f2_c2_y = 0.075 * cos2
+    t2 = 0.075 * sin2
+    n2_c2_z = 0.005 + 0.125 * cos2 * f2_c2_y + 0.125 * sin2 * t2
     n1_c1_z = v1_y * t2
-    t3 = t1 * f2_c2_y - (9.80665 * s1 + qd2 * v1_y) * t2 + wd2_z * n2_c2_z + w2_z * n1_c1_z
+    t3 = t1 * f2_c2_y - (9.80665 * sin1 + qd2 * v1_y) * t2 + wd2_z * n2_c2_z + w2_z * n1_c1_z
 
     # outputs
     return (
@@ -128,25 +128,25 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     qdd2 = qdd[..., 1]
 
     # intermediate values
-    s1 = xp.sin(q1)
-    c1 = xp.cos(q1)
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    t1 = 9.80665 * s1
-    t2 = 9.80665 * c1
+    sin1 = xp.sin(q1)
+    cos1 = xp.cos(q1)
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    t1 = 9.80665 * sin1
+    t2 = 9.80665 * cos1
     w2_z = qd1 + qd2
     wd2_z = qdd1 + qdd2
     v1_y = 0.25 * qd1
     t3 = qd1 * v1_y - t1
-    f2_c2_y = 0.075 * c2
-    t4 = 0.075 * s2
+    f2_c2_y = 0.075 * cos2
+    t4 = 0.075 * sin2
     t5 = 0.6 * (t1 + qd2 * v1_y) - wd2_z * t4 - w2_z * (0.15 * qd1 + w2_z * f2_c2_y)
     t6 = t1 * f2_c2_y + t2 * t4
     t7 = t3 * f2_c2_y - (t2 + 0.25 * qdd1) * t4
 
     # outputs
     return (
-        0.25 * (t5 - 5.88399 * s1) - (t6 + 0.25 * t5),  # c0(1, 2, 1)
+        0.25 * (t5 - 5.88399 * sin1) - (t6 + 0.25 * t5),  # c0(1, 2, 1)
         t7 + 0.25 * (t5 + 0.6 * t3),  # c0(1, 2, 2)
         -t6,  # c0(2, 2, 1)
         t7,  # c0(2, 2, 2)

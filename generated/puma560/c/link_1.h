@@ -8,26 +8,25 @@
        axes    the base's
        origin  the link's centre of mass, moving with it; lengths are times the square root of its mass, 0.0 kg
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 1 additions and multiplications. */
 KERNEL(link_1_decomposition)(
     const real *RESTRICT qdd,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
         const real qdd1 = qdd[0 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c2_out[0 * W + b] = R(0.35); /* c2(1, 1, 1) */
-        c1_out[0 * W + b] = R(0.0); /* c1(1, 1, 1) */
-        g_out[0 * W + b] = R(0.0); /* g(1, 1) */
-        tau_out[0 * W + b] = R(0.35) * qdd1; /* tau(1, 1) */
+        c2[0 * W + b] = R(0.35); /* c2(1, 1, 1) */
+        c1[0 * W + b] = R(0.0); /* c1(1, 1, 1) */
+        g[0 * W + b] = R(0.0); /* g(1, 1) */
+        tau[0 * W + b] = R(0.35) * qdd1; /* tau(1, 1) */
     }
 }
 #endif
@@ -36,14 +35,14 @@ KERNEL(link_1_decomposition)(
 /* Torques alone: 1 additions and multiplications. */
 KERNEL(link_1_torque)(
     const real *RESTRICT qdd,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
         const real qdd1 = qdd[0 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        tau_out[0 * W + b] = R(0.35) * qdd1; /* tau(1, 1) */
+        tau[0 * W + b] = R(0.35) * qdd1; /* tau(1, 1) */
     }
 }
 #endif
@@ -51,11 +50,11 @@ KERNEL(link_1_torque)(
 #ifdef WANT_POSITION_GRADIENT
 /* Position gradient: 0 additions and multiplications. */
 KERNEL(link_1_position_gradient)(
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Intermediate values, and each output as soon as it is known. */
-        c0_out[0 * W + b] = R(0.0); /* c0(1, 1, 1) */
+        c0[0 * W + b] = R(0.0); /* c0(1, 1, 1) */
     }
 }
 #endif

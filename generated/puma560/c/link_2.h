@@ -8,16 +8,15 @@
        axes    of the frame that joint 1 moves
        origin  where joint 1 is at the instant, at rest
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 48 additions and multiplications, 2 sines and cosines apart. */
 KERNEL(link_2_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -25,35 +24,35 @@ KERNEL(link_2_decomposition)(
         const real qd2 = qd[1 * W + b];
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real c2 = cosine[1 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real cos2 = cosine[1 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c1_out[3 * W + b] = R(0.0); /* c1(2, 2, 2) */
-        g_out[0 * W + b] = R(0.0); /* g(1, 2) */
-        const real t1 = R(0.068) * c2 - R(0.006) * s2;
-        const real t2 = R(0.068) * s2 + R(0.006) * c2;
+        c1[3 * W + b] = R(0.0); /* c1(2, 2, 2) */
+        g[0 * W + b] = R(0.0); /* g(1, 2) */
+        const real t1 = R(0.068) * cos2 - R(0.006) * sin2;
+        const real t2 = R(0.068) * sin2 + R(0.006) * cos2;
         const real f1_c2_y = R(17.4) * t1;
-        const real t3 = c2 * (R(0.0725) * s2) - s2 * (R(0.4665) * c2) - t2 * f1_c2_y;
+        const real t3 = cos2 * (R(0.0725) * sin2) - sin2 * (R(0.4665) * cos2) - t2 * f1_c2_y;
         const real n1_c2_y = R(3.9585) * t2;
-        c2_out[1 * W + b] = n1_c2_y; /* c2(1, 2, 2) */
+        c2[1 * W + b] = n1_c2_y; /* c2(1, 2, 2) */
         const real t4 = t2 * (R(17.4) * t2);
         const real t5 = R(0.5965) + t4 + t1 * f1_c2_y + R(0.90055875);
         const real n2_c2_y = t5 - R(0.95805875);
-        c2_out[2 * W + b] = n2_c2_y; /* c2(2, 2, 2) */
-        const real n1_c2_z = t5 - (s2 * (R(0.4665) * s2) + c2 * (R(0.0725) * c2) + t4);
-        c2_out[0 * W + b] = n1_c2_z; /* c2(1, 2, 1) */
+        c2[2 * W + b] = n2_c2_y; /* c2(2, 2, 2) */
+        const real n1_c2_z = t5 - (sin2 * (R(0.4665) * sin2) + cos2 * (R(0.0725) * cos2) + t4);
+        c2[0 * W + b] = n1_c2_z; /* c2(1, 2, 1) */
         const real n1_c1_z = qd2 * t3;
-        c1_out[0 * W + b] = n1_c1_z; /* c1(1, 2, 1) */
+        c1[0 * W + b] = n1_c1_z; /* c1(1, 2, 1) */
         const real t6 = qd1 * t3;
-        c1_out[2 * W + b] = -t6; /* c1(2, 2, 1) */
+        c1[2 * W + b] = -t6; /* c1(2, 2, 1) */
         const real t7 = R(170.694) * t1;
-        g_out[1 * W + b] = -t7; /* g(2, 2) */
-        tau_out[1 * W + b] = qdd2 * n2_c2_y + qdd1 * n1_c2_y - (t7 + qd1 * t6); /* tau(2, 2) */
+        g[1 * W + b] = -t7; /* g(2, 2) */
+        tau[1 * W + b] = qdd2 * n2_c2_y + qdd1 * n1_c2_y - (t7 + qd1 * t6); /* tau(2, 2) */
         const real tau1_1 = qdd1 * n1_c2_z + qd1 * n1_c1_z;
         const real n2_c1_z = qd2 * (R(3.9585) * t1) + t6;
-        c1_out[1 * W + b] = n2_c1_z; /* c1(1, 2, 2) */
-        tau_out[0 * W + b] = qdd2 * n1_c2_y + tau1_1 + qd2 * n2_c1_z; /* tau(1, 2) */
+        c1[1 * W + b] = n2_c1_z; /* c1(1, 2, 2) */
+        tau[0 * W + b] = qdd2 * n1_c2_y + tau1_1 + qd2 * n2_c1_z; /* tau(1, 2) */
     }
 }
 #endif
@@ -62,7 +61,7 @@ KERNEL(link_2_decomposition)(
 /* Torques alone: 55 additions and multiplications, 2 sines and cosines apart. */
 KERNEL(link_2_torque)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -70,25 +69,25 @@ KERNEL(link_2_torque)(
         const real qd2 = qd[1 * W + b];
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real c2 = cosine[1 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real cos2 = cosine[1 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
         const real t1 = qd1 * qd2;
-        const real t2 = R(0.068) * c2 - R(0.006) * s2;
-        const real t3 = R(0.068) * s2 + R(0.006) * c2;
+        const real t2 = R(0.068) * cos2 - R(0.006) * sin2;
+        const real t3 = R(0.068) * sin2 + R(0.006) * cos2;
         const real f1_c2_y = R(17.4) * t2;
         const real t4 = R(3.9585) * t2;
-        const real t5 = c2 * (R(0.0725) * s2) - s2 * (R(0.4665) * c2) - t3 * f1_c2_y;
+        const real t5 = cos2 * (R(0.0725) * sin2) - sin2 * (R(0.4665) * cos2) - t3 * f1_c2_y;
         const real n1_c2_y = R(3.9585) * t3;
         const real t6 = t3 * (R(17.4) * t3);
         const real t7 = R(0.5965) + t6 + t2 * f1_c2_y + R(0.90055875);
         const real n2_c2_y = t7 - R(0.95805875);
-        const real n1_c2_z = t7 - (s2 * (R(0.4665) * s2) + c2 * (R(0.0725) * c2) + t6);
+        const real n1_c2_z = t7 - (sin2 * (R(0.4665) * sin2) + cos2 * (R(0.0725) * cos2) + t6);
         const real n1_c1_z = qd2 * t5;
-        tau_out[0 * W + b] = t1 * t5 + qdd2 * n1_c2_y + qdd1 * n1_c2_z + qd2 * (qd2 * t4) + qd1 * n1_c1_z; /* tau(1, 2) */
+        tau[0 * W + b] = t1 * t5 + qdd2 * n1_c2_y + qdd1 * n1_c2_z + qd2 * (qd2 * t4) + qd1 * n1_c1_z; /* tau(1, 2) */
         const real t8 = t1 * t4 + qdd2 * n2_c2_y + qdd1 * n1_c2_y - R(170.694) * t2;
-        tau_out[1 * W + b] = t8 - (qd2 * (qd1 * t4) + qd1 * (qd1 * t5)); /* tau(2, 2) */
+        tau[1 * W + b] = t8 - (qd2 * (qd1 * t4) + qd1 * (qd1 * t5)); /* tau(2, 2) */
     }
 }
 #endif
@@ -97,7 +96,7 @@ KERNEL(link_2_torque)(
 /* Position gradient: 69 additions and multiplications, 2 sines and cosines apart. */
 KERNEL(link_2_position_gradient)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -105,31 +104,31 @@ KERNEL(link_2_position_gradient)(
         const real qd2 = qd[1 * W + b];
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real c2 = cosine[1 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real cos2 = cosine[1 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c0_out[0 * W + b] = R(0.0); /* c0(1, 2, 1) */
-        c0_out[2 * W + b] = R(0.0); /* c0(2, 2, 1) */
+        c0[0 * W + b] = R(0.0); /* c0(1, 2, 1) */
+        c0[2 * W + b] = R(0.0); /* c0(2, 2, 1) */
         const real t1 = qd1 * qd1;
-        const real t2 = R(0.068) * c2 - R(0.006) * s2;
-        const real t3 = R(0.068) * s2 + R(0.006) * c2;
+        const real t2 = R(0.068) * cos2 - R(0.006) * sin2;
+        const real t3 = R(0.068) * sin2 + R(0.006) * cos2;
         const real f1_c2_y = R(17.4) * t2;
-        const real t4 = R(0.4665) * c2;
-        const real t5 = R(0.0725) * s2;
+        const real t4 = R(0.4665) * cos2;
+        const real t5 = R(0.0725) * sin2;
         const real t6 = t2 * f1_c2_y;
-        const real t7 = c2 * t4 + s2 * t5 + t6;
+        const real t7 = cos2 * t4 + sin2 * t5 + t6;
         const real t8 = R(3.9585) * t2;
         const real n1_c2_y = R(3.9585) * t3;
         const real t9 = t3 * (R(17.4) * t3);
         const real t10 = R(0.5965) + t9 + t6 + R(0.90055875);
         const real n2_c2_y = t10 - R(0.95805875);
-        c0_out[3 * W + b] = R(170.694) * t3 + qdd1 * t8 - t1 * n2_c2_y + R(2.0) * (qd1 * (qd1 * t7)); /* c0(2, 2, 2) */
-        const real t11 = qdd1 * (c2 * t5 - s2 * t4 - t3 * f1_c2_y);
-        const real t12 = qd1 * (qd1 * n1_c2_y + qd2 * (s2 * (R(0.4665) * s2) + c2 * (R(0.0725) * c2) + t9));
+        c0[3 * W + b] = R(170.694) * t3 + qdd1 * t8 - t1 * n2_c2_y + R(2.0) * (qd1 * (qd1 * t7)); /* c0(2, 2, 2) */
+        const real t11 = qdd1 * (cos2 * t5 - sin2 * t4 - t3 * f1_c2_y);
+        const real t12 = qd1 * n1_c2_y + qd2 * (sin2 * (R(0.4665) * sin2) + cos2 * (R(0.0725) * cos2) + t9);
         const real t13 = R(38.832885) - (qd1 * qd2 * (t10 - t7) + qdd2 * t8 + t11);
         const real t14 = R(38.832885) + t11 - t1 * n1_c2_y - R(2.0) * (qd1 * (qd2 * t7));
-        c0_out[1 * W + b] = t14 - (t13 + qd2 * (R(0.95805875) * qd1 + qd2 * n1_c2_y) - t12); /* c0(1, 2, 2) */
+        c0[1 * W + b] = t14 - (t13 + qd2 * (R(0.95805875) * qd1 + qd2 * n1_c2_y) - qd1 * t12); /* c0(1, 2, 2) */
     }
 }
 #endif

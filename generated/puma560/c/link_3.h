@@ -8,16 +8,15 @@
        axes    of the frame that joint 1 moves
        origin  the link's centre of mass, moving with it; lengths are times the square root of its mass, 4.8 kg
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 122 additions and multiplications, 4 sines and cosines apart. */
 KERNEL(link_3_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -27,20 +26,20 @@ KERNEL(link_3_decomposition)(
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        g_out[0 * W + b] = R(0.0); /* g(1, 3) */
-        const real x3_x = c2 * c3 - s2 * s3;
-        const real t1 = s2 * c3 + c2 * s3;
+        g[0 * W + b] = R(0.0); /* g(1, 3) */
+        const real x3_x = cos2 * cos3 - sin2 * sin3;
+        const real t1 = sin2 * cos3 + cos2 * sin3;
         const real w3_y = qd2 + qd3;
         const real t2 = R(0.15336231610144652) * t1;
         const real s3_x = R(0.15336231610144652) * x3_x;
-        const real s1_y = t2 + R(0.9460264013229229) * c2;
-        const real t3 = R(0.9460264013229229) * s2 - s3_x;
+        const real s1_y = t2 + R(0.9460264013229229) * cos2;
+        const real t3 = R(0.9460264013229229) * sin2 - s3_x;
         const real t4 = qd3 * s3_x;
         const real v2_z = qd3 * t2;
         const real v1_x = qd2 * t3 - t4;
@@ -55,48 +54,48 @@ KERNEL(link_3_decomposition)(
         const real n1_c1_z = w3_y * t8;
         const real n2_c1_z = qd1 * t8;
         const real t9 = R(21.49263315650272) * s1_y;
-        g_out[1 * W + b] = -t9; /* g(2, 3) */
+        g[1 * W + b] = -t9; /* g(2, 3) */
         const real t10 = R(3.29616) * t1;
-        g_out[2 * W + b] = -t10; /* g(3, 3) */
+        g[2 * W + b] = -t10; /* g(3, 3) */
         const real t11 = s1_y * s1_y;
         const real c2_1_1 = n1_c2_z + R(0.129258288) + t11;
-        c2_out[0 * W + b] = c2_1_1; /* c2(1, 3, 1) */
+        c2[0 * W + b] = c2_1_1; /* c2(1, 3, 1) */
         const real c1_1_1 = n1_c1_z + R(0.35952508674639105) * t5 - s1_y * v0_x;
-        c1_out[0 * W + b] = c1_1_1; /* c1(1, 3, 1) */
+        c1[0 * W + b] = c1_1_1; /* c1(1, 3, 1) */
         const real c1_2_1 = t3 * t5 - n2_c1_z;
-        c1_out[3 * W + b] = c1_2_1; /* c1(2, 3, 1) */
+        c1[3 * W + b] = c1_2_1; /* c1(2, 3, 1) */
         const real t12 = n2_c1_z + s3_x * t5;
-        c1_out[6 * W + b] = -t12; /* c1(3, 3, 1) */
+        c1[6 * W + b] = -t12; /* c1(3, 3, 1) */
         const real tau1_1 = qdd1 * c2_1_1 + qd1 * c1_1_1;
         const real tau2_1 = qd1 * c1_2_1 - t9;
         const real c2_1_2 = R(0.35952508674639105) * t3;
-        c2_out[1 * W + b] = c2_1_2; /* c2(1, 3, 2) */
+        c2[1 * W + b] = c2_1_2; /* c2(1, 3, 2) */
         const real c1_1_2 = n2_c1_z + R(0.35952508674639105) * v1_z - s1_y * (qd1 * t3);
-        c1_out[1 * W + b] = c1_1_2; /* c1(1, 3, 2) */
+        c1[1 * W + b] = c1_1_2; /* c1(1, 3, 2) */
         const real c2_2_2 = R(0.086) + t11 + t3 * t3;
-        c2_out[3 * W + b] = c2_2_2; /* c2(2, 3, 2) */
+        c2[3 * W + b] = c2_2_2; /* c2(2, 3, 2) */
         const real c1_2_2 = t3 * v1_z - s1_y * v1_x;
-        c1_out[4 * W + b] = c1_2_2; /* c1(2, 3, 2) */
+        c1[4 * W + b] = c1_2_2; /* c1(2, 3, 2) */
         const real t13 = s3_x * v1_z + t2 * v1_x;
-        c1_out[7 * W + b] = -t13; /* c1(3, 3, 2) */
+        c1[7 * W + b] = -t13; /* c1(3, 3, 2) */
         const real tau1_2 = tau1_1 + qdd2 * c2_1_2 + qd2 * c1_1_2;
         const real tau2_2 = tau2_1 + qdd1 * c2_1_2 + qdd2 * c2_2_2 + qd2 * c1_2_2;
         const real t14 = R(0.0551376) * x3_x;
-        c2_out[2 * W + b] = -t14; /* c2(1, 3, 3) */
+        c2[2 * W + b] = -t14; /* c2(1, 3, 3) */
         const real c1_1_3 = n2_c1_z + R(0.35952508674639105) * t6 + s1_y * sd3_y;
-        c1_out[2 * W + b] = c1_1_3; /* c1(1, 3, 3) */
-        tau_out[0 * W + b] = tau1_2 - qdd3 * t14 + qd3 * c1_1_3; /* tau(1, 3) */
+        c1[2 * W + b] = c1_1_3; /* c1(1, 3, 3) */
+        tau[0 * W + b] = tau1_2 - qdd3 * t14 + qd3 * c1_1_3; /* tau(1, 3) */
         const real c2_2_3 = R(0.086) + t2 * s1_y - s3_x * t3;
-        c2_out[4 * W + b] = c2_2_3; /* c2(2, 3, 3) */
+        c2[4 * W + b] = c2_2_3; /* c2(2, 3, 3) */
         const real c1_2_3 = t3 * t6 + s1_y * t7;
-        c1_out[5 * W + b] = c1_2_3; /* c1(2, 3, 3) */
-        tau_out[1 * W + b] = tau2_2 + qdd3 * c2_2_3 + qd3 * c1_2_3; /* tau(2, 3) */
+        c1[5 * W + b] = c1_2_3; /* c1(2, 3, 3) */
+        tau[1 * W + b] = tau2_2 + qdd3 * c2_2_3 + qd3 * c1_2_3; /* tau(2, 3) */
         const real c2_3_3 = R(0.086) + s3_x * s3_x + t2 * t2;
-        c2_out[5 * W + b] = c2_3_3; /* c2(3, 3, 3) */
+        c2[5 * W + b] = c2_3_3; /* c2(3, 3, 3) */
         const real c1_3_3 = t2 * t7 - s3_x * t6;
-        c1_out[8 * W + b] = c1_3_3; /* c1(3, 3, 3) */
+        c1[8 * W + b] = c1_3_3; /* c1(3, 3, 3) */
         const real t15 = qdd2 * c2_2_3 - (t10 + qd1 * t12 + qd2 * t13 + qdd1 * t14) + qdd3 * c2_3_3;
-        tau_out[2 * W + b] = t15 + qd3 * c1_3_3; /* tau(3, 3) */
+        tau[2 * W + b] = t15 + qd3 * c1_3_3; /* tau(3, 3) */
     }
 }
 #endif
@@ -105,7 +104,7 @@ KERNEL(link_3_decomposition)(
 /* Torques alone: 91 additions and multiplications, 4 sines and cosines apart. */
 KERNEL(link_3_torque)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -115,20 +114,20 @@ KERNEL(link_3_torque)(
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x3_x = c2 * c3 - s2 * s3;
-        const real t1 = s2 * c3 + c2 * s3;
+        const real x3_x = cos2 * cos3 - sin2 * sin3;
+        const real t1 = sin2 * cos3 + cos2 * sin3;
         const real w3_y = qd2 + qd3;
         const real wd3_y = qdd2 + qdd3;
         const real t2 = R(0.15336231610144652) * t1;
         const real s3_x = R(0.15336231610144652) * x3_x;
-        const real s1_y = t2 + R(0.9460264013229229) * c2;
-        const real t3 = R(0.9460264013229229) * s2 - s3_x;
+        const real s1_y = t2 + R(0.9460264013229229) * cos2;
+        const real t3 = R(0.9460264013229229) * sin2 - s3_x;
         const real t4 = qd3 * s3_x;
         const real v2_z = qd3 * t2;
         const real v1_x = qd2 * t3 - t4;
@@ -143,11 +142,11 @@ KERNEL(link_3_torque)(
         const real n1_c1_z = w3_y * t8;
         const real n2_c1_z = qd1 * t8;
         const real t9 = R(0.086) * wd3_y - qd1 * n2_c1_z;
-        tau_out[1 * W + b] = t9 - (t3 * t6 + s1_y * t7); /* tau(2, 3) */
-        tau_out[2 * W + b] = t9 + s3_x * t6 - t2 * t7; /* tau(3, 3) */
+        tau[1 * W + b] = t9 - (t3 * t6 + s1_y * t7); /* tau(2, 3) */
+        tau[2 * W + b] = t9 + s3_x * t6 - t2 * t7; /* tau(3, 3) */
         const real t10 = s1_y * (qdd1 * s1_y - qd1 * v0_x - qd2 * (qd1 * t3) + qd3 * sd3_y);
         const real t11 = (qd1 * qd2 + qd1 * qd3) * t8 + qdd1 * n1_c2_z + qd1 * n1_c1_z;
-        tau_out[0 * W + b] = t11 + t10 - R(0.35952508674639105) * t6; /* tau(1, 3) */
+        tau[0 * W + b] = t11 + t10 - R(0.35952508674639105) * t6; /* tau(1, 3) */
     }
 }
 #endif
@@ -156,7 +155,7 @@ KERNEL(link_3_torque)(
 /* Position gradient: 155 additions and multiplications, 4 sines and cosines apart. */
 KERNEL(link_3_position_gradient)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -166,23 +165,23 @@ KERNEL(link_3_position_gradient)(
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c0_out[0 * W + b] = R(0.0); /* c0(1, 3, 1) */
-        c0_out[3 * W + b] = R(0.0); /* c0(2, 3, 1) */
-        c0_out[6 * W + b] = R(0.0); /* c0(3, 3, 1) */
-        const real x3_x = c2 * c3 - s2 * s3;
-        const real t1 = s2 * c3 + c2 * s3;
+        c0[0 * W + b] = R(0.0); /* c0(1, 3, 1) */
+        c0[3 * W + b] = R(0.0); /* c0(2, 3, 1) */
+        c0[6 * W + b] = R(0.0); /* c0(3, 3, 1) */
+        const real x3_x = cos2 * cos3 - sin2 * sin3;
+        const real t1 = sin2 * cos3 + cos2 * sin3;
         const real t2 = qd1 * qd2;
         const real w3_y = qd2 + qd3;
         const real t3 = R(0.15336231610144652) * t1;
         const real s3_x = R(0.15336231610144652) * x3_x;
-        const real s1_y = t3 + R(0.9460264013229229) * c2;
-        const real t4 = R(0.9460264013229229) * s2 - s3_x;
+        const real s1_y = t3 + R(0.9460264013229229) * cos2;
+        const real t4 = R(0.9460264013229229) * sin2 - s3_x;
         const real t5 = qd3 * s3_x;
         const real v2_z = qd3 * t3;
         const real v1_x = qd2 * t4 - t5;
@@ -206,19 +205,19 @@ KERNEL(link_3_position_gradient)(
         const real t20 = qd1 * (w3_y * (t1 * (R(0.01625) * t1) + x3_x * (R(0.06975) * x3_x)));
         const real t21 = (t2 + qd1 * qd3) * (R(0.08225) - t18) + t19 + w3_y * (R(0.00375) * qd1) + t20;
         const real t22 = R(2.0) * (qd1 * (qd1 * t18)) - R(0.086) * (qd1 * qd1);
-        c0_out[7 * W + b] = t22 + s3_x * t10 + t3 * t9; /* c0(3, 3, 2) */
+        c0[7 * W + b] = t22 + s3_x * t10 + t3 * t9; /* c0(3, 3, 2) */
         const real t23 = t19 - R(2.0) * (qd1 * (w3_y * t18));
         const real t24 = t10 + t15;
-        c0_out[4 * W + b] = t22 + t4 * t15 - s1_y * t13 + s1_y * (t9 + t13) - t4 * t24; /* c0(2, 3, 2) */
+        c0[4 * W + b] = t22 + t4 * t15 - s1_y * t13 + s1_y * (t9 + t13) - t4 * t24; /* c0(2, 3, 2) */
         const real t25 = R(0.35952508674639105) * t24 + s1_y * (qdd1 * t4 + R(2.0) * (qd1 * v1_z));
-        c0_out[1 * W + b] = t23 + t21 - t4 * t14 - t25; /* c0(1, 3, 2) */
+        c0[1 * W + b] = t23 + t21 - t4 * t14 - t25; /* c0(1, 3, 2) */
         const real t26 = t22 - (t3 * t13 + s3_x * t15);
         const real t27 = t15 - (t12 + qdd2 * t3 + qd2 * t8 + qd1 * sd3_y);
         const real t28 = qd2 * t7 - (t11 + qdd2 * s3_x) - t13;
-        c0_out[5 * W + b] = t26 - (t4 * t27 + s1_y * t28); /* c0(2, 3, 3) */
-        c0_out[8 * W + b] = t26 + s3_x * t27 - t3 * t28; /* c0(3, 3, 3) */
+        c0[5 * W + b] = t26 - (t4 * t27 + s1_y * t28); /* c0(2, 3, 3) */
+        c0[8 * W + b] = t26 + s3_x * t27 - t3 * t28; /* c0(3, 3, 3) */
         const real t29 = s1_y * (qdd1 * s3_x - t2 * t3 - (qd1 * t7 + qd1 * v2_z)) - R(0.35952508674639105) * t27;
-        c0_out[2 * W + b] = t23 + t21 + s3_x * t14 + t29; /* c0(1, 3, 3) */
+        c0[2 * W + b] = t23 + t21 + s3_x * t14 + t29; /* c0(1, 3, 3) */
     }
 }
 #endif

@@ -8,16 +8,15 @@
        axes    of the frame that joint 3 moves
        origin  the link's centre of mass, moving with it; lengths are times the square root of its mass, 0.82 kg
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 224 additions and multiplications, 6 sines and cosines apart. */
 KERNEL(link_4_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -29,29 +28,29 @@ KERNEL(link_4_decomposition)(
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
         const real qdd4 = qdd[3 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s4 = sine[3 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c4 = cosine[3 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin4 = sine[3 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos4 = cosine[3 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c2_out[6 * W + b] = R(0.0); /* c2(2, 4, 4) */
-        c2_out[8 * W + b] = R(0.0); /* c2(3, 4, 4) */
-        c2_out[9 * W + b] = R(0.0013); /* c2(4, 4, 4) */
-        c1_out[15 * W + b] = R(0.0); /* c1(4, 4, 4) */
-        g_out[3 * W + b] = R(0.0); /* g(4, 4) */
-        const real x1_x = c2 * c3 - s2 * s3;
-        const real t1 = c2 * s3 + s2 * c3;
+        c2[6 * W + b] = R(0.0); /* c2(2, 4, 4) */
+        c2[8 * W + b] = R(0.0); /* c2(3, 4, 4) */
+        c2[9 * W + b] = R(0.0013); /* c2(4, 4, 4) */
+        c1[15 * W + b] = R(0.0); /* c1(4, 4, 4) */
+        g[3 * W + b] = R(0.0); /* g(4, 4) */
+        const real x1_x = cos2 * cos3 - sin2 * sin3;
+        const real t1 = cos2 * sin3 + sin2 * cos3;
         const real zd2_y = qd1 * t1;
         const real t2 = qd1 * x1_x;
         const real w3_z = qd2 + qd3;
         const real t3 = qd4 + t2;
         const real t4 = R(8.883332820512805) * t1;
         const real t5 = R(8.883332820512805) * x1_x;
-        const real t6 = R(0.018382431830418957) - R(0.39101153026477364) * c3;
-        const real s2_x = R(0.3749834985702704) + R(0.39101153026477364) * s3;
+        const real t6 = R(0.018382431830418957) - R(0.39101153026477364) * cos3;
+        const real s2_x = R(0.3749834985702704) + R(0.39101153026477364) * sin3;
         const real t7 = R(0.13592133092344263) * x1_x;
         const real s1_y = R(0.13592133092344263) * t1;
         const real s1_z = t1 * s2_x - x1_x * t6;
@@ -69,10 +68,10 @@ KERNEL(link_4_decomposition)(
         const real sd3_z = R(0.018382431830418957) * zd2_y + R(0.3749834985702704) * t2;
         const real sd3_x = v2_y + R(0.018382431830418957) * qd2;
         const real sd3_y = t8 + R(0.3749834985702704) * qd2;
-        const real t11 = R(0.00065) * c4;
-        const real t12 = R(0.00065) * s4;
-        const real t13 = c4 * t11 + s4 * t12;
-        const real t14 = s4 * t11 - c4 * t12;
+        const real t11 = R(0.00065) * cos4;
+        const real t12 = R(0.00065) * sin4;
+        const real t13 = cos4 * t11 + sin4 * t12;
+        const real t14 = sin4 * t11 - cos4 * t12;
         const real n2_c2_z = R(0.00245) - t13;
         const real t15 = t3 * t14;
         const real t16 = zd2_y * t14;
@@ -81,73 +80,73 @@ KERNEL(link_4_decomposition)(
         const real t19 = R(0.00115) * zd2_y;
         const real t20 = w3_z * t14;
         const real g_1 = t4 * t7 - t5 * s1_y;
-        g_out[0 * W + b] = g_1; /* g(1, 4) */
+        g[0 * W + b] = g_1; /* g(1, 4) */
         const real g_2 = t5 * t6 - t4 * s2_x;
-        g_out[1 * W + b] = g_2; /* g(2, 4) */
+        g[1 * W + b] = g_2; /* g(2, 4) */
         const real g_3 = R(0.16329726) * x1_x - R(3.33110322) * t1;
-        g_out[2 * W + b] = g_3; /* g(3, 4) */
+        g[2 * W + b] = g_3; /* g(3, 4) */
         const real c2_1_4 = R(0.0013) * x1_x;
-        c2_out[3 * W + b] = c2_1_4; /* c2(1, 4, 4) */
+        c2[3 * W + b] = c2_1_4; /* c2(1, 4, 4) */
         const real n1_c2_z = t1 * t14;
         const real n1_c1_y = t1 * (t16 + w3_z * t13);
-        c1_out[12 * W + b] = -n1_c1_y; /* c1(4, 4, 1) */
+        c1[12 * W + b] = -n1_c1_y; /* c1(4, 4, 1) */
         const real n1_c1_z = t1 * t17 - x1_x * t19;
         const real c2_1_1 = t1 * (t1 * n2_c2_z) + x1_x * c2_1_4 + t7 * t7 + s1_y * s1_y + s1_z * s1_z;
-        c2_out[0 * W + b] = c2_1_1; /* c2(1, 4, 1) */
+        c2[0 * W + b] = c2_1_1; /* c2(1, 4, 1) */
         const real c1_1_1 = t1 * (t1 * t15 + x1_x * t18) - x1_x * n1_c1_y + t7 * t10 + s1_y * sd1_y + s1_z * sd1_z;
-        c1_out[0 * W + b] = c1_1_1; /* c1(1, 4, 1) */
+        c1[0 * W + b] = c1_1_1; /* c1(1, 4, 1) */
         const real c1_2_1 = n1_c1_z - (s2_x * t10 + t6 * sd1_y);
-        c1_out[4 * W + b] = c1_2_1; /* c1(2, 4, 1) */
+        c1[4 * W + b] = c1_2_1; /* c1(2, 4, 1) */
         const real c1_3_1 = n1_c1_z - (R(0.3749834985702704) * t10 + R(0.018382431830418957) * sd1_y);
-        c1_out[8 * W + b] = c1_3_1; /* c1(3, 4, 1) */
+        c1[8 * W + b] = c1_3_1; /* c1(3, 4, 1) */
         const real tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1;
         const real tau2_1 = g_2 + qd1 * c1_2_1;
         const real tau3_1 = g_3 + qd1 * c1_3_1;
         const real n2_c1_x = t17 - t2 * n2_c2_z;
         const real n2_c1_y = R(0.0013) * zd2_y - (zd2_y * t13 + t20);
-        c1_out[13 * W + b] = -n2_c1_y; /* c1(4, 4, 2) */
-        c1_out[14 * W + b] = -n2_c1_y; /* c1(4, 4, 3) */
-        tau_out[3 * W + b] = qdd1 * c2_1_4 - (qd1 * n1_c1_y + qd2 * n2_c1_y + qd3 * n2_c1_y) + R(0.0013) * qdd4; /* tau(4, 4) */
+        c1[13 * W + b] = -n2_c1_y; /* c1(4, 4, 2) */
+        c1[14 * W + b] = -n2_c1_y; /* c1(4, 4, 3) */
+        tau[3 * W + b] = qdd1 * c2_1_4 - (qd1 * n1_c1_y + qd2 * n2_c1_y + qd3 * n2_c1_y) + R(0.0013) * qdd4; /* tau(4, 4) */
         const real n2_c1_z = t2 * t14 - t15;
         const real c2_1_2 = n1_c2_z - (s2_x * t7 + t6 * s1_y);
-        c2_out[1 * W + b] = c2_1_2; /* c2(1, 4, 2) */
+        c2[1 * W + b] = c2_1_2; /* c2(1, 4, 2) */
         const real t21 = t1 * n2_c1_x + x1_x * n2_c1_y;
         const real c1_1_2 = s1_y * sd2_y - t7 * v1_y + s1_z * sd2_z - t21;
-        c1_out[1 * W + b] = c1_1_2; /* c1(1, 4, 2) */
+        c1[1 * W + b] = c1_1_2; /* c1(1, 4, 2) */
         const real c2_2_2 = n2_c2_z + s2_x * s2_x + t6 * t6;
-        c2_out[4 * W + b] = c2_2_2; /* c2(2, 4, 2) */
+        c2[4 * W + b] = c2_2_2; /* c2(2, 4, 2) */
         const real c1_2_2 = n2_c1_z + s2_x * v1_y - t6 * sd2_y;
-        c1_out[5 * W + b] = c1_2_2; /* c1(2, 4, 2) */
+        c1[5 * W + b] = c1_2_2; /* c1(2, 4, 2) */
         const real c1_3_2 = n2_c1_z + R(0.3749834985702704) * v1_y - R(0.018382431830418957) * sd2_y;
-        c1_out[9 * W + b] = c1_3_2; /* c1(3, 4, 2) */
+        c1[9 * W + b] = c1_3_2; /* c1(3, 4, 2) */
         const real tau1_2 = tau1_1 + qdd2 * c2_1_2 + qd2 * c1_1_2;
         const real tau2_2 = tau2_1 + qdd1 * c2_1_2 + qdd2 * c2_2_2 + qd2 * c1_2_2;
         const real tau3_2 = tau3_1 + qd2 * c1_3_2;
         const real c2_1_3 = n1_c2_z - (R(0.0509682562) * x1_x + R(0.0024985646) * t1);
-        c2_out[2 * W + b] = c2_1_3; /* c2(1, 4, 3) */
+        c2[2 * W + b] = c2_1_3; /* c2(1, 4, 3) */
         const real c1_1_3 = s1_y * sd3_y - t7 * sd3_x + s1_z * sd3_z - t21;
-        c1_out[2 * W + b] = c1_1_3; /* c1(1, 4, 3) */
+        c1[2 * W + b] = c1_1_3; /* c1(1, 4, 3) */
         const real c2_2_3 = n2_c2_z + R(0.3749834985702704) * s2_x + R(0.018382431830418957) * t6;
-        c2_out[5 * W + b] = c2_2_3; /* c2(2, 4, 3) */
+        c2[5 * W + b] = c2_2_3; /* c2(2, 4, 3) */
         const real c1_2_3 = n2_c1_z + s2_x * sd3_x - t6 * sd3_y;
-        c1_out[6 * W + b] = c1_2_3; /* c1(2, 4, 3) */
+        c1[6 * W + b] = c1_2_3; /* c1(2, 4, 3) */
         const real c2_3_3 = n2_c2_z + R(0.140950538);
-        c2_out[7 * W + b] = c2_3_3; /* c2(3, 4, 3) */
+        c2[7 * W + b] = c2_3_3; /* c2(3, 4, 3) */
         const real c1_3_3 = n2_c1_z + R(0.3749834985702704) * sd3_x - R(0.018382431830418957) * sd3_y;
-        c1_out[10 * W + b] = c1_3_3; /* c1(3, 4, 3) */
+        c1[10 * W + b] = c1_3_3; /* c1(3, 4, 3) */
         const real tau1_3 = tau1_2 + qdd3 * c2_1_3 + qd3 * c1_1_3;
         const real tau2_3 = tau2_2 + qdd3 * c2_2_3 + qd3 * c1_2_3;
         const real tau3_3 = tau3_2 + qdd1 * c2_1_3 + qdd2 * c2_2_3 + qdd3 * c2_3_3 + qd3 * c1_3_3;
         const real n4_c1_x = w3_z * n2_c2_z - t16 - t18;
         const real n4_c1_z = zd2_y * n2_c2_z - t20 - t19;
-        c1_out[7 * W + b] = n4_c1_z; /* c1(2, 4, 4) */
-        c1_out[11 * W + b] = n4_c1_z; /* c1(3, 4, 4) */
+        c1[7 * W + b] = n4_c1_z; /* c1(2, 4, 4) */
+        c1[11 * W + b] = n4_c1_z; /* c1(3, 4, 4) */
         const real t22 = t1 * n4_c1_x;
-        c1_out[3 * W + b] = -t22; /* c1(1, 4, 4) */
-        tau_out[0 * W + b] = tau1_3 + qdd4 * c2_1_4 - qd4 * t22; /* tau(1, 4) */
+        c1[3 * W + b] = -t22; /* c1(1, 4, 4) */
+        tau[0 * W + b] = tau1_3 + qdd4 * c2_1_4 - qd4 * t22; /* tau(1, 4) */
         const real t23 = qd4 * n4_c1_z;
-        tau_out[1 * W + b] = tau2_3 + t23; /* tau(2, 4) */
-        tau_out[2 * W + b] = tau3_3 + t23; /* tau(3, 4) */
+        tau[1 * W + b] = tau2_3 + t23; /* tau(2, 4) */
+        tau[2 * W + b] = tau3_3 + t23; /* tau(3, 4) */
     }
 }
 #endif
@@ -156,7 +155,7 @@ KERNEL(link_4_decomposition)(
 /* Torques alone: 153 additions and multiplications, 6 sines and cosines apart. */
 KERNEL(link_4_torque)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -168,16 +167,16 @@ KERNEL(link_4_torque)(
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
         const real qdd4 = qdd[3 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s4 = sine[3 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c4 = cosine[3 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin4 = sine[3 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos4 = cosine[3 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x1_x = c2 * c3 - s2 * s3;
-        const real t1 = c2 * s3 + s2 * c3;
+        const real x1_x = cos2 * cos3 - sin2 * sin3;
+        const real t1 = cos2 * sin3 + sin2 * cos3;
         const real zd2_y = qd1 * t1;
         const real t2 = qd1 * x1_x;
         const real wd2_y = qd2 * zd2_y - qdd1 * x1_x;
@@ -188,8 +187,8 @@ KERNEL(link_4_torque)(
         const real wd4_x = qd4 * w3_z - (qdd1 * t1 + qd2 * t2 + qd3 * t2);
         const real wd4_y = wd3_y - qdd4;
         const real wd4_z = wd3_z + qd4 * zd2_y;
-        const real t4 = R(0.018382431830418957) - R(0.39101153026477364) * c3;
-        const real s2_x = R(0.3749834985702704) + R(0.39101153026477364) * s3;
+        const real t4 = R(0.018382431830418957) - R(0.39101153026477364) * cos3;
+        const real s2_x = R(0.3749834985702704) + R(0.39101153026477364) * sin3;
         const real t5 = R(0.13592133092344263) * x1_x;
         const real s1_y = R(0.13592133092344263) * t1;
         const real s1_z = t1 * s2_x - x1_x * t4;
@@ -210,22 +209,22 @@ KERNEL(link_4_torque)(
         const real t9 = R(0.3749834985702704) * qdd3 + t8 + qd3 * sd3_x;
         const real t10 = qdd1 * s1_y + qd1 * sd1_y - R(8.883332820512805) * x1_x + qd2 * sd2_y - qdd2 * t4;
         const real t11 = t10 + qd3 * sd3_y - R(0.018382431830418957) * qdd3;
-        const real t12 = R(0.00065) * c4;
-        const real t13 = R(0.00065) * s4;
-        const real t14 = c4 * t12 + s4 * t13;
-        const real t15 = s4 * t12 - c4 * t13;
+        const real t12 = R(0.00065) * cos4;
+        const real t13 = R(0.00065) * sin4;
+        const real t14 = cos4 * t12 + sin4 * t13;
+        const real t15 = sin4 * t12 - cos4 * t13;
         const real n2_c2_z = R(0.00245) - t14;
         const real t16 = t3 * t15;
         const real t17 = t3 * t14;
         const real t18 = zd2_y * (zd2_y * t15 + w3_z * t14) - w3_z * (zd2_y * t14 + w3_z * t15);
         const real t19 = R(0.0013) * wd4_y + t18;
-        tau_out[3 * W + b] = -t19; /* tau(4, 4) */
+        tau[3 * W + b] = -t19; /* tau(4, 4) */
         const real t20 = wd4_z * n2_c2_z - wd4_x * t15 + zd2_y * t17 - t3 * (R(0.00115) * zd2_y) - w3_z * t16;
-        tau_out[1 * W + b] = t20 + s2_x * t9 - t4 * t11; /* tau(2, 4) */
-        tau_out[2 * W + b] = t20 + R(0.3749834985702704) * t9 - R(0.018382431830418957) * t11; /* tau(3, 4) */
+        tau[1 * W + b] = t20 + s2_x * t9 - t4 * t11; /* tau(2, 4) */
+        tau[2 * W + b] = t20 + R(0.3749834985702704) * t9 - R(0.018382431830418957) * t11; /* tau(3, 4) */
         const real t21 = wd4_x * n2_c2_z - wd4_z * t15 + w3_z * t17 - (zd2_y * t16 + t3 * (R(0.00115) * w3_z));
         const real t22 = s1_y * t11 - t5 * t9 + s1_z * (qd1 * sd1_z + qdd1 * s1_z + qd2 * sd2_z + qd3 * sd3_z);
-        tau_out[0 * W + b] = t22 - (t1 * t21 + x1_x * t19); /* tau(1, 4) */
+        tau[0 * W + b] = t22 - (t1 * t21 + x1_x * t19); /* tau(1, 4) */
     }
 }
 #endif
@@ -234,7 +233,7 @@ KERNEL(link_4_torque)(
 /* Position gradient: 319 additions and multiplications, 6 sines and cosines apart. */
 KERNEL(link_4_position_gradient)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -246,19 +245,19 @@ KERNEL(link_4_position_gradient)(
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
         const real qdd4 = qdd[3 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s4 = sine[3 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c4 = cosine[3 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin4 = sine[3 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos4 = cosine[3 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c0_out[4 * W + b] = R(0.0); /* c0(2, 4, 1) */
-        c0_out[8 * W + b] = R(0.0); /* c0(3, 4, 1) */
-        c0_out[12 * W + b] = R(0.0); /* c0(4, 4, 1) */
-        const real x1_x = c2 * c3 - s2 * s3;
-        const real t1 = c2 * s3 + s2 * c3;
+        c0[4 * W + b] = R(0.0); /* c0(2, 4, 1) */
+        c0[8 * W + b] = R(0.0); /* c0(3, 4, 1) */
+        c0[12 * W + b] = R(0.0); /* c0(4, 4, 1) */
+        const real x1_x = cos2 * cos3 - sin2 * sin3;
+        const real t1 = cos2 * sin3 + sin2 * cos3;
         const real zd2_y = qd1 * t1;
         const real t2 = qd1 * x1_x;
         const real t3 = qdd1 * t1;
@@ -282,8 +281,8 @@ KERNEL(link_4_position_gradient)(
         const real wd4_z = wd3_z + qd4 * zd2_y;
         const real t15 = R(8.883332820512805) * t1;
         const real t16 = R(8.883332820512805) * x1_x;
-        const real t17 = R(0.018382431830418957) - R(0.39101153026477364) * c3;
-        const real s2_x = R(0.3749834985702704) + R(0.39101153026477364) * s3;
+        const real t17 = R(0.018382431830418957) - R(0.39101153026477364) * cos3;
+        const real s2_x = R(0.3749834985702704) + R(0.39101153026477364) * sin3;
         const real t18 = R(0.13592133092344263) * x1_x;
         const real s1_y = R(0.13592133092344263) * t1;
         const real s1_z = t1 * s2_x - x1_x * t17;
@@ -310,10 +309,10 @@ KERNEL(link_4_position_gradient)(
         const real t28 = R(0.3749834985702704) * qdd3 + t25 + qd3 * sd3_x;
         const real t29 = t26 + qd3 * sd3_y - R(0.018382431830418957) * qdd3;
         const real t30 = qd1 * sd1_z + qdd1 * s1_z + qd2 * sd2_z + qd3 * sd3_z;
-        const real t31 = R(0.00065) * c4;
-        const real t32 = R(0.00065) * s4;
-        const real t33 = c4 * t31 + s4 * t32;
-        const real t34 = s4 * t31 - c4 * t32;
+        const real t31 = R(0.00065) * cos4;
+        const real t32 = R(0.00065) * sin4;
+        const real t33 = cos4 * t31 + sin4 * t32;
+        const real t34 = sin4 * t31 - cos4 * t32;
         const real n2_c2_z = R(0.00245) - t33;
         const real t35 = t14 * t34;
         const real t36 = zd2_y * t34 + w3_z * t33;
@@ -330,38 +329,38 @@ KERNEL(link_4_position_gradient)(
         const real t47 = wd4_z * n2_c2_z - wd4_x * t34 + t43 - t14 * t39 - t44;
         const real t48 = s1_z * (x1_x * t15 - t1 * t16 + x1_x * t28 - t1 * t29);
         const real t49 = t1 * (s1_y * t30 - s1_z * t29 - x1_x * t47) + x1_x * (t1 * t47 + s1_z * t28 + t18 * t30);
-        c0_out[0 * W + b] = t18 * (x1_x * t30) + s1_y * (t1 * t30) + t48 - t49; /* c0(1, 4, 1) */
+        c0[0 * W + b] = t18 * (x1_x * t30) + s1_y * (t1 * t30) + t48 - t49; /* c0(1, 4, 1) */
         const real t50 = t6 * t34;
         const real t51 = t6 * n2_c2_z;
         const real t52 = R(2.0) * (zd2_y * t38 - t2 * t35);
         const real t53 = R(2.0) * (t2 * t36);
         const real t54 = R(2.0) * (t2 * t37 + zd2_y * t39);
         const real t55 = R(0.0013) * t3 + t53;
-        c0_out[13 * W + b] = -t55; /* c0(4, 4, 2) */
+        c0[13 * W + b] = -t55; /* c0(4, 4, 2) */
         const real t56 = t4 * t34 - t51 + t54;
-        c0_out[9 * W + b] = t56 + R(0.3749834985702704) * t23 - R(0.018382431830418957) * t24; /* c0(3, 4, 2) */
+        c0[9 * W + b] = t56 + R(0.3749834985702704) * t23 - R(0.018382431830418957) * t24; /* c0(3, 4, 2) */
         const real t57 = t23 - t29;
         const real t58 = t24 + t28;
-        c0_out[5 * W + b] = t56 + s2_x * t29 + t17 * t28 + s2_x * t57 - t17 * t58; /* c0(2, 4, 2) */
+        c0[5 * W + b] = t56 + s2_x * t29 + t17 * t28 + s2_x * t57 - t17 * t58; /* c0(2, 4, 2) */
         const real t59 = s1_z * (t3 * t17 + t4 * s2_x + R(2.0) * (t2 * v1_y - zd2_y * sd2_y));
         const real t60 = t1 * (t50 - t4 * n2_c2_z + t52 - (t46 + t17 * t30)) + x1_x * (t55 + t45 - s2_x * t30);
-        c0_out[1 * W + b] = s1_y * t58 - t18 * t57 + t59 - t60; /* c0(1, 4, 2) */
+        c0[1 * W + b] = s1_y * t58 - t18 * t57 + t59 - t60; /* c0(1, 4, 2) */
         const real t61 = t53 + R(0.0013) * (t9 - t7);
-        c0_out[14 * W + b] = -t61; /* c0(4, 4, 3) */
+        c0[14 * W + b] = -t61; /* c0(4, 4, 3) */
         const real t62 = t54 - (t51 + t10 * t34) + R(0.3749834985702704) * t29 + R(0.018382431830418957) * t28;
         const real t63 = t26 + R(0.018382431830418957) * qdd2 - (t2 * sd3_z + qd2 * sd3_y) - t29;
         const real t64 = R(0.3749834985702704) * qdd2 - t25 + qd2 * sd3_x + zd2_y * sd3_z + t28;
-        c0_out[6 * W + b] = t62 + s2_x * t63 - t17 * t64; /* c0(2, 4, 3) */
-        c0_out[10 * W + b] = t62 + R(0.3749834985702704) * t63 - R(0.018382431830418957) * t64; /* c0(3, 4, 3) */
+        c0[6 * W + b] = t62 + s2_x * t63 - t17 * t64; /* c0(2, 4, 3) */
+        c0[10 * W + b] = t62 + R(0.3749834985702704) * t63 - R(0.018382431830418957) * t64; /* c0(3, 4, 3) */
         const real t65 = t1 * (t52 + t50 + t10 * n2_c2_z - (t46 + R(0.018382431830418957) * t30));
         const real t66 = s1_z * (t27 + t2 * sd3_x - zd2_y * sd3_y + t2 * v2_y - zd2_y * t19);
-        c0_out[2 * W + b] = s1_y * t64 - t18 * t63 + t66 - (t65 + x1_x * (t61 + t45 - R(0.3749834985702704) * t30)); /* c0(1, 4, 3) */
+        c0[2 * W + b] = s1_y * t64 - t18 * t63 + t66 - (t65 + x1_x * (t61 + t45 - R(0.3749834985702704) * t30)); /* c0(1, 4, 3) */
         const real t67 = R(0.0013) * (t5 + w3_z * w3_z) - R(2.0) * (w3_z * t36 + zd2_y * t40);
-        c0_out[3 * W + b] = -(t1 * (t12 * n2_c2_z - t13 * t34 + R(2.0) * (t43 + t44) - t47) + x1_x * t67); /* c0(1, 4, 4) */
-        c0_out[15 * W + b] = -t67; /* c0(4, 4, 4) */
+        c0[3 * W + b] = -(t1 * (t12 * n2_c2_z - t13 * t34 + R(2.0) * (t43 + t44) - t47) + x1_x * t67); /* c0(1, 4, 4) */
+        c0[15 * W + b] = -t67; /* c0(4, 4, 4) */
         const real t68 = t45 + t13 * n2_c2_z - t12 * t34 - R(2.0) * (t41 + t42);
-        c0_out[7 * W + b] = t68; /* c0(2, 4, 4) */
-        c0_out[11 * W + b] = t68; /* c0(3, 4, 4) */
+        c0[7 * W + b] = t68; /* c0(2, 4, 4) */
+        c0[11 * W + b] = t68; /* c0(3, 4, 4) */
     }
 }
 #endif

@@ -8,16 +8,15 @@
        axes    of the frame that joint 3 moves
        origin  the link's centre of mass, moving with it; lengths are times the square root of its mass, 0.34 kg
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 397 additions and multiplications, 8 sines and cosines apart. */
 KERNEL(link_5_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -31,37 +30,37 @@ KERNEL(link_5_decomposition)(
         const real qdd3 = qdd[2 * W + b];
         const real qdd4 = qdd[3 * W + b];
         const real qdd5 = qdd[4 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s4 = sine[3 * W + b];
-        const real s5 = sine[4 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c4 = cosine[3 * W + b];
-        const real c5 = cosine[4 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin4 = sine[3 * W + b];
+        const real sin5 = sine[4 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos4 = cosine[3 * W + b];
+        const real cos5 = cosine[4 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        g_out[3 * W + b] = R(0.0); /* g(4, 5) */
-        g_out[4 * W + b] = R(0.0); /* g(5, 5) */
-        const real x1_x = c2 * c3 - s2 * s3;
-        const real t1 = c2 * s3 + s2 * c3;
-        const real x5_x = c4 * c5;
-        const real x5_z = s4 * c5;
-        const real t2 = c4 * s5;
-        const real t3 = s4 * s5;
+        g[3 * W + b] = R(0.0); /* g(4, 5) */
+        g[4 * W + b] = R(0.0); /* g(5, 5) */
+        const real x1_x = cos2 * cos3 - sin2 * sin3;
+        const real t1 = cos2 * sin3 + sin2 * cos3;
+        const real x5_x = cos4 * cos5;
+        const real x5_z = sin4 * cos5;
+        const real t2 = cos4 * sin5;
+        const real t3 = sin4 * sin5;
         const real zd2_y = qd1 * t1;
         const real t4 = qd1 * x1_x;
         const real w3_z = qd2 + qd3;
         const real t5 = qd4 + t4;
-        const real t6 = c4 * t5;
-        const real zd5_y = c4 * zd2_y - s4 * w3_z;
-        const real t7 = s4 * t5;
-        const real t8 = zd2_y + qd5 * s4;
-        const real w5_z = w3_z + qd5 * c4;
+        const real t6 = cos4 * t5;
+        const real zd5_y = cos4 * zd2_y - sin4 * w3_z;
+        const real t7 = sin4 * t5;
+        const real t8 = zd2_y + qd5 * sin4;
+        const real w5_z = w3_z + qd5 * cos4;
         const real t9 = R(5.72016380884324) * t1;
         const real t10 = R(5.72016380884324) * x1_x;
-        const real t11 = R(0.01183683234653596) - R(0.25178050281942005) * c3;
-        const real s2_x = R(0.25253852656575) + R(0.25178050281942005) * s3;
+        const real t11 = R(0.01183683234653596) - R(0.25178050281942005) * cos3;
+        const real s2_x = R(0.25253852656575) + R(0.25178050281942005) * sin3;
         const real t12 = R(0.08752258794162796) * x1_x;
         const real s1_y = R(0.08752258794162796) * t1;
         const real s1_z = t1 * s2_x - x1_x * t11;
@@ -80,21 +79,21 @@ KERNEL(link_5_decomposition)(
         const real sd3_x = v2_y + R(0.01183683234653596) * qd2;
         const real sd3_y = t13 + R(0.25253852656575) * qd2;
         const real t16 = R(0.0002) * x5_x;
-        const real t17 = R(0.0002) * s5;
+        const real t17 = R(0.0002) * sin5;
         const real t18 = R(0.0002) * t2;
-        const real t19 = R(0.0002) * c5;
-        const real t20 = R(0.0001) * s4;
-        const real t21 = x5_x * t16 + t2 * t18 + s4 * t20;
-        const real n4_c2_x = s5 * t16 - c5 * t18;
-        const real t22 = x5_z * t16 + t3 * t18 - c4 * t20;
-        const real t23 = s5 * t17 + c5 * t19;
+        const real t19 = R(0.0002) * cos5;
+        const real t20 = R(0.0001) * sin4;
+        const real t21 = x5_x * t16 + t2 * t18 + sin4 * t20;
+        const real n4_c2_x = sin5 * t16 - cos5 * t18;
+        const real t22 = x5_z * t16 + t3 * t18 - cos4 * t20;
+        const real t23 = sin5 * t17 + cos5 * t19;
         const real n4_c2_z = x5_z * t17 - t3 * t19;
-        c2_out[7 * W + b] = n4_c2_z; /* c2(2, 5, 4) */
-        c2_out[10 * W + b] = n4_c2_z; /* c2(3, 5, 4) */
-        const real t24 = x5_z * (R(0.0002) * x5_z) + t3 * (R(0.0002) * t3) + c4 * (R(0.0001) * c4);
+        c2[7 * W + b] = n4_c2_z; /* c2(2, 5, 4) */
+        c2[10 * W + b] = n4_c2_z; /* c2(3, 5, 4) */
+        const real t24 = x5_z * (R(0.0002) * x5_z) + t3 * (R(0.0002) * t3) + cos4 * (R(0.0001) * cos4);
         const real t25 = R(0.0005) - t21;
         const real c2_4_4 = R(0.0005) - t23;
-        c2_out[12 * W + b] = c2_4_4; /* c2(4, 5, 4) */
+        c2[12 * W + b] = c2_4_4; /* c2(4, 5, 4) */
         const real n2_c2_z = R(0.0005) - t24;
         const real t26 = w5_z * n4_c2_x;
         const real t27 = t5 * t22;
@@ -109,29 +108,29 @@ KERNEL(link_5_decomposition)(
         const real t36 = t8 * t24 + w5_z * t22;
         const real t37 = t32 - t27;
         const real g_1 = t9 * t12 - t10 * s1_y;
-        g_out[0 * W + b] = g_1; /* g(1, 5) */
+        g[0 * W + b] = g_1; /* g(1, 5) */
         const real g_2 = t10 * t11 - t9 * s2_x;
-        g_out[1 * W + b] = g_2; /* g(2, 5) */
+        g[1 * W + b] = g_2; /* g(2, 5) */
         const real g_3 = R(0.06770862) * x1_x - R(1.44456174) * t1;
-        g_out[2 * W + b] = g_3; /* g(3, 5) */
+        g[2 * W + b] = g_3; /* g(3, 5) */
         const real n1_c2_x = x1_x * n4_c2_x - t1 * t25;
         const real n1_c2_y = t1 * n4_c2_x - x1_x * c2_4_4;
-        c2_out[3 * W + b] = -n1_c2_y; /* c2(1, 5, 4) */
+        c2[3 * W + b] = -n1_c2_y; /* c2(1, 5, 4) */
         const real n1_c2_z = t1 * t22 + x1_x * n4_c2_z;
         const real t38 = t1 * t28 + x1_x * t31;
         const real n1_c1_y = t1 * t29 + x1_x * t33;
-        c1_out[15 * W + b] = -n1_c1_y; /* c1(4, 5, 1) */
+        c1[15 * W + b] = -n1_c1_y; /* c1(4, 5, 1) */
         const real t39 = t1 * t30 + x1_x * t34;
         const real c2_1_1 = t12 * t12 + s1_y * s1_y + s1_z * s1_z - (t1 * n1_c2_x + x1_x * n1_c2_y);
-        c2_out[0 * W + b] = c2_1_1; /* c2(1, 5, 1) */
+        c2[0 * W + b] = c2_1_1; /* c2(1, 5, 1) */
         const real c1_1_1 = t1 * t38 - x1_x * n1_c1_y + t12 * t15 + s1_y * sd1_y + s1_z * sd1_z;
-        c1_out[0 * W + b] = c1_1_1; /* c1(1, 5, 1) */
+        c1[0 * W + b] = c1_1_1; /* c1(1, 5, 1) */
         const real t40 = t39 + s2_x * t15 + t11 * sd1_y;
-        c1_out[5 * W + b] = -t40; /* c1(2, 5, 1) */
+        c1[5 * W + b] = -t40; /* c1(2, 5, 1) */
         const real t41 = t39 + R(0.25253852656575) * t15 + R(0.01183683234653596) * sd1_y;
-        c1_out[10 * W + b] = -t41; /* c1(3, 5, 1) */
-        const real c1_5_1 = s4 * t38 - c4 * t39;
-        c1_out[20 * W + b] = c1_5_1; /* c1(5, 5, 1) */
+        c1[10 * W + b] = -t41; /* c1(3, 5, 1) */
+        const real c1_5_1 = sin4 * t38 - cos4 * t39;
+        c1[20 * W + b] = c1_5_1; /* c1(5, 5, 1) */
         const real tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1;
         const real tau2_1 = g_2 - qd1 * t40;
         const real tau3_1 = g_3 - qd1 * t41;
@@ -139,53 +138,53 @@ KERNEL(link_5_decomposition)(
         const real t42 = zd2_y * n4_c2_z;
         const real n2_c1_x = t35 - (t4 * t25 + zd2_y * n4_c2_x);
         const real n2_c1_y = t4 * n4_c2_x + zd2_y * c2_4_4 - t36;
-        c1_out[16 * W + b] = -n2_c1_y; /* c1(4, 5, 2) */
-        c1_out[17 * W + b] = -n2_c1_y; /* c1(4, 5, 3) */
+        c1[16 * W + b] = -n2_c1_y; /* c1(4, 5, 2) */
+        c1[17 * W + b] = -n2_c1_y; /* c1(4, 5, 3) */
         const real n2_c1_z = t37 + t4 * t22 - t42;
         const real c2_1_2 = n1_c2_z - (s2_x * t12 + t11 * s1_y);
-        c2_out[1 * W + b] = c2_1_2; /* c2(1, 5, 2) */
+        c2[1 * W + b] = c2_1_2; /* c2(1, 5, 2) */
         const real t43 = t1 * n2_c1_x + x1_x * n2_c1_y;
         const real c1_1_2 = s1_y * sd2_y - t12 * v1_y + s1_z * sd2_z - t43;
-        c1_out[1 * W + b] = c1_1_2; /* c1(1, 5, 2) */
+        c1[1 * W + b] = c1_1_2; /* c1(1, 5, 2) */
         const real c2_2_2 = n2_c2_z + s2_x * s2_x + t11 * t11;
-        c2_out[5 * W + b] = c2_2_2; /* c2(2, 5, 2) */
+        c2[5 * W + b] = c2_2_2; /* c2(2, 5, 2) */
         const real c1_2_2 = n2_c1_z + s2_x * v1_y - t11 * sd2_y;
-        c1_out[6 * W + b] = c1_2_2; /* c1(2, 5, 2) */
+        c1[6 * W + b] = c1_2_2; /* c1(2, 5, 2) */
         const real c1_3_2 = n2_c1_z + R(0.25253852656575) * v1_y - R(0.01183683234653596) * sd2_y;
-        c1_out[11 * W + b] = c1_3_2; /* c1(3, 5, 2) */
-        const real c1_5_2 = c4 * n2_c1_z - s4 * n2_c1_x;
-        c1_out[21 * W + b] = c1_5_2; /* c1(5, 5, 2) */
-        c1_out[22 * W + b] = c1_5_2; /* c1(5, 5, 3) */
+        c1[11 * W + b] = c1_3_2; /* c1(3, 5, 2) */
+        const real c1_5_2 = cos4 * n2_c1_z - sin4 * n2_c1_x;
+        c1[21 * W + b] = c1_5_2; /* c1(5, 5, 2) */
+        c1[22 * W + b] = c1_5_2; /* c1(5, 5, 3) */
         const real tau1_2 = tau1_1 + qdd2 * c2_1_2 + qd2 * c1_1_2;
         const real tau2_2 = tau2_1 + qdd1 * c2_1_2 + qdd2 * c2_2_2 + qd2 * c1_2_2;
         const real tau3_2 = tau3_1 + qd2 * c1_3_2;
         const real tau5_2 = tau5_1 + qd2 * c1_5_2;
         const real c2_1_3 = n1_c2_z - (R(0.0221028254) * x1_x + R(0.0010359902) * t1);
-        c2_out[2 * W + b] = c2_1_3; /* c2(1, 5, 3) */
+        c2[2 * W + b] = c2_1_3; /* c2(1, 5, 3) */
         const real c1_1_3 = s1_y * sd3_y - t12 * sd3_x + s1_z * sd3_z - t43;
-        c1_out[2 * W + b] = c1_1_3; /* c1(1, 5, 3) */
+        c1[2 * W + b] = c1_1_3; /* c1(1, 5, 3) */
         const real c2_2_3 = n2_c2_z + R(0.25253852656575) * s2_x + R(0.01183683234653596) * t11;
-        c2_out[6 * W + b] = c2_2_3; /* c2(2, 5, 3) */
+        c2[6 * W + b] = c2_2_3; /* c2(2, 5, 3) */
         const real c1_2_3 = n2_c1_z + s2_x * sd3_x - t11 * sd3_y;
-        c1_out[7 * W + b] = c1_2_3; /* c1(2, 5, 3) */
+        c1[7 * W + b] = c1_2_3; /* c1(2, 5, 3) */
         const real c2_3_3 = n2_c2_z + R(0.063915818);
-        c2_out[9 * W + b] = c2_3_3; /* c2(3, 5, 3) */
+        c2[9 * W + b] = c2_3_3; /* c2(3, 5, 3) */
         const real c1_3_3 = n2_c1_z + R(0.25253852656575) * sd3_x - R(0.01183683234653596) * sd3_y;
-        c1_out[12 * W + b] = c1_3_3; /* c1(3, 5, 3) */
+        c1[12 * W + b] = c1_3_3; /* c1(3, 5, 3) */
         const real tau1_3 = tau1_2 + qdd3 * c2_1_3 + qd3 * c1_1_3;
         const real tau2_3 = tau2_2 + qdd3 * c2_2_3 + qd3 * c1_2_3;
         const real tau3_3 = tau3_2 + qdd1 * c2_1_3 + qdd2 * c2_2_3 + qdd3 * c2_3_3 + qd3 * c1_3_3;
         const real tau5_3 = tau5_2 + qd3 * c1_5_2;
         const real n4_c1_x = w3_z * t25 - zd2_y * t22 - t31;
         const real n4_c1_y = t33 - (t42 + w3_z * n4_c2_x);
-        c1_out[18 * W + b] = -n4_c1_y; /* c1(4, 5, 4) */
+        c1[18 * W + b] = -n4_c1_y; /* c1(4, 5, 4) */
         const real n4_c1_z = zd2_y * n2_c2_z - w3_z * t22 - t34;
-        c1_out[8 * W + b] = n4_c1_z; /* c1(2, 5, 4) */
-        c1_out[13 * W + b] = n4_c1_z; /* c1(3, 5, 4) */
+        c1[8 * W + b] = n4_c1_z; /* c1(2, 5, 4) */
+        c1[13 * W + b] = n4_c1_z; /* c1(3, 5, 4) */
         const real t44 = t1 * n4_c1_x + x1_x * n4_c1_y;
-        c1_out[3 * W + b] = -t44; /* c1(1, 5, 4) */
-        const real c1_5_4 = c4 * n4_c1_z - s4 * n4_c1_x;
-        c1_out[23 * W + b] = c1_5_4; /* c1(5, 5, 4) */
+        c1[3 * W + b] = -t44; /* c1(1, 5, 4) */
+        const real c1_5_4 = cos4 * n4_c1_z - sin4 * n4_c1_x;
+        c1[23 * W + b] = c1_5_4; /* c1(5, 5, 4) */
         const real tau1_4 = tau1_3 - qdd4 * n1_c2_y - qd4 * t44;
         const real t45 = qdd4 * n4_c2_z;
         const real t46 = qd4 * n4_c1_z;
@@ -194,34 +193,34 @@ KERNEL(link_5_decomposition)(
         const real tau3_4 = t46 + tau3_3 + t45;
         const real tau4_4 = t47 + qdd3 * n4_c2_z + qdd4 * c2_4_4 - qd4 * n4_c1_y;
         const real tau5_4 = tau5_3 + qd4 * c1_5_4;
-        const real t48 = s4 * t25 + c4 * t22;
-        const real n5_c2_y = s4 * n4_c2_x - c4 * n4_c2_z;
-        c2_out[13 * W + b] = -n5_c2_y; /* c2(4, 5, 5) */
-        const real n5_c2_z = s4 * t22 + c4 * n2_c2_z;
-        c2_out[8 * W + b] = n5_c2_z; /* c2(2, 5, 5) */
-        c2_out[11 * W + b] = n5_c2_z; /* c2(3, 5, 5) */
-        const real n5_c1_x = c4 * t35 - s4 * t28 + t7 * t22 - (t6 * t25 + zd5_y * n4_c2_x);
-        const real n5_c1_y = s4 * t29 - c4 * t36 + t6 * n4_c2_x + zd5_y * c2_4_4 + t7 * n4_c2_z;
-        c1_out[19 * W + b] = -n5_c1_y; /* c1(4, 5, 5) */
-        tau_out[3 * W + b] = tau4_4 - qdd5 * n5_c2_y - qd5 * n5_c1_y; /* tau(4, 5) */
-        const real n5_c1_z = c4 * t37 - s4 * t30 + t6 * t22 - zd5_y * n4_c2_z - t7 * n2_c2_z;
-        c1_out[9 * W + b] = n5_c1_z; /* c1(2, 5, 5) */
-        c1_out[14 * W + b] = n5_c1_z; /* c1(3, 5, 5) */
+        const real t48 = sin4 * t25 + cos4 * t22;
+        const real n5_c2_y = sin4 * n4_c2_x - cos4 * n4_c2_z;
+        c2[13 * W + b] = -n5_c2_y; /* c2(4, 5, 5) */
+        const real n5_c2_z = sin4 * t22 + cos4 * n2_c2_z;
+        c2[8 * W + b] = n5_c2_z; /* c2(2, 5, 5) */
+        c2[11 * W + b] = n5_c2_z; /* c2(3, 5, 5) */
+        const real n5_c1_x = cos4 * t35 - sin4 * t28 + t7 * t22 - (t6 * t25 + zd5_y * n4_c2_x);
+        const real n5_c1_y = sin4 * t29 - cos4 * t36 + t6 * n4_c2_x + zd5_y * c2_4_4 + t7 * n4_c2_z;
+        c1[19 * W + b] = -n5_c1_y; /* c1(4, 5, 5) */
+        tau[3 * W + b] = tau4_4 - qdd5 * n5_c2_y - qd5 * n5_c1_y; /* tau(4, 5) */
+        const real n5_c1_z = cos4 * t37 - sin4 * t30 + t6 * t22 - zd5_y * n4_c2_z - t7 * n2_c2_z;
+        c1[9 * W + b] = n5_c1_z; /* c1(2, 5, 5) */
+        c1[14 * W + b] = n5_c1_z; /* c1(3, 5, 5) */
         const real c2_1_5 = t1 * t48 - x1_x * n5_c2_y;
-        c2_out[4 * W + b] = c2_1_5; /* c2(1, 5, 5) */
+        c2[4 * W + b] = c2_1_5; /* c2(1, 5, 5) */
         const real t49 = t1 * n5_c1_x + x1_x * n5_c1_y;
-        c1_out[4 * W + b] = -t49; /* c1(1, 5, 5) */
-        tau_out[0 * W + b] = tau1_4 + qdd5 * c2_1_5 - qd5 * t49; /* tau(1, 5) */
-        const real c2_5_5 = s4 * t48 + c4 * n5_c2_z;
-        c2_out[14 * W + b] = c2_5_5; /* c2(5, 5, 5) */
-        const real c1_5_5 = c4 * n5_c1_z - s4 * n5_c1_x;
-        c1_out[24 * W + b] = c1_5_5; /* c1(5, 5, 5) */
+        c1[4 * W + b] = -t49; /* c1(1, 5, 5) */
+        tau[0 * W + b] = tau1_4 + qdd5 * c2_1_5 - qd5 * t49; /* tau(1, 5) */
+        const real c2_5_5 = sin4 * t48 + cos4 * n5_c2_z;
+        c2[14 * W + b] = c2_5_5; /* c2(5, 5, 5) */
+        const real c1_5_5 = cos4 * n5_c1_z - sin4 * n5_c1_x;
+        c1[24 * W + b] = c1_5_5; /* c1(5, 5, 5) */
         const real t50 = qdd5 * n5_c2_z;
         const real t51 = qd5 * n5_c1_z;
-        tau_out[1 * W + b] = tau2_4 + t50 + t51; /* tau(2, 5) */
-        tau_out[2 * W + b] = t51 + tau3_4 + t50; /* tau(3, 5) */
+        tau[1 * W + b] = tau2_4 + t50 + t51; /* tau(2, 5) */
+        tau[2 * W + b] = t51 + tau3_4 + t50; /* tau(3, 5) */
         const real t52 = tau5_4 + qdd1 * c2_1_5 + qdd2 * n5_c2_z + qdd3 * n5_c2_z - qdd4 * n5_c2_y;
-        tau_out[4 * W + b] = t52 + qdd5 * c2_5_5 + qd5 * c1_5_5; /* tau(5, 5) */
+        tau[4 * W + b] = t52 + qdd5 * c2_5_5 + qd5 * c1_5_5; /* tau(5, 5) */
     }
 }
 #endif
@@ -230,7 +229,7 @@ KERNEL(link_5_decomposition)(
 /* Torques alone: 229 additions and multiplications, 8 sines and cosines apart. */
 KERNEL(link_5_torque)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -244,22 +243,22 @@ KERNEL(link_5_torque)(
         const real qdd3 = qdd[2 * W + b];
         const real qdd4 = qdd[3 * W + b];
         const real qdd5 = qdd[4 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s4 = sine[3 * W + b];
-        const real s5 = sine[4 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c4 = cosine[3 * W + b];
-        const real c5 = cosine[4 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin4 = sine[3 * W + b];
+        const real sin5 = sine[4 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos4 = cosine[3 * W + b];
+        const real cos5 = cosine[4 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x1_x = c2 * c3 - s2 * s3;
-        const real t1 = c2 * s3 + s2 * c3;
-        const real x5_x = c4 * c5;
-        const real x5_z = s4 * c5;
-        const real t2 = c4 * s5;
-        const real t3 = s4 * s5;
+        const real x1_x = cos2 * cos3 - sin2 * sin3;
+        const real t1 = cos2 * sin3 + sin2 * cos3;
+        const real x5_x = cos4 * cos5;
+        const real x5_z = sin4 * cos5;
+        const real t2 = cos4 * sin5;
+        const real t3 = sin4 * sin5;
         const real zd2_y = qd1 * t1;
         const real t4 = qd1 * x1_x;
         const real wd2_y = qd2 * zd2_y - qdd1 * x1_x;
@@ -270,14 +269,14 @@ KERNEL(link_5_torque)(
         const real wd4_x = qd4 * w3_z - (qdd1 * t1 + qd2 * t4 + qd3 * t4);
         const real wd4_y = wd3_y - qdd4;
         const real wd4_z = wd3_z + qd4 * zd2_y;
-        const real zd5_y = c4 * zd2_y - s4 * w3_z;
-        const real t6 = zd2_y + qd5 * s4;
-        const real w5_z = w3_z + qd5 * c4;
-        const real wd5_x = wd4_x - qdd5 * s4 - qd5 * (c4 * t5);
+        const real zd5_y = cos4 * zd2_y - sin4 * w3_z;
+        const real t6 = zd2_y + qd5 * sin4;
+        const real w5_z = w3_z + qd5 * cos4;
+        const real wd5_x = wd4_x - qdd5 * sin4 - qd5 * (cos4 * t5);
         const real wd5_y = wd4_y + qd5 * zd5_y;
-        const real wd5_z = wd4_z + qdd5 * c4 - qd5 * (s4 * t5);
-        const real t7 = R(0.01183683234653596) - R(0.25178050281942005) * c3;
-        const real s2_x = R(0.25253852656575) + R(0.25178050281942005) * s3;
+        const real wd5_z = wd4_z + qdd5 * cos4 - qd5 * (sin4 * t5);
+        const real t7 = R(0.01183683234653596) - R(0.25178050281942005) * cos3;
+        const real s2_x = R(0.25253852656575) + R(0.25178050281942005) * sin3;
         const real t8 = R(0.08752258794162796) * x1_x;
         const real s1_y = R(0.08752258794162796) * t1;
         const real s1_z = t1 * s2_x - x1_x * t7;
@@ -299,16 +298,16 @@ KERNEL(link_5_torque)(
         const real t13 = qdd1 * s1_y + qd1 * sd1_y - R(5.72016380884324) * x1_x + qd2 * sd2_y - qdd2 * t7;
         const real t14 = t13 + qd3 * sd3_y - R(0.01183683234653596) * qdd3;
         const real t15 = R(0.0002) * x5_x;
-        const real t16 = R(0.0002) * s5;
+        const real t16 = R(0.0002) * sin5;
         const real t17 = R(0.0002) * t2;
-        const real t18 = R(0.0002) * c5;
-        const real t19 = R(0.0001) * s4;
-        const real t20 = x5_x * t15 + t2 * t17 + s4 * t19;
-        const real n4_c2_x = s5 * t15 - c5 * t17;
-        const real t21 = x5_z * t15 + t3 * t17 - c4 * t19;
-        const real t22 = s5 * t16 + c5 * t18;
+        const real t18 = R(0.0002) * cos5;
+        const real t19 = R(0.0001) * sin4;
+        const real t20 = x5_x * t15 + t2 * t17 + sin4 * t19;
+        const real n4_c2_x = sin5 * t15 - cos5 * t17;
+        const real t21 = x5_z * t15 + t3 * t17 - cos4 * t19;
+        const real t22 = sin5 * t16 + cos5 * t18;
         const real n4_c2_z = x5_z * t16 - t3 * t18;
-        const real t23 = x5_z * (R(0.0002) * x5_z) + t3 * (R(0.0002) * t3) + c4 * (R(0.0001) * c4);
+        const real t23 = x5_z * (R(0.0002) * x5_z) + t3 * (R(0.0002) * t3) + cos4 * (R(0.0001) * cos4);
         const real c2_4_4 = R(0.0005) - t22;
         const real n2_c2_z = R(0.0005) - t23;
         const real t24 = w5_z * n4_c2_x;
@@ -319,14 +318,14 @@ KERNEL(link_5_torque)(
         const real t29 = t28 + w5_z * (w5_z * n4_c2_z + t5 * t23) - t27;
         const real t30 = t6 * (t6 * t21 + w5_z * t20) + t5 * (t24 + t26) - w5_z * (t6 * t23 + w5_z * t21);
         const real t31 = wd5_y * c2_4_4 - wd5_x * n4_c2_x - wd5_z * n4_c2_z + t30;
-        tau_out[3 * W + b] = -t31; /* tau(4, 5) */
+        tau[3 * W + b] = -t31; /* tau(4, 5) */
         const real t32 = w5_z * (t26 - t25) - (t6 * (t6 * n4_c2_x - t5 * t20) + t5 * (t6 * t22 - t5 * n4_c2_x));
         const real t33 = wd5_z * n2_c2_z - (wd5_x * t21 + wd5_y * n4_c2_z) + t32;
-        tau_out[1 * W + b] = t33 + s2_x * t12 - t7 * t14; /* tau(2, 5) */
-        tau_out[2 * W + b] = t33 + R(0.25253852656575) * t12 - R(0.01183683234653596) * t14; /* tau(3, 5) */
-        tau_out[4 * W + b] = c4 * t33 - s4 * t29; /* tau(5, 5) */
+        tau[1 * W + b] = t33 + s2_x * t12 - t7 * t14; /* tau(2, 5) */
+        tau[2 * W + b] = t33 + R(0.25253852656575) * t12 - R(0.01183683234653596) * t14; /* tau(3, 5) */
+        tau[4 * W + b] = cos4 * t33 - sin4 * t29; /* tau(5, 5) */
         const real t34 = s1_y * t14 - t8 * t12 + s1_z * (qd1 * sd1_z + qdd1 * s1_z + qd2 * sd2_z + qd3 * sd3_z);
-        tau_out[0 * W + b] = t34 - (t1 * t29 + x1_x * t31); /* tau(1, 5) */
+        tau[0 * W + b] = t34 - (t1 * t29 + x1_x * t31); /* tau(1, 5) */
     }
 }
 #endif
@@ -335,7 +334,7 @@ KERNEL(link_5_torque)(
 /* Position gradient: 497 additions and multiplications, 8 sines and cosines apart. */
 KERNEL(link_5_position_gradient)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -349,26 +348,26 @@ KERNEL(link_5_position_gradient)(
         const real qdd3 = qdd[2 * W + b];
         const real qdd4 = qdd[3 * W + b];
         const real qdd5 = qdd[4 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s4 = sine[3 * W + b];
-        const real s5 = sine[4 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c4 = cosine[3 * W + b];
-        const real c5 = cosine[4 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin4 = sine[3 * W + b];
+        const real sin5 = sine[4 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos4 = cosine[3 * W + b];
+        const real cos5 = cosine[4 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c0_out[5 * W + b] = R(0.0); /* c0(2, 5, 1) */
-        c0_out[10 * W + b] = R(0.0); /* c0(3, 5, 1) */
-        c0_out[15 * W + b] = R(0.0); /* c0(4, 5, 1) */
-        c0_out[20 * W + b] = R(0.0); /* c0(5, 5, 1) */
-        const real x1_x = c2 * c3 - s2 * s3;
-        const real t1 = c2 * s3 + s2 * c3;
-        const real x5_x = c4 * c5;
-        const real x5_z = s4 * c5;
-        const real t2 = c4 * s5;
-        const real t3 = s4 * s5;
+        c0[5 * W + b] = R(0.0); /* c0(2, 5, 1) */
+        c0[10 * W + b] = R(0.0); /* c0(3, 5, 1) */
+        c0[15 * W + b] = R(0.0); /* c0(4, 5, 1) */
+        c0[20 * W + b] = R(0.0); /* c0(5, 5, 1) */
+        const real x1_x = cos2 * cos3 - sin2 * sin3;
+        const real t1 = cos2 * sin3 + sin2 * cos3;
+        const real x5_x = cos4 * cos5;
+        const real x5_z = sin4 * cos5;
+        const real t2 = cos4 * sin5;
+        const real t3 = sin4 * sin5;
         const real zd2_y = qd1 * t1;
         const real t4 = qd1 * x1_x;
         const real t5 = qdd1 * t1;
@@ -392,21 +391,21 @@ KERNEL(link_5_position_gradient)(
         const real wd4_x = qd4 * w3_z - t14;
         const real wd4_y = wd3_y - qdd4;
         const real wd4_z = wd3_z + qd4 * zd2_y;
-        const real t19 = c4 * t18;
-        const real zd5_y = c4 * zd2_y - s4 * w3_z;
-        const real t20 = s4 * t18;
-        const real t21 = c4 * wd4_y + t18 * t20 - w3_z * zd5_y;
-        const real t22 = s4 * wd4_z + c4 * wd4_x + w3_z * t19 + zd2_y * t20;
-        const real t23 = s4 * wd4_y - (zd2_y * zd5_y + t18 * t19);
-        const real t24 = zd2_y + qd5 * s4;
-        const real w5_z = w3_z + qd5 * c4;
-        const real wd5_x = wd4_x - qdd5 * s4 - qd5 * t19;
+        const real t19 = cos4 * t18;
+        const real zd5_y = cos4 * zd2_y - sin4 * w3_z;
+        const real t20 = sin4 * t18;
+        const real t21 = cos4 * wd4_y + t18 * t20 - w3_z * zd5_y;
+        const real t22 = sin4 * wd4_z + cos4 * wd4_x + w3_z * t19 + zd2_y * t20;
+        const real t23 = sin4 * wd4_y - (zd2_y * zd5_y + t18 * t19);
+        const real t24 = zd2_y + qd5 * sin4;
+        const real w5_z = w3_z + qd5 * cos4;
+        const real wd5_x = wd4_x - qdd5 * sin4 - qd5 * t19;
         const real wd5_y = wd4_y + qd5 * zd5_y;
-        const real wd5_z = wd4_z + qdd5 * c4 - qd5 * t20;
+        const real wd5_z = wd4_z + qdd5 * cos4 - qd5 * t20;
         const real t25 = R(5.72016380884324) * t1;
         const real t26 = R(5.72016380884324) * x1_x;
-        const real t27 = R(0.01183683234653596) - R(0.25178050281942005) * c3;
-        const real s2_x = R(0.25253852656575) + R(0.25178050281942005) * s3;
+        const real t27 = R(0.01183683234653596) - R(0.25178050281942005) * cos3;
+        const real s2_x = R(0.25253852656575) + R(0.25178050281942005) * sin3;
         const real t28 = R(0.08752258794162796) * x1_x;
         const real s1_y = R(0.08752258794162796) * t1;
         const real s1_z = t1 * s2_x - x1_x * t27;
@@ -434,16 +433,16 @@ KERNEL(link_5_position_gradient)(
         const real t39 = t36 + qd3 * sd3_y - R(0.01183683234653596) * qdd3;
         const real t40 = qd1 * sd1_z + qdd1 * s1_z + qd2 * sd2_z + qd3 * sd3_z;
         const real t41 = R(0.0002) * x5_x;
-        const real t42 = R(0.0002) * s5;
+        const real t42 = R(0.0002) * sin5;
         const real t43 = R(0.0002) * t2;
-        const real t44 = R(0.0002) * c5;
-        const real t45 = R(0.0001) * s4;
-        const real t46 = x5_x * t41 + t2 * t43 + s4 * t45;
-        const real n4_c2_x = s5 * t41 - c5 * t43;
-        const real t47 = x5_z * t41 + t3 * t43 - c4 * t45;
-        const real t48 = s5 * t42 + c5 * t44;
+        const real t44 = R(0.0002) * cos5;
+        const real t45 = R(0.0001) * sin4;
+        const real t46 = x5_x * t41 + t2 * t43 + sin4 * t45;
+        const real n4_c2_x = sin5 * t41 - cos5 * t43;
+        const real t47 = x5_z * t41 + t3 * t43 - cos4 * t45;
+        const real t48 = sin5 * t42 + cos5 * t44;
         const real n4_c2_z = x5_z * t42 - t3 * t44;
-        const real t49 = x5_z * (R(0.0002) * x5_z) + t3 * (R(0.0002) * t3) + c4 * (R(0.0001) * c4);
+        const real t49 = x5_z * (R(0.0002) * x5_z) + t3 * (R(0.0002) * t3) + cos4 * (R(0.0001) * cos4);
         const real t50 = R(0.0005) - t46;
         const real c2_4_4 = R(0.0005) - t48;
         const real n2_c2_z = R(0.0005) - t49;
@@ -464,7 +463,7 @@ KERNEL(link_5_position_gradient)(
         const real t65 = wd5_z * n2_c2_z - (wd5_x * t47 + wd5_y * n4_c2_z) + w5_z * t62 - (t24 * t55 + t18 * t59);
         const real t66 = s1_z * (x1_x * t25 - t1 * t26 + x1_x * t38 - t1 * t39);
         const real t67 = t1 * (s1_y * t40 - s1_z * t39 - x1_x * t65) + x1_x * (t1 * t65 + s1_z * t38 + t28 * t40);
-        c0_out[0 * W + b] = t28 * (x1_x * t40) + s1_y * (t1 * t40) + t66 - t67; /* c0(1, 5, 1) */
+        c0[0 * W + b] = t28 * (x1_x * t40) + s1_y * (t1 * t40) + t66 - t67; /* c0(1, 5, 1) */
         const real t68 = t8 * t47;
         const real t69 = t8 * n4_c2_z;
         const real t70 = t8 * n2_c2_z;
@@ -473,49 +472,49 @@ KERNEL(link_5_position_gradient)(
         const real t73 = R(2.0) * (zd2_y * t59 - t4 * t55);
         const real t74 = t68 - (t6 * t50 + t5 * n4_c2_x) + t71;
         const real t75 = t6 * n4_c2_x + t5 * c2_4_4 + t69 + t72;
-        c0_out[16 * W + b] = -t75; /* c0(4, 5, 2) */
+        c0[16 * W + b] = -t75; /* c0(4, 5, 2) */
         const real t76 = t6 * t47 - t5 * n4_c2_z - t70 + t73;
-        c0_out[11 * W + b] = t76 + R(0.25253852656575) * t33 - R(0.01183683234653596) * t34; /* c0(3, 5, 2) */
-        c0_out[21 * W + b] = c4 * t76 - s4 * t74; /* c0(5, 5, 2) */
+        c0[11 * W + b] = t76 + R(0.25253852656575) * t33 - R(0.01183683234653596) * t34; /* c0(3, 5, 2) */
+        c0[21 * W + b] = cos4 * t76 - sin4 * t74; /* c0(5, 5, 2) */
         const real t77 = t33 - t39;
         const real t78 = t34 + t38;
-        c0_out[6 * W + b] = t76 + s2_x * t39 + t27 * t38 + s2_x * t77 - t27 * t78; /* c0(2, 5, 2) */
+        c0[6 * W + b] = t76 + s2_x * t39 + t27 * t38 + s2_x * t77 - t27 * t78; /* c0(2, 5, 2) */
         const real t79 = s1_z * (t5 * t27 + t6 * s2_x + R(2.0) * (t4 * v1_y - zd2_y * sd2_y));
         const real t80 = t1 * (t74 - (t64 + t27 * t40)) + x1_x * (t75 + t63 - s2_x * t40);
-        c0_out[1 * W + b] = s1_y * t78 - t28 * t77 + t79 - t80; /* c0(1, 5, 2) */
+        c0[1 * W + b] = s1_y * t78 - t28 * t77 + t79 - t80; /* c0(1, 5, 2) */
         const real t81 = t71 + t68 + t12 * t50 - t13 * n4_c2_x;
         const real t82 = t72 + t69 + t13 * c2_4_4 - t12 * n4_c2_x;
-        c0_out[17 * W + b] = -t82; /* c0(4, 5, 3) */
+        c0[17 * W + b] = -t82; /* c0(4, 5, 3) */
         const real t83 = t73 - (t70 + t12 * t47 + t13 * n4_c2_z);
-        c0_out[22 * W + b] = c4 * t83 - s4 * t81; /* c0(5, 5, 3) */
+        c0[22 * W + b] = cos4 * t83 - sin4 * t81; /* c0(5, 5, 3) */
         const real t84 = t83 + R(0.25253852656575) * t39 + R(0.01183683234653596) * t38;
         const real t85 = t36 + R(0.01183683234653596) * qdd2 - (t4 * sd3_z + qd2 * sd3_y) - t39;
         const real t86 = R(0.25253852656575) * qdd2 - t35 + qd2 * sd3_x + zd2_y * sd3_z + t38;
-        c0_out[7 * W + b] = t84 + s2_x * t85 - t27 * t86; /* c0(2, 5, 3) */
-        c0_out[12 * W + b] = t84 + R(0.25253852656575) * t85 - R(0.01183683234653596) * t86; /* c0(3, 5, 3) */
+        c0[7 * W + b] = t84 + s2_x * t85 - t27 * t86; /* c0(2, 5, 3) */
+        c0[12 * W + b] = t84 + R(0.25253852656575) * t85 - R(0.01183683234653596) * t86; /* c0(3, 5, 3) */
         const real t87 = t1 * (t81 - (t64 + R(0.01183683234653596) * t40));
         const real t88 = s1_z * (t37 + t4 * sd3_x - zd2_y * sd3_y + t4 * v2_y - zd2_y * t29);
-        c0_out[2 * W + b] = s1_y * t86 - t28 * t85 + t88 - (t87 + x1_x * (t82 + t63 - R(0.25253852656575) * t40)); /* c0(1, 5, 3) */
+        c0[2 * W + b] = s1_y * t86 - t28 * t85 + t88 - (t87 + x1_x * (t82 + t63 - R(0.25253852656575) * t40)); /* c0(1, 5, 3) */
         const real t89 = t16 * t50 - t15 * n4_c2_x - t17 * t47 + R(2.0) * (w3_z * t53 + zd2_y * t60);
         const real t90 = t15 * c2_4_4 - t16 * n4_c2_x - t17 * n4_c2_z - R(2.0) * (w3_z * t54 + zd2_y * t61);
-        c0_out[3 * W + b] = -(t1 * (t89 - t65) + x1_x * t90); /* c0(1, 5, 4) */
-        c0_out[18 * W + b] = -t90; /* c0(4, 5, 4) */
+        c0[3 * W + b] = -(t1 * (t89 - t65) + x1_x * t90); /* c0(1, 5, 4) */
+        c0[18 * W + b] = -t90; /* c0(4, 5, 4) */
         const real t91 = t17 * n2_c2_z - (t16 * t47 + t15 * n4_c2_z) + R(2.0) * (w3_z * t55 + zd2_y * t62);
-        c0_out[23 * W + b] = c4 * t91 - s4 * t89; /* c0(5, 5, 4) */
+        c0[23 * W + b] = cos4 * t91 - sin4 * t89; /* c0(5, 5, 4) */
         const real t92 = t63 + t91;
-        c0_out[8 * W + b] = t92; /* c0(2, 5, 4) */
-        c0_out[13 * W + b] = t92; /* c0(3, 5, 4) */
+        c0[8 * W + b] = t92; /* c0(2, 5, 4) */
+        c0[13 * W + b] = t92; /* c0(3, 5, 4) */
         const real t93 = R(2.0) * (t19 * t54 - zd5_y * t58 + t20 * t61);
         const real t94 = R(2.0) * (zd5_y * t59 - t19 * t55 - t20 * t62);
         const real t95 = t21 * t50 + t22 * n4_c2_x - t23 * t47 + R(2.0) * (zd5_y * t56 - t19 * t53 - t20 * t60);
-        const real t96 = t95 - c4 * t64;
-        const real t97 = t93 - (t21 * n4_c2_x + t22 * c2_4_4 + t23 * n4_c2_z) + c4 * t63 + s4 * t65;
-        c0_out[4 * W + b] = -(t1 * t96 + x1_x * t97); /* c0(1, 5, 5) */
-        c0_out[19 * W + b] = -t97; /* c0(4, 5, 5) */
-        const real t98 = t22 * n4_c2_z - t21 * t47 + t23 * n2_c2_z + t94 - s4 * t64;
-        c0_out[9 * W + b] = t98; /* c0(2, 5, 5) */
-        c0_out[14 * W + b] = t98; /* c0(3, 5, 5) */
-        c0_out[24 * W + b] = c4 * t98 - s4 * t96; /* c0(5, 5, 5) */
+        const real t96 = t95 - cos4 * t64;
+        const real t97 = t93 - (t21 * n4_c2_x + t22 * c2_4_4 + t23 * n4_c2_z) + cos4 * t63 + sin4 * t65;
+        c0[4 * W + b] = -(t1 * t96 + x1_x * t97); /* c0(1, 5, 5) */
+        c0[19 * W + b] = -t97; /* c0(4, 5, 5) */
+        const real t98 = t22 * n4_c2_z - t21 * t47 + t23 * n2_c2_z + t94 - sin4 * t64;
+        c0[9 * W + b] = t98; /* c0(2, 5, 5) */
+        c0[14 * W + b] = t98; /* c0(3, 5, 5) */
+        c0[24 * W + b] = cos4 * t98 - sin4 * t96; /* c0(5, 5, 5) */
     }
 }
 #endif

@@ -32,17 +32,17 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     qdd2 = qdd[..., 1]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    t1 = 0.068 * c2 - 0.006 * s2
-    t2 = 0.068 * s2 + 0.006 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    t1 = 0.068 * cos2 - 0.006 * sin2
+    t2 = 0.068 * sin2 + 0.006 * cos2
     f1_c2_y = 17.4 * t1
-    t3 = c2 * (0.0725 * s2) - s2 * (0.4665 * c2) - t2 * f1_c2_y
+    t3 = cos2 * (0.0725 * sin2) - sin2 * (0.4665 * cos2) - t2 * f1_c2_y
     n1_c2_y = 3.9585 * t2
     t4 = t2 * (17.4 * t2)
     t5 = 0.5965 + t4 + t1 * f1_c2_y + 0.90055875
     n2_c2_y = t5 - 0.95805875
-    n1_c2_z = t5 - (s2 * (0.4665 * s2) + c2 * (0.0725 * c2) + t4)
+    n1_c2_z = t5 - (sin2 * (0.4665 * sin2) + cos2 * (0.0725 * cos2) + t4)
     n1_c1_z = qd2 * t3
     t6 = qd1 * t3
     t7 = 170.694 * t1
@@ -86,19 +86,19 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     qdd2 = qdd[..., 1]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
     t1 = qd1 * qd2
-    t2 = 0.068 * c2 - 0.006 * s2
-    t3 = 0.068 * s2 + 0.006 * c2
+    t2 = 0.068 * cos2 - 0.006 * sin2
+    t3 = 0.068 * sin2 + 0.006 * cos2
     f1_c2_y = 17.4 * t2
     t4 = 3.9585 * t2
-    t5 = c2 * (0.0725 * s2) - s2 * (0.4665 * c2) - t3 * f1_c2_y
+    t5 = cos2 * (0.0725 * sin2) - sin2 * (0.4665 * cos2) - t3 * f1_c2_y
     n1_c2_y = 3.9585 * t3
     t6 = t3 * (17.4 * t3)
     t7 = 0.5965 + t6 + t2 * f1_c2_y + 0.90055875
     n2_c2_y = t7 - 0.95805875
-    n1_c2_z = t7 - (s2 * (0.4665 * s2) + c2 * (0.0725 * c2) + t6)
+    n1_c2_z = t7 - (sin2 * (0.4665 * sin2) + cos2 * (0.0725 * cos2) + t6)
     n1_c1_z = qd2 * t5
     t8 = t1 * t4 + qdd2 * n2_c2_y + qdd1 * n1_c2_y - 170.694 * t2
 
@@ -122,23 +122,23 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     qdd2 = qdd[..., 1]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
     t1 = qd1 * qd1
-    t2 = 0.068 * c2 - 0.006 * s2
-    t3 = 0.068 * s2 + 0.006 * c2
+    t2 = 0.068 * cos2 - 0.006 * sin2
+    t3 = 0.068 * sin2 + 0.006 * cos2
     f1_c2_y = 17.4 * t2
-    t4 = 0.4665 * c2
-    t5 = 0.0725 * s2
+    t4 = 0.4665 * cos2
+    t5 = 0.0725 * sin2
     t6 = t2 * f1_c2_y
-    t7 = c2 * t4 + s2 * t5 + t6
+    t7 = cos2 * t4 + sin2 * t5 + t6
     t8 = 3.9585 * t2
     n1_c2_y = 3.9585 * t3
     t9 = t3 * (17.4 * t3)
     t10 = 0.5965 + t9 + t6 + 0.90055875
     n2_c2_y = t10 - 0.95805875
-    t11 = qdd1 * (c2 * t5 - s2 * t4 - t3 * f1_c2_y)
-    t12 = qd1 * (qd1 * n1_c2_y + qd2 * (s2 * (0.4665 * s2) + c2 * (0.0725 * c2) + t9))
+    t11 = qdd1 * (cos2 * t5 - sin2 * t4 - t3 * f1_c2_y)
+    t12 = qd1 * (qd1 * n1_c2_y + qd2 * (sin2 * (0.4665 * sin2) + cos2 * (0.0725 * cos2) + t9))
     t13 = 38.832885 - (qd1 * qd2 * (t10 - t7) + qdd2 * t8 + t11)
     t14 = 38.832885 + t11 - t1 * n1_c2_y - 2.0 * (qd1 * (qd2 * t7))
 

@@ -35,17 +35,17 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     qdd3 = qdd[..., 2]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    x3_x = c2 * c3 - s2 * s3
-    t1 = s2 * c3 + c2 * s3
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    x3_x = cos2 * cos3 - sin2 * sin3
+    t1 = sin2 * cos3 + cos2 * sin3
     w3_y = qd2 + qd3
     t2 = 0.15336231610144652 * t1
     s3_x = 0.15336231610144652 * x3_x
-    s1_y = t2 + 0.9460264013229229 * c2
-    t3 = 0.9460264013229229 * s2 - s3_x
+    s1_y = t2 + 0.9460264013229229 * cos2
+    t3 = 0.9460264013229229 * sin2 - s3_x
     t4 = qd3 * s3_x
     v2_z = qd3 * t2
     v1_x = qd2 * t3 - t4
@@ -133,18 +133,18 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     qdd3 = qdd[..., 2]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    x3_x = c2 * c3 - s2 * s3
-    t1 = s2 * c3 + c2 * s3
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    x3_x = cos2 * cos3 - sin2 * sin3
+    t1 = sin2 * cos3 + cos2 * sin3
     w3_y = qd2 + qd3
     wd3_y = qdd2 + qdd3
     t2 = 0.15336231610144652 * t1
     s3_x = 0.15336231610144652 * x3_x
-    s1_y = t2 + 0.9460264013229229 * c2
-    t3 = 0.9460264013229229 * s2 - s3_x
+    s1_y = t2 + 0.9460264013229229 * cos2
+    t3 = 0.9460264013229229 * sin2 - s3_x
     t4 = qd3 * s3_x
     v2_z = qd3 * t2
     v1_x = qd2 * t3 - t4
@@ -186,18 +186,18 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     qdd3 = qdd[..., 2]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    x3_x = c2 * c3 - s2 * s3
-    t1 = s2 * c3 + c2 * s3
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    x3_x = cos2 * cos3 - sin2 * sin3
+    t1 = sin2 * cos3 + cos2 * sin3
     t2 = qd1 * qd2
     w3_y = qd2 + qd3
     t3 = 0.15336231610144652 * t1
     s3_x = 0.15336231610144652 * x3_x
-    s1_y = t3 + 0.9460264013229229 * c2
-    t4 = 0.9460264013229229 * s2 - s3_x
+    s1_y = t3 + 0.9460264013229229 * cos2
+    t4 = 0.9460264013229229 * sin2 - s3_x
     t5 = qd3 * s3_x
     v2_z = qd3 * t3
     v1_x = qd2 * t4 - t5

@@ -38,22 +38,22 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     qdd4 = qdd[..., 3]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    x1_x = c2 * c3 - s2 * s3
-    t1 = c2 * s3 + s2 * c3
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    x1_x = cos2 * cos3 - sin2 * sin3
+    t1 = cos2 * sin3 + sin2 * cos3
     zd2_y = qd1 * t1
     t2 = qd1 * x1_x
     w3_z = qd2 + qd3
     t3 = qd4 + t2
     t4 = 8.883332820512805 * t1
     t5 = 8.883332820512805 * x1_x
-    t6 = 0.018382431830418957 - 0.39101153026477364 * c3
-    s2_x = 0.3749834985702704 + 0.39101153026477364 * s3
+    t6 = 0.018382431830418957 - 0.39101153026477364 * cos3
+    s2_x = 0.3749834985702704 + 0.39101153026477364 * sin3
     t7 = 0.13592133092344263 * x1_x
     s1_y = 0.13592133092344263 * t1
     s1_z = t1 * s2_x - x1_x * t6
@@ -71,10 +71,10 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     sd3_z = 0.018382431830418957 * zd2_y + 0.3749834985702704 * t2
     sd3_x = v2_y + 0.018382431830418957 * qd2
     sd3_y = t8 + 0.3749834985702704 * qd2
-    t11 = 0.00065 * c4
-    t12 = 0.00065 * s4
-    t13 = c4 * t11 + s4 * t12
-    t14 = s4 * t11 - c4 * t12
+    t11 = 0.00065 * cos4
+    t12 = 0.00065 * sin4
+    t13 = cos4 * t11 + sin4 * t12
+    t14 = sin4 * t11 - cos4 * t12
     n2_c2_z = 0.00245 - t13
     t15 = t3 * t14
     t16 = zd2_y * t14
@@ -188,14 +188,14 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     qdd4 = qdd[..., 3]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    x1_x = c2 * c3 - s2 * s3
-    t1 = c2 * s3 + s2 * c3
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    x1_x = cos2 * cos3 - sin2 * sin3
+    t1 = cos2 * sin3 + sin2 * cos3
     zd2_y = qd1 * t1
     t2 = qd1 * x1_x
     wd2_y = qd2 * zd2_y - qdd1 * x1_x
@@ -206,8 +206,8 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     wd4_x = qd4 * w3_z - (qdd1 * t1 + qd2 * t2 + qd3 * t2)
     wd4_y = wd3_y - qdd4
     wd4_z = wd3_z + qd4 * zd2_y
-    t4 = 0.018382431830418957 - 0.39101153026477364 * c3
-    s2_x = 0.3749834985702704 + 0.39101153026477364 * s3
+    t4 = 0.018382431830418957 - 0.39101153026477364 * cos3
+    s2_x = 0.3749834985702704 + 0.39101153026477364 * sin3
     t5 = 0.13592133092344263 * x1_x
     s1_y = 0.13592133092344263 * t1
     s1_z = t1 * s2_x - x1_x * t4
@@ -228,10 +228,10 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     t9 = 0.3749834985702704 * qdd3 + t8 + qd3 * sd3_x
     t10 = qdd1 * s1_y + qd1 * sd1_y - 8.883332820512805 * x1_x + qd2 * sd2_y - qdd2 * t4
     t11 = t10 + qd3 * sd3_y - 0.018382431830418957 * qdd3
-    t12 = 0.00065 * c4
-    t13 = 0.00065 * s4
-    t14 = c4 * t12 + s4 * t13
-    t15 = s4 * t12 - c4 * t13
+    t12 = 0.00065 * cos4
+    t13 = 0.00065 * sin4
+    t14 = cos4 * t12 + sin4 * t13
+    t15 = sin4 * t12 - cos4 * t13
     n2_c2_z = 0.00245 - t14
     t16 = t3 * t15
     t17 = t3 * t14
@@ -268,14 +268,14 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     qdd4 = qdd[..., 3]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    x1_x = c2 * c3 - s2 * s3
-    t1 = c2 * s3 + s2 * c3
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    x1_x = cos2 * cos3 - sin2 * sin3
+    t1 = cos2 * sin3 + sin2 * cos3
     zd2_y = qd1 * t1
     t2 = qd1 * x1_x
     t3 = qdd1 * t1
@@ -299,8 +299,8 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     wd4_z = wd3_z + qd4 * zd2_y
     t15 = 8.883332820512805 * t1
     t16 = 8.883332820512805 * x1_x
-    t17 = 0.018382431830418957 - 0.39101153026477364 * c3
-    s2_x = 0.3749834985702704 + 0.39101153026477364 * s3
+    t17 = 0.018382431830418957 - 0.39101153026477364 * cos3
+    s2_x = 0.3749834985702704 + 0.39101153026477364 * sin3
     t18 = 0.13592133092344263 * x1_x
     s1_y = 0.13592133092344263 * t1
     s1_z = t1 * s2_x - x1_x * t17
@@ -327,10 +327,10 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t28 = 0.3749834985702704 * qdd3 + t25 + qd3 * sd3_x
     t29 = t26 + qd3 * sd3_y - 0.018382431830418957 * qdd3
     t30 = qd1 * sd1_z + qdd1 * s1_z + qd2 * sd2_z + qd3 * sd3_z
-    t31 = 0.00065 * c4
-    t32 = 0.00065 * s4
-    t33 = c4 * t31 + s4 * t32
-    t34 = s4 * t31 - c4 * t32
+    t31 = 0.00065 * cos4
+    t32 = 0.00065 * sin4
+    t33 = cos4 * t31 + sin4 * t32
+    t34 = sin4 * t31 - cos4 * t32
     n2_c2_z = 0.00245 - t33
     t35 = t14 * t34
     t36 = zd2_y * t34 + w3_z * t33

@@ -41,33 +41,33 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     qdd5 = qdd[..., 4]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    s5 = xp.sin(q5)
-    c5 = xp.cos(q5)
-    x1_x = c2 * c3 - s2 * s3
-    t1 = c2 * s3 + s2 * c3
-    x5_x = c4 * c5
-    x5_z = s4 * c5
-    t2 = c4 * s5
-    t3 = s4 * s5
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    sin5 = xp.sin(q5)
+    cos5 = xp.cos(q5)
+    x1_x = cos2 * cos3 - sin2 * sin3
+    t1 = cos2 * sin3 + sin2 * cos3
+    x5_x = cos4 * cos5
+    x5_z = sin4 * cos5
+    t2 = cos4 * sin5
+    t3 = sin4 * sin5
     zd2_y = qd1 * t1
     t4 = qd1 * x1_x
     w3_z = qd2 + qd3
     t5 = qd4 + t4
-    t6 = c4 * t5
-    zd5_y = c4 * zd2_y - s4 * w3_z
-    t7 = s4 * t5
-    t8 = zd2_y + qd5 * s4
-    w5_z = w3_z + qd5 * c4
+    t6 = cos4 * t5
+    zd5_y = cos4 * zd2_y - sin4 * w3_z
+    t7 = sin4 * t5
+    t8 = zd2_y + qd5 * sin4
+    w5_z = w3_z + qd5 * cos4
     t9 = 5.72016380884324 * t1
     t10 = 5.72016380884324 * x1_x
-    t11 = 0.01183683234653596 - 0.25178050281942005 * c3
-    s2_x = 0.25253852656575 + 0.25178050281942005 * s3
+    t11 = 0.01183683234653596 - 0.25178050281942005 * cos3
+    s2_x = 0.25253852656575 + 0.25178050281942005 * sin3
     t12 = 0.08752258794162796 * x1_x
     s1_y = 0.08752258794162796 * t1
     s1_z = t1 * s2_x - x1_x * t11
@@ -86,16 +86,16 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     sd3_x = v2_y + 0.01183683234653596 * qd2
     sd3_y = t13 + 0.25253852656575 * qd2
     t16 = 0.0002 * x5_x
-    t17 = 0.0002 * s5
+    t17 = 0.0002 * sin5
     t18 = 0.0002 * t2
-    t19 = 0.0002 * c5
-    t20 = 0.0001 * s4
-    t21 = x5_x * t16 + t2 * t18 + s4 * t20
-    n4_c2_x = s5 * t16 - c5 * t18
-    t22 = x5_z * t16 + t3 * t18 - c4 * t20
-    t23 = s5 * t17 + c5 * t19
+    t19 = 0.0002 * cos5
+    t20 = 0.0001 * sin4
+    t21 = x5_x * t16 + t2 * t18 + sin4 * t20
+    n4_c2_x = sin5 * t16 - cos5 * t18
+    t22 = x5_z * t16 + t3 * t18 - cos4 * t20
+    t23 = sin5 * t17 + cos5 * t19
     n4_c2_z = x5_z * t17 - t3 * t19
-    t24 = x5_z * (0.0002 * x5_z) + t3 * (0.0002 * t3) + c4 * (0.0001 * c4)
+    t24 = x5_z * (0.0002 * x5_z) + t3 * (0.0002 * t3) + cos4 * (0.0001 * cos4)
     t25 = 0.0005 - t21
     c2_4_4 = 0.0005 - t23
     n2_c2_z = 0.0005 - t24
@@ -124,7 +124,7 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     c1_1_1 = t1 * t38 - x1_x * n1_c1_y + t12 * t15 + s1_y * sd1_y + s1_z * sd1_z
     t40 = t39 + s2_x * t15 + t11 * sd1_y
     t41 = t39 + 0.25253852656575 * t15 + 0.01183683234653596 * sd1_y
-    c1_5_1 = s4 * t38 - c4 * t39
+    c1_5_1 = sin4 * t38 - cos4 * t39
     tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1
     tau2_1 = g_2 - qd1 * t40
     tau3_1 = g_3 - qd1 * t41
@@ -139,7 +139,7 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     c2_2_2 = n2_c2_z + s2_x * s2_x + t11 * t11
     c1_2_2 = n2_c1_z + s2_x * v1_y - t11 * sd2_y
     c1_3_2 = n2_c1_z + 0.25253852656575 * v1_y - 0.01183683234653596 * sd2_y
-    c1_5_2 = c4 * n2_c1_z - s4 * n2_c1_x
+    c1_5_2 = cos4 * n2_c1_z - sin4 * n2_c1_x
     tau1_2 = tau1_1 + qdd2 * c2_1_2 + qd2 * c1_1_2
     tau2_2 = tau2_1 + qdd1 * c2_1_2 + qdd2 * c2_2_2 + qd2 * c1_2_2
     tau3_2 = tau3_1 + qd2 * c1_3_2
@@ -158,7 +158,7 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     n4_c1_y = t33 - (t42 + w3_z * n4_c2_x)
     n4_c1_z = zd2_y * n2_c2_z - w3_z * t22 - t34
     t44 = t1 * n4_c1_x + x1_x * n4_c1_y
-    c1_5_4 = c4 * n4_c1_z - s4 * n4_c1_x
+    c1_5_4 = cos4 * n4_c1_z - sin4 * n4_c1_x
     tau1_4 = tau1_3 - qdd4 * n1_c2_y - qd4 * t44
     t45 = qdd4 * n4_c2_z
     t46 = qd4 * n4_c1_z
@@ -167,16 +167,16 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     tau3_4 = t46 + tau3_3 + t45
     tau4_4 = t47 + qdd3 * n4_c2_z + qdd4 * c2_4_4 - qd4 * n4_c1_y
     tau5_4 = tau5_3 + qd4 * c1_5_4
-    t48 = s4 * t25 + c4 * t22
-    n5_c2_y = s4 * n4_c2_x - c4 * n4_c2_z
-    n5_c2_z = s4 * t22 + c4 * n2_c2_z
-    n5_c1_x = c4 * t35 - s4 * t28 + t7 * t22 - (t6 * t25 + zd5_y * n4_c2_x)
-    n5_c1_y = s4 * t29 - c4 * t36 + t6 * n4_c2_x + zd5_y * c2_4_4 + t7 * n4_c2_z
-    n5_c1_z = c4 * t37 - s4 * t30 + t6 * t22 - zd5_y * n4_c2_z - t7 * n2_c2_z
+    t48 = sin4 * t25 + cos4 * t22
+    n5_c2_y = sin4 * n4_c2_x - cos4 * n4_c2_z
+    n5_c2_z = sin4 * t22 + cos4 * n2_c2_z
+    n5_c1_x = cos4 * t35 - sin4 * t28 + t7 * t22 - (t6 * t25 + zd5_y * n4_c2_x)
+    n5_c1_y = sin4 * t29 - cos4 * t36 + t6 * n4_c2_x + zd5_y * c2_4_4 + t7 * n4_c2_z
+    n5_c1_z = cos4 * t37 - sin4 * t30 + t6 * t22 - zd5_y * n4_c2_z - t7 * n2_c2_z
     c2_1_5 = t1 * t48 - x1_x * n5_c2_y
     t49 = t1 * n5_c1_x + x1_x * n5_c1_y
-    c2_5_5 = s4 * t48 + c4 * n5_c2_z
-    c1_5_5 = c4 * n5_c1_z - s4 * n5_c1_x
+    c2_5_5 = sin4 * t48 + cos4 * n5_c2_z
+    c1_5_5 = cos4 * n5_c1_z - sin4 * n5_c1_x
     t50 = qdd5 * n5_c2_z
     t51 = qd5 * n5_c1_z
     t52 = tau5_4 + qdd1 * c2_1_5 + qdd2 * n5_c2_z + qdd3 * n5_c2_z - qdd4 * n5_c2_y
@@ -266,20 +266,20 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     qdd5 = qdd[..., 4]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    s5 = xp.sin(q5)
-    c5 = xp.cos(q5)
-    x1_x = c2 * c3 - s2 * s3
-    t1 = c2 * s3 + s2 * c3
-    x5_x = c4 * c5
-    x5_z = s4 * c5
-    t2 = c4 * s5
-    t3 = s4 * s5
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    sin5 = xp.sin(q5)
+    cos5 = xp.cos(q5)
+    x1_x = cos2 * cos3 - sin2 * sin3
+    t1 = cos2 * sin3 + sin2 * cos3
+    x5_x = cos4 * cos5
+    x5_z = sin4 * cos5
+    t2 = cos4 * sin5
+    t3 = sin4 * sin5
     zd2_y = qd1 * t1
     t4 = qd1 * x1_x
     wd2_y = qd2 * zd2_y - qdd1 * x1_x
@@ -290,14 +290,14 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     wd4_x = qd4 * w3_z - (qdd1 * t1 + qd2 * t4 + qd3 * t4)
     wd4_y = wd3_y - qdd4
     wd4_z = wd3_z + qd4 * zd2_y
-    zd5_y = c4 * zd2_y - s4 * w3_z
-    t6 = zd2_y + qd5 * s4
-    w5_z = w3_z + qd5 * c4
-    wd5_x = wd4_x - qdd5 * s4 - qd5 * (c4 * t5)
+    zd5_y = cos4 * zd2_y - sin4 * w3_z
+    t6 = zd2_y + qd5 * sin4
+    w5_z = w3_z + qd5 * cos4
+    wd5_x = wd4_x - qdd5 * sin4 - qd5 * (cos4 * t5)
     wd5_y = wd4_y + qd5 * zd5_y
-    wd5_z = wd4_z + qdd5 * c4 - qd5 * (s4 * t5)
-    t7 = 0.01183683234653596 - 0.25178050281942005 * c3
-    s2_x = 0.25253852656575 + 0.25178050281942005 * s3
+    wd5_z = wd4_z + qdd5 * cos4 - qd5 * (sin4 * t5)
+    t7 = 0.01183683234653596 - 0.25178050281942005 * cos3
+    s2_x = 0.25253852656575 + 0.25178050281942005 * sin3
     t8 = 0.08752258794162796 * x1_x
     s1_y = 0.08752258794162796 * t1
     s1_z = t1 * s2_x - x1_x * t7
@@ -319,16 +319,16 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     t13 = qdd1 * s1_y + qd1 * sd1_y - 5.72016380884324 * x1_x + qd2 * sd2_y - qdd2 * t7
     t14 = t13 + qd3 * sd3_y - 0.01183683234653596 * qdd3
     t15 = 0.0002 * x5_x
-    t16 = 0.0002 * s5
+    t16 = 0.0002 * sin5
     t17 = 0.0002 * t2
-    t18 = 0.0002 * c5
-    t19 = 0.0001 * s4
-    t20 = x5_x * t15 + t2 * t17 + s4 * t19
-    n4_c2_x = s5 * t15 - c5 * t17
-    t21 = x5_z * t15 + t3 * t17 - c4 * t19
-    t22 = s5 * t16 + c5 * t18
+    t18 = 0.0002 * cos5
+    t19 = 0.0001 * sin4
+    t20 = x5_x * t15 + t2 * t17 + sin4 * t19
+    n4_c2_x = sin5 * t15 - cos5 * t17
+    t21 = x5_z * t15 + t3 * t17 - cos4 * t19
+    t22 = sin5 * t16 + cos5 * t18
     n4_c2_z = x5_z * t16 - t3 * t18
-    t23 = x5_z * (0.0002 * x5_z) + t3 * (0.0002 * t3) + c4 * (0.0001 * c4)
+    t23 = x5_z * (0.0002 * x5_z) + t3 * (0.0002 * t3) + cos4 * (0.0001 * cos4)
     c2_4_4 = 0.0005 - t22
     n2_c2_z = 0.0005 - t23
     t24 = w5_z * n4_c2_x
@@ -349,7 +349,7 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
         t33 + s2_x * t12 - t7 * t14,  # tau(2, 5)
         t33 + 0.25253852656575 * t12 - 0.01183683234653596 * t14,  # tau(3, 5)
         -t31,  # tau(4, 5)
-        c4 * t33 - s4 * t29,  # tau(5, 5)
+        cos4 * t33 - sin4 * t29,  # tau(5, 5)
     )
 
 
@@ -375,20 +375,20 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     qdd5 = qdd[..., 4]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    s5 = xp.sin(q5)
-    c5 = xp.cos(q5)
-    x1_x = c2 * c3 - s2 * s3
-    t1 = c2 * s3 + s2 * c3
-    x5_x = c4 * c5
-    x5_z = s4 * c5
-    t2 = c4 * s5
-    t3 = s4 * s5
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    sin5 = xp.sin(q5)
+    cos5 = xp.cos(q5)
+    x1_x = cos2 * cos3 - sin2 * sin3
+    t1 = cos2 * sin3 + sin2 * cos3
+    x5_x = cos4 * cos5
+    x5_z = sin4 * cos5
+    t2 = cos4 * sin5
+    t3 = sin4 * sin5
     zd2_y = qd1 * t1
     t4 = qd1 * x1_x
     t5 = qdd1 * t1
@@ -412,21 +412,21 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     wd4_x = qd4 * w3_z - t14
     wd4_y = wd3_y - qdd4
     wd4_z = wd3_z + qd4 * zd2_y
-    t19 = c4 * t18
-    zd5_y = c4 * zd2_y - s4 * w3_z
-    t20 = s4 * t18
-    t21 = c4 * wd4_y + t18 * t20 - w3_z * zd5_y
-    t22 = s4 * wd4_z + c4 * wd4_x + w3_z * t19 + zd2_y * t20
-    t23 = s4 * wd4_y - (zd2_y * zd5_y + t18 * t19)
-    t24 = zd2_y + qd5 * s4
-    w5_z = w3_z + qd5 * c4
-    wd5_x = wd4_x - qdd5 * s4 - qd5 * t19
+    t19 = cos4 * t18
+    zd5_y = cos4 * zd2_y - sin4 * w3_z
+    t20 = sin4 * t18
+    t21 = cos4 * wd4_y + t18 * t20 - w3_z * zd5_y
+    t22 = sin4 * wd4_z + cos4 * wd4_x + w3_z * t19 + zd2_y * t20
+    t23 = sin4 * wd4_y - (zd2_y * zd5_y + t18 * t19)
+    t24 = zd2_y + qd5 * sin4
+    w5_z = w3_z + qd5 * cos4
+    wd5_x = wd4_x - qdd5 * sin4 - qd5 * t19
     wd5_y = wd4_y + qd5 * zd5_y
-    wd5_z = wd4_z + qdd5 * c4 - qd5 * t20
+    wd5_z = wd4_z + qdd5 * cos4 - qd5 * t20
     t25 = 5.72016380884324 * t1
     t26 = 5.72016380884324 * x1_x
-    t27 = 0.01183683234653596 - 0.25178050281942005 * c3
-    s2_x = 0.25253852656575 + 0.25178050281942005 * s3
+    t27 = 0.01183683234653596 - 0.25178050281942005 * cos3
+    s2_x = 0.25253852656575 + 0.25178050281942005 * sin3
     t28 = 0.08752258794162796 * x1_x
     s1_y = 0.08752258794162796 * t1
     s1_z = t1 * s2_x - x1_x * t27
@@ -454,16 +454,16 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t39 = t36 + qd3 * sd3_y - 0.01183683234653596 * qdd3
     t40 = qd1 * sd1_z + qdd1 * s1_z + qd2 * sd2_z + qd3 * sd3_z
     t41 = 0.0002 * x5_x
-    t42 = 0.0002 * s5
+    t42 = 0.0002 * sin5
     t43 = 0.0002 * t2
-    t44 = 0.0002 * c5
-    t45 = 0.0001 * s4
-    t46 = x5_x * t41 + t2 * t43 + s4 * t45
-    n4_c2_x = s5 * t41 - c5 * t43
-    t47 = x5_z * t41 + t3 * t43 - c4 * t45
-    t48 = s5 * t42 + c5 * t44
+    t44 = 0.0002 * cos5
+    t45 = 0.0001 * sin4
+    t46 = x5_x * t41 + t2 * t43 + sin4 * t45
+    n4_c2_x = sin5 * t41 - cos5 * t43
+    t47 = x5_z * t41 + t3 * t43 - cos4 * t45
+    t48 = sin5 * t42 + cos5 * t44
     n4_c2_z = x5_z * t42 - t3 * t44
-    t49 = x5_z * (0.0002 * x5_z) + t3 * (0.0002 * t3) + c4 * (0.0001 * c4)
+    t49 = x5_z * (0.0002 * x5_z) + t3 * (0.0002 * t3) + cos4 * (0.0001 * cos4)
     t50 = 0.0005 - t46
     c2_4_4 = 0.0005 - t48
     n2_c2_z = 0.0005 - t49
@@ -511,10 +511,10 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t92 = t63 + t91
     t93 = t21 * n4_c2_x + t22 * c2_4_4 + t23 * n4_c2_z
     t94 = t21 * t50 + t22 * n4_c2_x - t23 * t47 + 2.0 * (zd5_y * t56 - t19 * t53 - t20 * t60)
-    t95 = t94 - c4 * t64
-    t96 = 2.0 * (t19 * t54 - zd5_y * t58 + t20 * t61) - t93 + c4 * t63 + s4 * t65
+    t95 = t94 - cos4 * t64
+    t96 = 2.0 * (t19 * t54 - zd5_y * t58 + t20 * t61) - t93 + cos4 * t63 + sin4 * t65
     t97 = t22 * n4_c2_z - t21 * t47 + t23 * n2_c2_z + 2.0 * (zd5_y * t59 - t19 * t55 - t20 * t62)
-    t98 = t97 - s4 * t64
+    t98 = t97 - sin4 * t64
 
     # outputs
     return (
@@ -539,8 +539,8 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
         -t90,  # c0(4, 5, 4)
         -t96,  # c0(4, 5, 5)
         0.0,  # c0(5, 5, 1)
-        c4 * t76 - s4 * t74,  # c0(5, 5, 2)
-        c4 * t83 - s4 * t81,  # c0(5, 5, 3)
-        c4 * t91 - s4 * t89,  # c0(5, 5, 4)
-        c4 * t98 - s4 * t95,  # c0(5, 5, 5)
+        cos4 * t76 - sin4 * t74,  # c0(5, 5, 2)
+        cos4 * t83 - sin4 * t81,  # c0(5, 5, 3)
+        cos4 * t91 - sin4 * t89,  # c0(5, 5, 4)
+        cos4 * t98 - sin4 * t95,  # c0(5, 5, 5)
     )

@@ -44,71 +44,71 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     qdd6 = qdd[..., 5]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    s5 = xp.sin(q5)
-    c5 = xp.cos(q5)
-    s6 = xp.sin(q6)
-    c6 = xp.cos(q6)
-    x3_x = c4 * c5
-    x3_z = c4 * s5
-    y1_x = s4 * c5
-    y1_z = s4 * s5
-    x2_x = c3 * x3_x - s3 * s5
-    t1 = c3 * s4
-    x2_z = c3 * x3_z + s3 * c5
-    y2_x = s3 * x3_x + c3 * s5
-    y2_z = s3 * x3_z - c3 * c5
-    t2 = s2 * x2_x + c2 * y2_x
-    z1_y = s2 * t1 + c2 * (s3 * s4)
-    t3 = s2 * x2_z + c2 * y2_z
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    sin5 = xp.sin(q5)
+    cos5 = xp.cos(q5)
+    sin6 = xp.sin(q6)
+    cos6 = xp.cos(q6)
+    x3_x = cos4 * cos5
+    x3_z = cos4 * sin5
+    y1_x = sin4 * cos5
+    y1_z = sin4 * sin5
+    x2_x = cos3 * x3_x - sin3 * sin5
+    t1 = cos3 * sin4
+    x2_z = cos3 * x3_z + sin3 * cos5
+    y2_x = sin3 * x3_x + cos3 * sin5
+    y2_z = sin3 * x3_z - cos3 * cos5
+    t2 = sin2 * x2_x + cos2 * y2_x
+    z1_y = sin2 * t1 + cos2 * (sin3 * sin4)
+    t3 = sin2 * x2_z + cos2 * y2_z
     t4 = qd1 * t2
     w1_y = qd1 * z1_y
     t5 = qd1 * t3
-    zd2_x = y1_z * w1_y + c4 * t5
+    zd2_x = y1_z * w1_y + cos4 * t5
     zd2_y = y1_z * t4 - y1_x * t5
     w2_x = qd2 * y1_x - t4
-    w2_y = w1_y + qd2 * c4
+    w2_y = w1_y + qd2 * cos4
     w2_z = qd2 * y1_z - t5
-    zd3_x = y1_z * w2_y - c4 * w2_z
+    zd3_x = y1_z * w2_y - cos4 * w2_z
     zd3_y = y1_x * w2_z - y1_z * w2_x
-    zd3_z = c4 * w2_x - y1_x * w2_y
+    zd3_z = cos4 * w2_x - y1_x * w2_y
     w3_x = w2_x + qd3 * y1_x
-    w3_y = w2_y + qd3 * c4
+    w3_y = w2_y + qd3 * cos4
     w3_z = w2_z + qd3 * y1_z
-    zd4_x = c5 * w3_y
-    t6 = s5 * w3_z + c5 * w3_x
-    zd4_z = s5 * w3_y
-    w4_x = w3_x - qd4 * s5
-    w4_z = w3_z + qd4 * c5
+    zd4_x = cos5 * w3_y
+    t6 = sin5 * w3_z + cos5 * w3_x
+    zd4_z = sin5 * w3_y
+    w4_x = w3_x - qd4 * sin5
+    w4_z = w3_z + qd4 * cos5
     w5_y = qd5 + w3_y
     w6_z = qd6 + w4_z
     t7 = 2.943 * t2
     t8 = 2.943 * z1_y
     t9 = 2.943 * t3
-    t10 = 0.00609 * x3_x + 0.12993 * s5
-    t11 = 0.00609 * s4
-    t12 = -0.0096 - (0.12993 * c5 - 0.00609 * x3_z)
+    t10 = 0.00609 * x3_x + 0.12993 * sin5
+    t11 = 0.00609 * sin4
+    t12 = -0.0096 - (0.12993 * cos5 - 0.00609 * x3_z)
     t13 = t10 - (0.12954 * x2_x - 0.02802 * y1_x)
-    t14 = 0.12954 * t1 + 0.02802 * c4 - t11
+    t14 = 0.12954 * t1 + 0.02802 * cos4 - t11
     t15 = t12 - (0.12954 * x2_z - 0.02802 * y1_z)
     t16 = t13 - 0.07305 * y1_x
-    t17 = t14 - 0.07305 * c4
+    t17 = t14 - 0.07305 * cos4
     t18 = t15 - 0.07305 * y1_z
     t19 = t3 * t17 + z1_y * t18
     s1_y = t3 * t16 - t2 * t18
     s1_z = z1_y * t16 + t2 * t17
-    s2_x = y1_z * t14 - c4 * t15
+    s2_x = y1_z * t14 - cos4 * t15
     s2_y = y1_x * t15 - y1_z * t13
-    s2_z = c4 * t13 - y1_x * t14
-    t20 = y1_z * t11 + c4 * t12
+    s2_z = cos4 * t13 - y1_x * t14
+    t20 = y1_z * t11 + cos4 * t12
     s3_y = y1_x * t12 - y1_z * t10
-    s3_z = c4 * t10 + y1_x * t11
-    s4_y = 0.0096 * s5
+    s3_z = cos4 * t10 + y1_x * t11
+    s4_y = 0.0096 * sin5
     t21 = 0.0096 * qd5
     t22 = qd4 * s4_y
     t23 = qd3 * s3_z
@@ -123,21 +123,21 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     sd1_x = t3 * t27 + z1_y * t28
     sd1_y = t2 * t28 + t3 * v0_x
     sd1_z = z1_y * v0_x - t2 * t27
-    sd2_x = w1_y * s2_z + t5 * s2_y + c4 * t26 - y1_z * t25
+    sd2_x = w1_y * s2_z + t5 * s2_y + cos4 * t26 - y1_z * t25
     sd2_y = t4 * s2_z - t5 * s2_x - (y1_x * t26 + y1_z * v1_x)
-    sd2_z = c4 * v1_x + y1_x * t25 - (t4 * s2_y + w1_y * s2_x)
-    sd3_x = w2_y * s3_z - w2_z * s3_y + c4 * t23 - y1_z * t24
+    sd2_z = cos4 * v1_x + y1_x * t25 - (t4 * s2_y + w1_y * s2_x)
+    sd3_x = w2_y * s3_z - w2_z * s3_y + cos4 * t23 - y1_z * t24
     t29 = w2_z * t20 + w2_x * s3_z + y1_x * t23 + y1_z * v2_x
-    sd3_z = w2_x * s3_y + w2_y * t20 + c4 * v2_x + y1_x * t24
-    sd4_y = c5 * t21
-    t30 = w3_z * s4_y + c5 * t22
-    sd4_z = w3_x * s4_y - s5 * t22
+    sd3_z = w2_x * s3_y + w2_y * t20 + cos4 * v2_x + y1_x * t24
+    sd4_y = cos5 * t21
+    t30 = w3_z * s4_y + cos5 * t22
+    sd4_z = w3_x * s4_y - sin5 * t22
     sd5_y = 0.0096 * w4_z
     t31 = t21 + 0.0096 * w3_y
-    t32 = 2e-05 * c6
-    t33 = 2e-05 * s6
-    t34 = c6 * t32 + s6 * t33
-    t35 = s6 * t32 - c6 * t33
+    t32 = 2e-05 * cos6
+    t33 = 2e-05 * sin6
+    t34 = cos6 * t32 + sin6 * t33
+    t35 = sin6 * t32 - cos6 * t33
     n5_c2_y = 0.00017 - t34
     t36 = w6_z * t35
     t37 = w6_z * t34
@@ -160,10 +160,10 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     t46 = t2 * (t2 * n5_c2_y + z1_y * t35) + z1_y * n1_c2_y + t3 * t45
     c2_1_1 = t46 + t19 * t19 + s1_y * s1_y + s1_z * s1_z
     c1_1_1 = z1_y * n1_c1_y - t2 * n1_c1_x - t3 * n1_c1_z + s1_y * sd1_y - t19 * sd1_x + s1_z * sd1_z
-    t47 = y1_x * n1_c1_x + c4 * n1_c1_y + y1_z * n1_c1_z
+    t47 = y1_x * n1_c1_x + cos4 * n1_c1_y + y1_z * n1_c1_z
     c1_2_1 = t47 + s2_x * sd1_x + s2_y * sd1_y + s2_z * sd1_z
     c1_3_1 = t47 + s3_y * sd1_y - t20 * sd1_x + s3_z * sd1_z
-    c1_4_1 = c5 * n1_c1_z - s5 * n1_c1_x + s4_y * sd1_y
+    c1_4_1 = cos5 * n1_c1_z - sin5 * n1_c1_x + s4_y * sd1_y
     c1_5_1 = n1_c1_y + 0.0096 * sd1_x
     tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1
     tau2_1 = g_2 + qd1 * c1_2_1
@@ -171,24 +171,24 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     tau4_1 = g_4 + qd1 * c1_4_1
     tau5_1 = qd1 * c1_5_1 - t44
     tau6_1 = qd1 * n1_c1_z
-    n2_c2_x = y1_x * n5_c2_y - c4 * t35
-    n2_c2_y = c4 * n5_c2_y - y1_x * t35
+    n2_c2_x = y1_x * n5_c2_y - cos4 * t35
+    n2_c2_y = cos4 * n5_c2_y - y1_x * t35
     n2_c2_z = 4e-05 * y1_z
-    t48 = y1_x * t36 + c4 * t37 - y1_z * t42
-    t49 = y1_z * t43 - (y1_x * t37 + c4 * t36)
-    t50 = y1_x * t39 + c4 * t41
+    t48 = y1_x * t36 + cos4 * t37 - y1_z * t42
+    t49 = y1_z * t43 - (y1_x * t37 + cos4 * t36)
+    t50 = y1_x * t39 + cos4 * t41
     n2_c1_x = t48 + zd2_x * n5_c2_y - zd2_y * t35
     n2_c1_y = t49 + zd2_y * n5_c2_y - zd2_x * t35
-    n2_c1_z = t50 - 4e-05 * (c4 * t4 + y1_x * w1_y)
+    n2_c1_z = t50 - 4e-05 * (cos4 * t4 + y1_x * w1_y)
     t51 = z1_y * n2_c2_y - t2 * n2_c2_x - t3 * n2_c2_z
     c2_1_2 = t51 + s1_y * s2_y - t19 * s2_x + s1_z * s2_z
     c1_1_2 = z1_y * n2_c1_y - t2 * n2_c1_x - t3 * n2_c1_z + s1_y * sd2_y - t19 * sd2_x + s1_z * sd2_z
-    t52 = y1_x * n2_c2_x + c4 * n2_c2_y + y1_z * n2_c2_z
+    t52 = y1_x * n2_c2_x + cos4 * n2_c2_y + y1_z * n2_c2_z
     c2_2_2 = t52 + s2_x * s2_x + s2_y * s2_y + s2_z * s2_z
-    t53 = y1_x * n2_c1_x + c4 * n2_c1_y + y1_z * n2_c1_z
+    t53 = y1_x * n2_c1_x + cos4 * n2_c1_y + y1_z * n2_c1_z
     c1_2_2 = t53 + s2_x * sd2_x + s2_y * sd2_y + s2_z * sd2_z
     c1_3_2 = t53 + s3_y * sd2_y - t20 * sd2_x + s3_z * sd2_z
-    c1_4_2 = c5 * n2_c1_z - s5 * n2_c1_x + s4_y * sd2_y
+    c1_4_2 = cos5 * n2_c1_z - sin5 * n2_c1_x + s4_y * sd2_y
     c1_5_2 = n2_c1_y + 0.0096 * sd2_x
     tau1_2 = tau1_1 + qdd2 * c2_1_2 + qd2 * c1_1_2
     tau2_2 = tau2_1 + qdd1 * c2_1_2 + qdd2 * c2_2_2 + qd2 * c1_2_2
@@ -202,11 +202,11 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     c2_1_3 = t51 + t19 * t20 + s1_y * s3_y + s1_z * s3_z
     c1_1_3 = z1_y * n3_c1_y - t2 * n3_c1_x - t3 * n3_c1_z + s1_z * sd3_z - (t19 * sd3_x + s1_y * t29)
     c2_2_3 = t52 + s2_y * s3_y - s2_x * t20 + s2_z * s3_z
-    t54 = y1_x * n3_c1_x + c4 * n3_c1_y + y1_z * n3_c1_z
+    t54 = y1_x * n3_c1_x + cos4 * n3_c1_y + y1_z * n3_c1_z
     c1_2_3 = t54 + s2_x * sd3_x - s2_y * t29 + s2_z * sd3_z
     c2_3_3 = t52 + t20 * t20 + s3_y * s3_y + s3_z * s3_z
     c1_3_3 = t54 + s3_z * sd3_z - (t20 * sd3_x + s3_y * t29)
-    c1_4_3 = c5 * n3_c1_z - s5 * n3_c1_x - s4_y * t29
+    c1_4_3 = cos5 * n3_c1_z - sin5 * n3_c1_x - s4_y * t29
     c1_5_3 = n3_c1_y + 0.0096 * sd3_x
     tau1_3 = tau1_2 + qdd3 * c2_1_3 + qd3 * c1_1_3
     tau2_3 = tau2_2 + qdd3 * c2_2_3 + qd3 * c1_2_3
@@ -214,22 +214,22 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     tau4_3 = tau4_2 + qd3 * c1_4_3
     tau5_3 = tau5_2 + qd3 * c1_5_3
     tau6_3 = tau6_2 + qd3 * n3_c1_z
-    t55 = s5 * n5_c2_y
-    n4_c2_y = s5 * t35
-    n4_c2_z = 4e-05 * c5
-    n4_c1_x = zd4_x * n5_c2_y + t6 * t35 - (s5 * t36 + c5 * t42)
-    n4_c1_y = s5 * t37 + c5 * t43 - (zd4_x * t35 + t6 * n5_c2_y)
-    n4_c1_z = 4e-05 * zd4_z - s5 * t39
+    t55 = sin5 * n5_c2_y
+    n4_c2_y = sin5 * t35
+    n4_c2_z = 4e-05 * cos5
+    n4_c1_x = zd4_x * n5_c2_y + t6 * t35 - (sin5 * t36 + cos5 * t42)
+    n4_c1_y = sin5 * t37 + cos5 * t43 - (zd4_x * t35 + t6 * n5_c2_y)
+    n4_c1_z = 4e-05 * zd4_z - sin5 * t39
     c2_1_4 = t2 * t55 + z1_y * n4_c2_y - t3 * n4_c2_z + s1_y * s4_y
     c1_1_4 = z1_y * n4_c1_y - t2 * n4_c1_x - t3 * n4_c1_z + t19 * t30 + s1_y * sd4_y + s1_z * sd4_z
-    t56 = c4 * n4_c2_y - y1_x * t55 + y1_z * n4_c2_z
+    t56 = cos4 * n4_c2_y - y1_x * t55 + y1_z * n4_c2_z
     c2_2_4 = t56 + s2_y * s4_y
-    t57 = y1_x * n4_c1_x + c4 * n4_c1_y + y1_z * n4_c1_z
+    t57 = y1_x * n4_c1_x + cos4 * n4_c1_y + y1_z * n4_c1_z
     c1_2_4 = t57 + s2_y * sd4_y - s2_x * t30 + s2_z * sd4_z
     c2_3_4 = t56 + s3_y * s4_y
     c1_3_4 = t57 + t20 * t30 + s3_y * sd4_y + s3_z * sd4_z
-    c2_4_4 = s5 * t55 + c5 * n4_c2_z + s4_y * s4_y
-    c1_4_4 = c5 * n4_c1_z - s5 * n4_c1_x + s4_y * sd4_y
+    c2_4_4 = sin5 * t55 + cos5 * n4_c2_z + s4_y * s4_y
+    c1_4_4 = cos5 * n4_c1_z - sin5 * n4_c1_x + s4_y * sd4_y
     c1_5_4 = n4_c1_y - 0.0096 * t30
     tau1_4 = tau1_3 + qdd4 * c2_1_4 + qd4 * c1_1_4
     tau2_4 = tau2_3 + qdd4 * c2_2_4 + qd4 * c1_2_4
@@ -243,11 +243,11 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     c2_1_5 = n1_c2_y - 0.0096 * t19
     c1_1_5 = z1_y * n5_c1_y - t2 * n5_c1_x - t3 * n5_c1_z + s1_y * sd5_y - s1_z * t31
     c2_2_5 = n2_c2_y + 0.0096 * s2_x
-    t58 = y1_x * n5_c1_x + c4 * n5_c1_y + y1_z * n5_c1_z
+    t58 = y1_x * n5_c1_x + cos4 * n5_c1_y + y1_z * n5_c1_z
     c1_2_5 = t58 + s2_y * sd5_y - s2_z * t31
     c2_3_5 = n2_c2_y - 0.0096 * t20
     c1_3_5 = t58 + s3_y * sd5_y - s3_z * t31
-    c1_4_5 = c5 * n5_c1_z - s5 * n5_c1_x + s4_y * sd5_y
+    c1_4_5 = cos5 * n5_c1_z - sin5 * n5_c1_x + s4_y * sd5_y
     c2_5_5 = n5_c2_y + 9.216e-05
     tau1_5 = tau1_4 + qdd5 * c2_1_5 + qd5 * c1_1_5
     tau2_5 = tau2_4 + qdd5 * c2_2_5 + qd5 * c1_2_5
@@ -259,8 +259,8 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     n6_c1_x = t38 + w5_y * n5_c2_y - t42
     n6_c1_y = t43 - (t40 + w4_x * n5_c2_y)
     c1_1_6 = z1_y * n6_c1_y - t2 * n6_c1_x
-    c1_2_6 = y1_x * n6_c1_x + c4 * n6_c1_y
-    t60 = s5 * n6_c1_x
+    c1_2_6 = y1_x * n6_c1_x + cos4 * n6_c1_y
+    t60 = sin5 * n6_c1_x
     t61 = qdd6 * n2_c2_z
     t62 = qd6 * c1_2_6
 
@@ -371,56 +371,56 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     qdd6 = qdd[..., 5]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    s5 = xp.sin(q5)
-    c5 = xp.cos(q5)
-    s6 = xp.sin(q6)
-    c6 = xp.cos(q6)
-    x3_x = c4 * c5
-    x3_z = c4 * s5
-    y1_x = s4 * c5
-    y1_z = s4 * s5
-    x2_x = c3 * x3_x - s3 * s5
-    t1 = c3 * s4
-    x2_z = c3 * x3_z + s3 * c5
-    y2_x = s3 * x3_x + c3 * s5
-    y2_z = s3 * x3_z - c3 * c5
-    t2 = s2 * x2_x + c2 * y2_x
-    z1_y = s2 * t1 + c2 * (s3 * s4)
-    t3 = s2 * x2_z + c2 * y2_z
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    sin5 = xp.sin(q5)
+    cos5 = xp.cos(q5)
+    sin6 = xp.sin(q6)
+    cos6 = xp.cos(q6)
+    x3_x = cos4 * cos5
+    x3_z = cos4 * sin5
+    y1_x = sin4 * cos5
+    y1_z = sin4 * sin5
+    x2_x = cos3 * x3_x - sin3 * sin5
+    t1 = cos3 * sin4
+    x2_z = cos3 * x3_z + sin3 * cos5
+    y2_x = sin3 * x3_x + cos3 * sin5
+    y2_z = sin3 * x3_z - cos3 * cos5
+    t2 = sin2 * x2_x + cos2 * y2_x
+    z1_y = sin2 * t1 + cos2 * (sin3 * sin4)
+    t3 = sin2 * x2_z + cos2 * y2_z
     t4 = qd1 * t2
     w1_y = qd1 * z1_y
     t5 = qd1 * t3
     wd1_y = qdd1 * z1_y
-    zd2_x = y1_z * w1_y + c4 * t5
+    zd2_x = y1_z * w1_y + cos4 * t5
     zd2_y = y1_z * t4 - y1_x * t5
     w2_x = qd2 * y1_x - t4
-    w2_y = w1_y + qd2 * c4
+    w2_y = w1_y + qd2 * cos4
     w2_z = qd2 * y1_z - t5
     wd2_x = qd2 * zd2_x + qdd2 * y1_x - qdd1 * t2
-    wd2_y = qd2 * zd2_y + wd1_y + qdd2 * c4
-    wd2_z = qdd2 * y1_z - qdd1 * t3 - qd2 * (c4 * t4 + y1_x * w1_y)
-    zd3_x = y1_z * w2_y - c4 * w2_z
+    wd2_y = qd2 * zd2_y + wd1_y + qdd2 * cos4
+    wd2_z = qdd2 * y1_z - qdd1 * t3 - qd2 * (cos4 * t4 + y1_x * w1_y)
+    zd3_x = y1_z * w2_y - cos4 * w2_z
     zd3_y = y1_x * w2_z - y1_z * w2_x
-    zd3_z = c4 * w2_x - y1_x * w2_y
+    zd3_z = cos4 * w2_x - y1_x * w2_y
     w3_x = w2_x + qd3 * y1_x
-    w3_y = w2_y + qd3 * c4
+    w3_y = w2_y + qd3 * cos4
     w3_z = w2_z + qd3 * y1_z
     wd3_x = qd3 * zd3_x + wd2_x + qdd3 * y1_x
-    wd3_y = qd3 * zd3_y + wd2_y + qdd3 * c4
+    wd3_y = qd3 * zd3_y + wd2_y + qdd3 * cos4
     wd3_z = qd3 * zd3_z + wd2_z + qdd3 * y1_z
-    zd4_x = c5 * w3_y
-    zd4_z = s5 * w3_y
-    w4_x = w3_x - qd4 * s5
-    w4_z = w3_z + qd4 * c5
-    wd4_x = qd4 * zd4_x + wd3_x - qdd4 * s5
-    wd4_y = wd3_y - qd4 * (s5 * w3_z + c5 * w3_x)
-    wd4_z = qd4 * zd4_z + wd3_z + qdd4 * c5
+    zd4_x = cos5 * w3_y
+    zd4_z = sin5 * w3_y
+    w4_x = w3_x - qd4 * sin5
+    w4_z = w3_z + qd4 * cos5
+    wd4_x = qd4 * zd4_x + wd3_x - qdd4 * sin5
+    wd4_y = wd3_y - qd4 * (sin5 * w3_z + cos5 * w3_x)
+    wd4_z = qd4 * zd4_z + wd3_z + qdd4 * cos5
     w5_y = qd5 + w3_y
     wd5_x = wd4_x - qd5 * w4_z
     wd5_y = qdd5 + wd4_y
@@ -429,25 +429,25 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     wd6_x = wd5_x + qd6 * w5_y
     wd6_y = wd5_y - qd6 * w4_x
     wd6_z = qdd6 + wd5_z
-    t6 = 0.00609 * x3_x + 0.12993 * s5
-    t7 = 0.00609 * s4
-    t8 = -0.0096 - (0.12993 * c5 - 0.00609 * x3_z)
+    t6 = 0.00609 * x3_x + 0.12993 * sin5
+    t7 = 0.00609 * sin4
+    t8 = -0.0096 - (0.12993 * cos5 - 0.00609 * x3_z)
     t9 = t6 - (0.12954 * x2_x - 0.02802 * y1_x)
-    t10 = 0.12954 * t1 + 0.02802 * c4 - t7
+    t10 = 0.12954 * t1 + 0.02802 * cos4 - t7
     t11 = t8 - (0.12954 * x2_z - 0.02802 * y1_z)
     t12 = t9 - 0.07305 * y1_x
-    t13 = t10 - 0.07305 * c4
+    t13 = t10 - 0.07305 * cos4
     t14 = t11 - 0.07305 * y1_z
     t15 = t3 * t13 + z1_y * t14
     s1_y = t3 * t12 - t2 * t14
     s1_z = z1_y * t12 + t2 * t13
-    s2_x = y1_z * t10 - c4 * t11
+    s2_x = y1_z * t10 - cos4 * t11
     s2_y = y1_x * t11 - y1_z * t9
-    s2_z = c4 * t9 - y1_x * t10
-    t16 = y1_z * t7 + c4 * t8
+    s2_z = cos4 * t9 - y1_x * t10
+    t16 = y1_z * t7 + cos4 * t8
     s3_y = y1_x * t8 - y1_z * t6
-    s3_z = c4 * t6 + y1_x * t7
-    s4_y = 0.0096 * s5
+    s3_z = cos4 * t6 + y1_x * t7
+    s4_y = 0.0096 * sin5
     t17 = 0.0096 * qd5
     t18 = qd4 * s4_y
     t19 = qd3 * s3_z
@@ -462,39 +462,39 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     sd1_x = t3 * t23 + z1_y * t24
     sd1_y = t2 * t24 + t3 * v0_x
     sd1_z = z1_y * v0_x - t2 * t23
-    sd2_x = w1_y * s2_z + t5 * s2_y + c4 * t22 - y1_z * t21
+    sd2_x = w1_y * s2_z + t5 * s2_y + cos4 * t22 - y1_z * t21
     sd2_y = t4 * s2_z - t5 * s2_x - (y1_x * t22 + y1_z * v1_x)
-    sd2_z = c4 * v1_x + y1_x * t21 - (t4 * s2_y + w1_y * s2_x)
-    sd3_x = w2_y * s3_z - w2_z * s3_y + c4 * t19 - y1_z * t20
-    sd3_z = w2_x * s3_y + w2_y * t16 + c4 * v2_x + y1_x * t20
-    sd4_y = c5 * t17
-    sd4_z = w3_x * s4_y - s5 * t18
+    sd2_z = cos4 * v1_x + y1_x * t21 - (t4 * s2_y + w1_y * s2_x)
+    sd3_x = w2_y * s3_z - w2_z * s3_y + cos4 * t19 - y1_z * t20
+    sd3_z = w2_x * s3_y + w2_y * t16 + cos4 * v2_x + y1_x * t20
+    sd4_y = cos5 * t17
+    sd4_z = w3_x * s4_y - sin5 * t18
     sd5_y = 0.0096 * w4_z
     t25 = qdd2 * s2_x + qd1 * sd1_x - 2.943 * t2 - qdd1 * t15 + qd2 * sd2_x + qd3 * sd3_x
     t26 = qdd2 * s2_y + qdd1 * s1_y + 2.943 * z1_y + qd1 * sd1_y + qd2 * sd2_y
     t27 = qdd2 * s2_z + qdd1 * s1_z + qd1 * sd1_z - 2.943 * t3 + qd2 * sd2_z + qd3 * sd3_z
     t28 = qdd3 * s3_y + t26 - qd3 * (w2_z * t16 + w2_x * s3_z + y1_x * t19 + y1_z * v2_x)
-    t29 = t25 - qdd3 * t16 - qd4 * (w3_z * s4_y + c5 * t18) + 0.0096 * qdd5
+    t29 = t25 - qdd3 * t16 - qd4 * (w3_z * s4_y + cos5 * t18) + 0.0096 * qdd5
     t30 = qdd4 * s4_y + t28 + qd4 * sd4_y + qd5 * sd5_y
     t31 = qdd3 * s3_z + t27 + qd4 * sd4_z - qd5 * (t17 + 0.0096 * w3_y)
-    t32 = 2e-05 * c6
-    t33 = 2e-05 * s6
-    t34 = c6 * t32 + s6 * t33
-    t35 = s6 * t32 - c6 * t33
+    t32 = 2e-05 * cos6
+    t33 = 2e-05 * sin6
+    t34 = cos6 * t32 + sin6 * t33
+    t35 = sin6 * t32 - cos6 * t33
     n5_c2_y = 0.00017 - t34
     t36 = w6_z * t35
     t37 = w6_z * t34
     t38 = wd6_x * n5_c2_y - wd6_y * t35 + w4_x * t36 + w5_y * t37 - w6_z * (0.00013 * w5_y)
     t39 = wd6_y * n5_c2_y - wd6_x * t35 + w6_z * (0.00013 * w4_x) - (w4_x * t37 + w5_y * t36)
     t40 = 4e-05 * wd6_z + w4_x * (w5_y * t34 - w4_x * t35) + w5_y * (w5_y * t35 - w4_x * t34)
-    t41 = y1_x * t38 + c4 * t39 + y1_z * t40
+    t41 = y1_x * t38 + cos4 * t39 + y1_z * t40
 
     # outputs
     return (
         z1_y * t39 - t2 * t38 - t3 * t40 + s1_y * t30 - t15 * t29 + s1_z * t31,  # tau(1, 6)
         t41 + s2_x * t29 + s2_y * t30 + s2_z * t31,  # tau(2, 6)
         t41 + s3_y * t30 - t16 * t29 + s3_z * t31,  # tau(3, 6)
-        c5 * t40 - s5 * t38 + s4_y * t30,  # tau(4, 6)
+        cos5 * t40 - sin5 * t38 + s4_y * t30,  # tau(4, 6)
         t39 + 0.0096 * t29,  # tau(5, 6)
         t40,  # tau(6, 6)
     )
@@ -525,66 +525,66 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     qdd6 = qdd[..., 5]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    s5 = xp.sin(q5)
-    c5 = xp.cos(q5)
-    s6 = xp.sin(q6)
-    c6 = xp.cos(q6)
-    x3_x = c4 * c5
-    x3_z = c4 * s5
-    y1_x = s4 * c5
-    y1_z = s4 * s5
-    x2_x = c3 * x3_x - s3 * s5
-    t1 = c3 * s4
-    x2_z = c3 * x3_z + s3 * c5
-    y2_x = s3 * x3_x + c3 * s5
-    y2_z = s3 * x3_z - c3 * c5
-    t2 = s2 * x2_x + c2 * y2_x
-    z1_y = s2 * t1 + c2 * (s3 * s4)
-    t3 = s2 * x2_z + c2 * y2_z
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    sin5 = xp.sin(q5)
+    cos5 = xp.cos(q5)
+    sin6 = xp.sin(q6)
+    cos6 = xp.cos(q6)
+    x3_x = cos4 * cos5
+    x3_z = cos4 * sin5
+    y1_x = sin4 * cos5
+    y1_z = sin4 * sin5
+    x2_x = cos3 * x3_x - sin3 * sin5
+    t1 = cos3 * sin4
+    x2_z = cos3 * x3_z + sin3 * cos5
+    y2_x = sin3 * x3_x + cos3 * sin5
+    y2_z = sin3 * x3_z - cos3 * cos5
+    t2 = sin2 * x2_x + cos2 * y2_x
+    z1_y = sin2 * t1 + cos2 * (sin3 * sin4)
+    t3 = sin2 * x2_z + cos2 * y2_z
     t4 = qd1 * t2
     w1_y = qd1 * z1_y
     t5 = qd1 * t3
     t6 = qdd1 * t2
     wd1_y = qdd1 * z1_y
     t7 = qdd1 * t3
-    zd2_x = y1_z * w1_y + c4 * t5
+    zd2_x = y1_z * w1_y + cos4 * t5
     zd2_y = y1_z * t4 - y1_x * t5
-    t8 = c4 * t4 + y1_x * w1_y
-    t9 = y1_z * wd1_y + c4 * t7 + t5 * zd2_y - w1_y * t8
+    t8 = cos4 * t4 + y1_x * w1_y
+    t9 = y1_z * wd1_y + cos4 * t7 + t5 * zd2_y - w1_y * t8
     t10 = y1_z * t6 - y1_x * t7 - (t5 * zd2_x + t4 * t8)
     w2_x = qd2 * y1_x - t4
-    w2_y = w1_y + qd2 * c4
+    w2_y = w1_y + qd2 * cos4
     w2_z = qd2 * y1_z - t5
     wd2_x = qd2 * zd2_x + qdd2 * y1_x - t6
-    wd2_y = qd2 * zd2_y + wd1_y + qdd2 * c4
+    wd2_y = qd2 * zd2_y + wd1_y + qdd2 * cos4
     wd2_z = qdd2 * y1_z - t7 - qd2 * t8
-    zd3_x = y1_z * w2_y - c4 * w2_z
+    zd3_x = y1_z * w2_y - cos4 * w2_z
     zd3_y = y1_x * w2_z - y1_z * w2_x
-    zd3_z = c4 * w2_x - y1_x * w2_y
-    t11 = y1_z * wd2_y - c4 * wd2_z + w2_y * zd3_z - w2_z * zd3_y
+    zd3_z = cos4 * w2_x - y1_x * w2_y
+    t11 = y1_z * wd2_y - cos4 * wd2_z + w2_y * zd3_z - w2_z * zd3_y
     t12 = y1_x * wd2_z - y1_z * wd2_x + w2_z * zd3_x - w2_x * zd3_z
     w3_x = w2_x + qd3 * y1_x
-    w3_y = w2_y + qd3 * c4
+    w3_y = w2_y + qd3 * cos4
     w3_z = w2_z + qd3 * y1_z
     wd3_x = qd3 * zd3_x + wd2_x + qdd3 * y1_x
-    wd3_y = qd3 * zd3_y + wd2_y + qdd3 * c4
+    wd3_y = qd3 * zd3_y + wd2_y + qdd3 * cos4
     wd3_z = qd3 * zd3_z + wd2_z + qdd3 * y1_z
-    zd4_x = c5 * w3_y
-    t13 = s5 * w3_z + c5 * w3_x
-    zd4_z = s5 * w3_y
-    t14 = c5 * wd3_y + w3_y * zd4_z + w3_z * t13
-    t15 = w3_z * zd4_x - w3_x * zd4_z - (s5 * wd3_z + c5 * wd3_x)
-    w4_x = w3_x - qd4 * s5
-    w4_z = w3_z + qd4 * c5
-    wd4_x = qd4 * zd4_x + wd3_x - qdd4 * s5
+    zd4_x = cos5 * w3_y
+    t13 = sin5 * w3_z + cos5 * w3_x
+    zd4_z = sin5 * w3_y
+    t14 = cos5 * wd3_y + w3_y * zd4_z + w3_z * t13
+    t15 = w3_z * zd4_x - w3_x * zd4_z - (sin5 * wd3_z + cos5 * wd3_x)
+    w4_x = w3_x - qd4 * sin5
+    w4_z = w3_z + qd4 * cos5
+    wd4_x = qd4 * zd4_x + wd3_x - qdd4 * sin5
     wd4_y = wd3_y - qd4 * t13
-    wd4_z = qd4 * zd4_z + wd3_z + qdd4 * c5
+    wd4_z = qd4 * zd4_z + wd3_z + qdd4 * cos5
     t16 = w4_x * w4_x
     t17 = w4_z * w4_z + t16
     t18 = w3_y * w4_x - wd4_z
@@ -601,25 +601,25 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t21 = 2.943 * t2
     t22 = 2.943 * z1_y
     t23 = 2.943 * t3
-    t24 = 0.00609 * x3_x + 0.12993 * s5
-    t25 = 0.00609 * s4
-    t26 = -0.0096 - (0.12993 * c5 - 0.00609 * x3_z)
+    t24 = 0.00609 * x3_x + 0.12993 * sin5
+    t25 = 0.00609 * sin4
+    t26 = -0.0096 - (0.12993 * cos5 - 0.00609 * x3_z)
     t27 = t24 - (0.12954 * x2_x - 0.02802 * y1_x)
-    t28 = 0.12954 * t1 + 0.02802 * c4 - t25
+    t28 = 0.12954 * t1 + 0.02802 * cos4 - t25
     t29 = t26 - (0.12954 * x2_z - 0.02802 * y1_z)
     t30 = t27 - 0.07305 * y1_x
-    t31 = t28 - 0.07305 * c4
+    t31 = t28 - 0.07305 * cos4
     t32 = t29 - 0.07305 * y1_z
     t33 = t3 * t31 + z1_y * t32
     s1_y = t3 * t30 - t2 * t32
     s1_z = z1_y * t30 + t2 * t31
-    s2_x = y1_z * t28 - c4 * t29
+    s2_x = y1_z * t28 - cos4 * t29
     s2_y = y1_x * t29 - y1_z * t27
-    s2_z = c4 * t27 - y1_x * t28
-    t34 = y1_z * t25 + c4 * t26
+    s2_z = cos4 * t27 - y1_x * t28
+    t34 = y1_z * t25 + cos4 * t26
     s3_y = y1_x * t26 - y1_z * t24
-    s3_z = c4 * t24 + y1_x * t25
-    s4_y = 0.0096 * s5
+    s3_z = cos4 * t24 + y1_x * t25
+    s4_y = 0.0096 * sin5
     t35 = 0.0096 * qd5
     t36 = qd4 * s4_y
     t37 = qd3 * s3_z
@@ -634,15 +634,15 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     sd1_x = t3 * t41 + z1_y * t42
     sd1_y = t2 * t42 + t3 * v0_x
     sd1_z = z1_y * v0_x - t2 * t41
-    sd2_x = w1_y * s2_z + t5 * s2_y + c4 * t40 - y1_z * t39
+    sd2_x = w1_y * s2_z + t5 * s2_y + cos4 * t40 - y1_z * t39
     sd2_y = t4 * s2_z - t5 * s2_x - (y1_x * t40 + y1_z * v1_x)
-    sd2_z = c4 * v1_x + y1_x * t39 - (t4 * s2_y + w1_y * s2_x)
-    sd3_x = w2_y * s3_z - w2_z * s3_y + c4 * t37 - y1_z * t38
+    sd2_z = cos4 * v1_x + y1_x * t39 - (t4 * s2_y + w1_y * s2_x)
+    sd3_x = w2_y * s3_z - w2_z * s3_y + cos4 * t37 - y1_z * t38
     t43 = w2_z * t34 + w2_x * s3_z + y1_x * t37 + y1_z * v2_x
-    sd3_z = w2_x * s3_y + w2_y * t34 + c4 * v2_x + y1_x * t38
-    sd4_y = c5 * t35
-    t44 = w3_z * s4_y + c5 * t36
-    sd4_z = w3_x * s4_y - s5 * t36
+    sd3_z = w2_x * s3_y + w2_y * t34 + cos4 * v2_x + y1_x * t38
+    sd4_y = cos5 * t35
+    t44 = w3_z * s4_y + cos5 * t36
+    sd4_z = w3_x * s4_y - sin5 * t36
     sd5_y = 0.0096 * w4_z
     t45 = t35 + 0.0096 * w3_y
     t46 = z1_y * t23 - t3 * t22
@@ -651,34 +651,34 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t49 = qd1 * sd1_x - t21 - qdd1 * t33
     t50 = qdd1 * s1_y + t22 + qd1 * sd1_y
     t51 = qdd1 * s1_z + qd1 * sd1_z - t23
-    t52 = w1_y * sd2_z + t5 * sd2_y + t8 * t39 + zd2_y * t40
-    t53 = wd1_y * s2_z + t7 * s2_y + y1_z * t50 - c4 * t51 + t52
+    t52 = wd1_y * s2_z + t7 * s2_y + y1_z * t50 - cos4 * t51
+    t53 = t52 + w1_y * sd2_z + t5 * sd2_y + t8 * t39 + zd2_y * t40
     t54 = t4 * sd2_z - t5 * sd2_x + t8 * v1_x - zd2_x * t40
     t55 = t6 * s2_z - t7 * s2_x + y1_x * t51 - y1_z * t49 + t54
     t56 = zd2_y * v1_x + zd2_x * t39 - (t4 * sd2_y + w1_y * sd2_x)
-    t57 = c4 * t49 - y1_x * t50 - (t6 * s2_y + wd1_y * s2_x) + t56
+    t57 = cos4 * t49 - y1_x * t50 - (t6 * s2_y + wd1_y * s2_x) + t56
     t58 = qdd2 * s2_x + t49 + qd2 * sd2_x
     t59 = qdd2 * s2_y + t50 + qd2 * sd2_y
     t60 = qdd2 * s2_z + t51 + qd2 * sd2_z
-    t61 = w2_y * sd3_z + w2_z * t43 + zd3_y * t37 - zd3_z * t38
-    t62 = wd2_y * s3_z - wd2_z * s3_y + y1_z * t59 - c4 * t60 + t61
+    t61 = wd2_y * s3_z - wd2_z * s3_y + y1_z * t59 - cos4 * t60
+    t62 = t61 + w2_y * sd3_z + w2_z * t43 + zd3_y * t37 - zd3_z * t38
     t63 = w2_z * sd3_x - w2_x * sd3_z - (zd3_x * t37 + zd3_z * v2_x)
     t64 = y1_x * t60 - y1_z * t58 - (wd2_z * t34 + wd2_x * s3_z) + t63
     t65 = zd3_y * v2_x + zd3_x * t38 - (w2_x * t43 + w2_y * sd3_x)
     t66 = t58 + qd3 * sd3_x - qdd3 * t34
     t67 = qdd3 * s3_y + t59 - qd3 * t43
     t68 = qdd3 * s3_z + t60 + qd3 * sd3_z
-    t69 = c5 * t67 - wd3_z * s4_y + w3_y * sd4_z - w3_z * sd4_y - zd4_z * t36
+    t69 = cos5 * t67 - wd3_z * s4_y + w3_y * sd4_z - w3_z * sd4_y - zd4_z * t36
     t70 = t66 - qd4 * t44
     t71 = t68 + qd4 * sd4_z
     t72 = 0.0096 * wd4_z + w4_x * t45 + w4_x * t35
     t73 = t70 + 0.0096 * qdd5
     t74 = qdd4 * s4_y + t67 + qd4 * sd4_y + qd5 * sd5_y
     t75 = t71 - qd5 * t45
-    t76 = 2e-05 * c6
-    t77 = 2e-05 * s6
-    t78 = c6 * t76 + s6 * t77
-    t79 = s6 * t76 - c6 * t77
+    t76 = 2e-05 * cos6
+    t77 = 2e-05 * sin6
+    t78 = cos6 * t76 + sin6 * t77
+    t79 = sin6 * t76 - cos6 * t77
     n5_c2_y = 0.00017 - t78
     t80 = w6_z * t79
     t81 = w6_z * t78
@@ -699,14 +699,14 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t96 = t94 + t3 * (t2 * t91 + z1_y * t90 + t33 * t74 + s1_y * t73)
     t97 = t9 * n5_c2_y - t10 * t79 + 2.0 * (zd2_x * t80 + zd2_y * t81 + t8 * t84)
     t98 = t10 * n5_c2_y - t9 * t79 - 2.0 * (zd2_x * t81 + zd2_y * t80 + t8 * t85)
-    t99 = 4e-05 * (c4 * t6 + y1_x * wd1_y + t4 * zd2_y + w1_y * zd2_x)
+    t99 = 4e-05 * (cos4 * t6 + y1_x * wd1_y + t4 * zd2_y + w1_y * zd2_x)
     t100 = 2.0 * (zd2_x * t82 + zd2_y * t83) - t99
-    t101 = c4 * t92 - y1_z * t91
+    t101 = cos4 * t92 - y1_z * t91
     t102 = y1_z * t90 - y1_x * t92
-    t103 = y1_x * t91 - c4 * t90
-    t104 = c4 * t75 - y1_z * t74
+    t103 = y1_x * t91 - cos4 * t90
+    t104 = cos4 * t75 - y1_z * t74
     t105 = y1_z * t73 - y1_x * t75
-    t106 = y1_x * t74 - c4 * t73
+    t106 = y1_x * t74 - cos4 * t73
     t107 = t97 + t101 + s2_y * t75 - s2_z * t74
     t108 = t98 + t102 + s2_z * t73 - s2_x * t75
     t109 = t100 + t103 + s2_x * t74 - s2_y * t73
@@ -715,73 +715,75 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t112 = t57 + t106
     t113 = t11 * n5_c2_y - t12 * t79 + 2.0 * (zd3_x * t80 + zd3_y * t81 - zd3_z * t84)
     t114 = t12 * n5_c2_y - t11 * t79 + 2.0 * (zd3_z * t85 - (zd3_x * t81 + zd3_y * t80))
-    t115 = 4e-05 * (c4 * wd2_x - y1_x * wd2_y + w2_x * zd3_y - w2_y * zd3_x)
+    t115 = 4e-05 * (cos4 * wd2_x - y1_x * wd2_y + w2_x * zd3_y - w2_y * zd3_x)
     t116 = t115 + 2.0 * (zd3_x * t82 + zd3_y * t83)
     t117 = t113 + t101 + s3_y * t75 - s3_z * t74
     t118 = t114 + t102 + s3_z * t73 + t34 * t75
     t119 = t116 + t103 - (t34 * t74 + s3_y * t73)
     t120 = t62 + t104
     t121 = t64 + t105
-    t122 = wd2_x * s3_y + wd2_y * t34 + c4 * t58 - y1_x * t59 + t65 + t106
-    t123 = y1_x * t117 + c4 * t118 + y1_z * t119
+    t122 = wd2_x * s3_y + wd2_y * t34 + cos4 * t58 - y1_x * t59 + t65 + t106
+    t123 = y1_x * t117 + cos4 * t118 + y1_z * t119
     t124 = t15 * n5_c2_y - t14 * t79 + 2.0 * (t13 * t80 - zd4_x * t81 + zd4_z * t85)
-    t125 = 4e-05 * (s5 * wd3_y - (w3_x * t13 + w3_y * zd4_x)) + 2.0 * (zd4_x * t82 - t13 * t83)
+    t125 = 4e-05 * (sin5 * wd3_y - (w3_x * t13 + w3_y * zd4_x)) + 2.0 * (zd4_x * t82 - t13 * t83)
     t126 = t14 * n5_c2_y - t15 * t79 + 2.0 * (zd4_x * t80 - t13 * t81 - zd4_z * t84)
-    t127 = t126 + s4_y * t75 - c5 * t91
-    t128 = t124 + c5 * t90 + s5 * t92
-    t129 = t125 - (s5 * t91 + s4_y * t73)
-    t130 = t69 - c5 * t74
-    t131 = zd4_z * t35 - (w3_z * t44 + w3_x * sd4_z) - (s5 * t68 + c5 * t66) + c5 * t73 + s5 * t75
-    t132 = wd3_x * s4_y + s5 * t67 + w3_x * sd4_y + w3_y * t44 + t13 * t35 + zd4_x * t36 - s5 * t74
-    t133 = y1_x * t127 + c4 * t128 + y1_z * t129
-    t134 = 4e-05 * (wd4_x + w3_y * w4_z) - 2.0 * (w4_z * t82)
-    t135 = t92 + t18 * n5_c2_y + t17 * t79 - 2.0 * (w4_z * t80 + w4_x * t84)
-    t136 = 2.0 * (w4_z * t81 + w4_x * t85) - (t18 * t79 + t17 * n5_c2_y) - 0.0096 * t75
-    t137 = t134 + 0.0096 * t74 - t90
-    t138 = t75 - (t71 + w3_y * t45 + w4_z * sd5_y)
-    t139 = t70 - 0.0096 * wd4_y + w4_x * sd5_y - t73
-    t140 = y1_x * t135 + c4 * t136 + y1_z * t137
-    t141 = 2.0 * (w5_y * t82 - w4_x * t83) - 4e-05 * (t16 + w5_y * w5_y)
-    t142 = t19 * n5_c2_y - t20 * t79 + 2.0 * (t89 - t88) - t91
-    t143 = t90 + t20 * n5_c2_y - t19 * t79 + 2.0 * (t86 - t87)
-    t144 = y1_x * t142 + c4 * t143 + y1_z * t141
+    t127 = t126 + s4_y * t75 - cos5 * t91
+    t128 = t124 + cos5 * t90 + sin5 * t92
+    t129 = t125 - (sin5 * t91 + s4_y * t73)
+    t130 = t69 - cos5 * t74
+    t131 = zd4_z * t35 - (w3_z * t44 + w3_x * sd4_z) - (sin5 * t68 + cos5 * t66)
+    t132 = t131 + cos5 * t73 + sin5 * t75
+    t133 = wd3_x * s4_y + sin5 * t67 + w3_x * sd4_y + w3_y * t44 + t13 * t35 + zd4_x * t36
+    t134 = t133 - sin5 * t74
+    t135 = y1_x * t127 + cos4 * t128 + y1_z * t129
+    t136 = 4e-05 * (wd4_x + w3_y * w4_z) - 2.0 * (w4_z * t82)
+    t137 = t92 + t18 * n5_c2_y + t17 * t79 - 2.0 * (w4_z * t80 + w4_x * t84)
+    t138 = 2.0 * (w4_z * t81 + w4_x * t85) - (t18 * t79 + t17 * n5_c2_y) - 0.0096 * t75
+    t139 = t136 + 0.0096 * t74 - t90
+    t140 = t75 - (t71 + w3_y * t45 + w4_z * sd5_y)
+    t141 = t70 - 0.0096 * wd4_y + w4_x * sd5_y - t73
+    t142 = y1_x * t137 + cos4 * t138 + y1_z * t139
+    t143 = 2.0 * (w5_y * t82 - w4_x * t83) - 4e-05 * (t16 + w5_y * w5_y)
+    t144 = t19 * n5_c2_y - t20 * t79 + 2.0 * (t89 - t88) - t91
+    t145 = t90 + t20 * n5_c2_y - t19 * t79 + 2.0 * (t86 - t87)
+    t146 = y1_x * t144 + cos4 * t145 + y1_z * t143
 
     # outputs
     return (
         t96 + t95 + s1_z * (t48 - (t2 * t74 + z1_y * t73)),  # c0(1, 6, 1)
         z1_y * t108 - t2 * t107 - t3 * t109 + s1_y * t111 - t33 * t110 + s1_z * t112,  # c0(1, 6, 2)
         z1_y * t118 - t2 * t117 - t3 * t119 + s1_y * t121 - t33 * t120 + s1_z * t122,  # c0(1, 6, 3)
-        z1_y * t128 - t2 * t127 - t3 * t129 + s1_y * t131 - t33 * t130 + s1_z * t132,  # c0(1, 6, 4)
-        z1_y * t136 - t2 * t135 - t3 * t137 + s1_y * t72 - t33 * t138 + s1_z * t139,  # c0(1, 6, 5)
-        z1_y * t143 - t2 * t142 - t3 * t141,  # c0(1, 6, 6)
+        z1_y * t128 - t2 * t127 - t3 * t129 + s1_y * t132 - t33 * t130 + s1_z * t134,  # c0(1, 6, 4)
+        z1_y * t138 - t2 * t137 - t3 * t139 + s1_y * t72 - t33 * t140 + s1_z * t141,  # c0(1, 6, 5)
+        z1_y * t145 - t2 * t144 - t3 * t143,  # c0(1, 6, 6)
         s2_x * t46 + s2_y * t47 + s2_z * t48,  # c0(2, 6, 1)
-        y1_x * t107 + c4 * t108 + y1_z * t109 + s2_x * t110 + s2_y * t111 + s2_z * t112,  # c0(2, 6, 2)
+        y1_x * t107 + cos4 * t108 + y1_z * t109 + s2_x * t110 + s2_y * t111 + s2_z * t112,  # c0(2, 6, 2)
         t123 + s2_x * t120 + s2_y * t121 + s2_z * t122,  # c0(2, 6, 3)
-        t133 + s2_x * t130 + s2_y * t131 + s2_z * t132,  # c0(2, 6, 4)
-        t140 + s2_x * t138 + s2_y * t72 + s2_z * t139,  # c0(2, 6, 5)
-        t144,  # c0(2, 6, 6)
+        t135 + s2_x * t130 + s2_y * t132 + s2_z * t134,  # c0(2, 6, 4)
+        t142 + s2_x * t140 + s2_y * t72 + s2_z * t141,  # c0(2, 6, 5)
+        t146,  # c0(2, 6, 6)
         s3_y * t47 - t34 * t46 + s3_z * t48,  # c0(3, 6, 1)
-        y1_x * t97 + c4 * t98 + y1_z * t100 + s3_y * t55 - t34 * t53 + s3_z * t57,  # c0(3, 6, 2)
+        y1_x * t97 + cos4 * t98 + y1_z * t100 + s3_y * t55 - t34 * t53 + s3_z * t57,  # c0(3, 6, 2)
         t123 + s3_y * t121 - t34 * t120 + s3_z * t122,  # c0(3, 6, 3)
-        t133 + s3_y * t131 - t34 * t130 + s3_z * t132,  # c0(3, 6, 4)
-        t140 + s3_y * t72 - t34 * t138 + s3_z * t139,  # c0(3, 6, 5)
-        t144,  # c0(3, 6, 6)
+        t135 + s3_y * t132 - t34 * t130 + s3_z * t134,  # c0(3, 6, 4)
+        t142 + s3_y * t72 - t34 * t140 + s3_z * t141,  # c0(3, 6, 5)
+        t146,  # c0(3, 6, 6)
         s4_y * t47,  # c0(4, 6, 1)
-        c5 * t100 - s5 * t97 + s4_y * t55,  # c0(4, 6, 2)
-        c5 * t116 - s5 * t113 + s4_y * t64,  # c0(4, 6, 3)
-        c5 * t129 - s5 * t127 + s4_y * t131,  # c0(4, 6, 4)
-        c5 * t137 - s5 * t135 + s4_y * t72,  # c0(4, 6, 5)
-        c5 * t141 - s5 * t142,  # c0(4, 6, 6)
+        cos5 * t100 - sin5 * t97 + s4_y * t55,  # c0(4, 6, 2)
+        cos5 * t116 - sin5 * t113 + s4_y * t64,  # c0(4, 6, 3)
+        cos5 * t129 - sin5 * t127 + s4_y * t132,  # c0(4, 6, 4)
+        cos5 * t139 - sin5 * t137 + s4_y * t72,  # c0(4, 6, 5)
+        cos5 * t143 - sin5 * t144,  # c0(4, 6, 6)
         0.0096 * t46,  # c0(5, 6, 1)
         t98 + 0.0096 * t53,  # c0(5, 6, 2)
         t114 + 0.0096 * t62,  # c0(5, 6, 3)
         t124 + 0.0096 * t69,  # c0(5, 6, 4)
-        t136 + 0.0096 * t138,  # c0(5, 6, 5)
-        t143,  # c0(5, 6, 6)
+        t138 + 0.0096 * t140,  # c0(5, 6, 5)
+        t145,  # c0(5, 6, 6)
         0.0,  # c0(6, 6, 1)
         t100,  # c0(6, 6, 2)
         t116,  # c0(6, 6, 3)
         t125,  # c0(6, 6, 4)
-        t134,  # c0(6, 6, 5)
-        t141,  # c0(6, 6, 6)
+        t136,  # c0(6, 6, 5)
+        t143,  # c0(6, 6, 6)
     )

@@ -8,16 +8,15 @@
        axes    of the frame that joint 2 moves
        origin  where joint 2 is at the instant, at rest
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 164 additions and multiplications, 4 sines and cosines apart. */
 KERNEL(link_1_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -27,37 +26,37 @@ KERNEL(link_1_decomposition)(
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c1_out[8 * W + b] = R(0.0); /* c1(3, 1, 3) */
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
+        c1[8 * W + b] = R(0.0); /* c1(3, 1, 3) */
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
         const real w3_x = qd3 + w1_x;
-        const real t1 = R(0.21) * c3 - R(0.012) * s3;
-        const real t2 = R(0.21) * s3 + R(0.012) * c3;
+        const real t1 = R(0.21) * cos3 - R(0.012) * sin3;
+        const real t2 = R(0.21) * sin3 + R(0.012) * cos3;
         const real f3_c2_z = R(12.5) * t1;
-        const real t3 = R(0.009) * s3;
-        const real t4 = R(0.155) * c3 + t3;
-        const real t5 = R(0.009) * c3;
-        const real t6 = t5 + R(0.032) * s3;
-        const real t7 = R(0.003) * c3 + R(0.002) * s3 + R(0.0375) * t1;
-        const real t8 = R(0.003) * s3 - R(0.002) * c3 + R(0.0375) * t2;
-        c2_out[4 * W + b] = -t8; /* c2(2, 1, 3) */
+        const real t3 = R(0.009) * sin3;
+        const real t4 = R(0.155) * cos3 + t3;
+        const real t5 = R(0.009) * cos3;
+        const real t6 = t5 + R(0.032) * sin3;
+        const real t7 = R(0.003) * cos3 + R(0.002) * sin3 + R(0.0375) * t1;
+        const real t8 = R(0.003) * sin3 - R(0.002) * cos3 + R(0.0375) * t2;
+        c2[4 * W + b] = -t8; /* c2(2, 1, 3) */
         const real t9 = t1 * f3_c2_z;
-        const real t10 = c3 * t4 + s3 * t6 + t9;
-        const real t11 = s3 * t4 - c3 * t6 + t2 * f3_c2_z;
+        const real t10 = cos3 * t4 + sin3 * t6 + t9;
+        const real t11 = sin3 * t4 - cos3 * t6 + t2 * f3_c2_z;
         const real t12 = t2 * (R(12.5) * t2);
-        const real t13 = s3 * (R(0.155) * s3 - t5) + c3 * (R(0.032) * c3 - t3) + t12;
+        const real t13 = sin3 * (R(0.155) * sin3 - t5) + cos3 * (R(0.032) * cos3 - t3) + t12;
         const real t14 = R(0.273) + t12 + R(0.0001125) + t9;
         const real n3_c2_x = t14 - R(0.0861125);
-        c2_out[5 * W + b] = n3_c2_x; /* c2(3, 1, 3) */
+        c2[5 * W + b] = n3_c2_x; /* c2(3, 1, 3) */
         const real t15 = t14 - t10;
         const real n2_c2_z = t14 - t13;
-        c2_out[3 * W + b] = n2_c2_z; /* c2(2, 1, 2) */
+        c2[3 * W + b] = n2_c2_z; /* c2(2, 1, 2) */
         const real t16 = qd2 * t7;
         const real t17 = w1_y * t8;
         const real t18 = w3_x * t8 - R(0.0861125) * qd2;
@@ -66,48 +65,48 @@ KERNEL(link_1_decomposition)(
         const real t21 = w3_x * t11;
         const real t22 = w1_y * t7;
         const real t23 = qd2 * t11;
-        const real t24 = R(122.625) * s2;
-        const real t25 = t2 * (R(122.625) * c2);
-        g_out[2 * W + b] = -t25; /* g(3, 1) */
-        const real g_2 = R(0.367875) * c2 - t1 * t24;
-        g_out[1 * W + b] = g_2; /* g(2, 1) */
-        const real g_1 = c2 * (t2 * t24) - s2 * t25;
-        g_out[0 * W + b] = g_1; /* g(1, 1) */
-        const real n1_c2_x = s2 * n3_c2_x - c2 * t7;
-        c2_out[2 * W + b] = n1_c2_x; /* c2(1, 1, 3) */
-        const real n1_c2_y = c2 * t15 - s2 * t7;
-        const real t26 = s2 * t8 + c2 * t11;
-        c2_out[1 * W + b] = -t26; /* c2(1, 1, 2) */
-        const real n1_c1_x = s2 * (t16 - t17) + c2 * (qd2 * t10 - t20);
-        c1_out[6 * W + b] = n1_c1_x; /* c1(3, 1, 1) */
-        const real n1_c1_y = s2 * t18 + c2 * (t21 - t16);
-        const real n1_c1_z = s2 * t19 + c2 * (t22 - w3_x * t10);
-        c1_out[3 * W + b] = n1_c1_z; /* c1(2, 1, 1) */
-        const real c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y;
-        c2_out[0 * W + b] = c2_1_1; /* c2(1, 1, 1) */
-        const real c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y;
-        c1_out[0 * W + b] = c1_1_1; /* c1(1, 1, 1) */
+        const real t24 = R(122.625) * sin2;
+        const real t25 = t2 * (R(122.625) * cos2);
+        g[2 * W + b] = -t25; /* g(3, 1) */
+        const real g_2 = R(0.367875) * cos2 - t1 * t24;
+        g[1 * W + b] = g_2; /* g(2, 1) */
+        const real g_1 = cos2 * (t2 * t24) - sin2 * t25;
+        g[0 * W + b] = g_1; /* g(1, 1) */
+        const real n1_c2_x = sin2 * n3_c2_x - cos2 * t7;
+        c2[2 * W + b] = n1_c2_x; /* c2(1, 1, 3) */
+        const real n1_c2_y = cos2 * t15 - sin2 * t7;
+        const real t26 = sin2 * t8 + cos2 * t11;
+        c2[1 * W + b] = -t26; /* c2(1, 1, 2) */
+        const real n1_c1_x = sin2 * (t16 - t17) + cos2 * (qd2 * t10 - t20);
+        c1[6 * W + b] = n1_c1_x; /* c1(3, 1, 1) */
+        const real n1_c1_y = sin2 * t18 + cos2 * (t21 - t16);
+        const real n1_c1_z = sin2 * t19 + cos2 * (t22 - w3_x * t10);
+        c1[3 * W + b] = n1_c1_z; /* c1(2, 1, 1) */
+        const real c2_1_1 = sin2 * n1_c2_x + cos2 * n1_c2_y;
+        c2[0 * W + b] = c2_1_1; /* c2(1, 1, 1) */
+        const real c1_1_1 = sin2 * n1_c1_x + cos2 * n1_c1_y;
+        c1[0 * W + b] = c1_1_1; /* c1(1, 1, 1) */
         const real tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1;
         const real tau2_1 = g_2 + qd1 * n1_c1_z;
         const real tau3_1 = qd1 * n1_c1_x - t25;
         const real n2_c1_x = t23 - w1_y * t13 + w1_y * n3_c2_x + w1_x * t7;
-        c1_out[7 * W + b] = n2_c1_x; /* c1(3, 1, 2) */
+        c1[7 * W + b] = n2_c1_x; /* c1(3, 1, 2) */
         const real n2_c1_y = w3_x * t13 - qd2 * t8 - (t22 + w1_x * t15);
         const real n2_c1_z = t17 - t21 + w1_x * t11 - t17;
-        c1_out[4 * W + b] = n2_c1_z; /* c1(2, 1, 2) */
-        const real c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y;
-        c1_out[1 * W + b] = c1_1_2; /* c1(1, 1, 2) */
+        c1[4 * W + b] = n2_c1_z; /* c1(2, 1, 2) */
+        const real c1_1_2 = sin2 * n2_c1_x + cos2 * n2_c1_y;
+        c1[1 * W + b] = c1_1_2; /* c1(1, 1, 2) */
         const real tau1_2 = tau1_1 - qdd2 * t26 + qd2 * c1_1_2;
         const real tau2_2 = tau2_1 - qdd1 * t26 + qdd2 * n2_c2_z + qd2 * n2_c1_z;
         const real tau3_2 = tau3_1 + qd2 * n2_c1_x;
-        tau_out[2 * W + b] = tau3_2 + qdd1 * n1_c2_x - qdd2 * t8 + qdd3 * n3_c2_x; /* tau(3, 1) */
+        tau[2 * W + b] = tau3_2 + qdd1 * n1_c2_x - qdd2 * t8 + qdd3 * n3_c2_x; /* tau(3, 1) */
         const real n3_c1_y = t18 + t20 + qd2 * t15;
         const real n3_c1_z = t19 - (t23 + w1_y * n2_c2_z);
-        c1_out[5 * W + b] = n3_c1_z; /* c1(2, 1, 3) */
-        tau_out[1 * W + b] = tau2_2 - qdd3 * t8 + qd3 * n3_c1_z; /* tau(2, 1) */
-        const real c1_1_3 = c2 * n3_c1_y;
-        c1_out[2 * W + b] = c1_1_3; /* c1(1, 1, 3) */
-        tau_out[0 * W + b] = tau1_2 + qdd3 * n1_c2_x + qd3 * c1_1_3; /* tau(1, 1) */
+        c1[5 * W + b] = n3_c1_z; /* c1(2, 1, 3) */
+        tau[1 * W + b] = tau2_2 - qdd3 * t8 + qd3 * n3_c1_z; /* tau(2, 1) */
+        const real c1_1_3 = cos2 * n3_c1_y;
+        c1[2 * W + b] = c1_1_3; /* c1(1, 1, 3) */
+        tau[0 * W + b] = tau1_2 + qdd3 * n1_c2_x + qd3 * c1_1_3; /* tau(1, 1) */
     }
 }
 #endif
@@ -116,7 +115,7 @@ KERNEL(link_1_decomposition)(
 /* Torques alone: 133 additions and multiplications, 4 sines and cosines apart. */
 KERNEL(link_1_torque)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -126,38 +125,38 @@ KERNEL(link_1_torque)(
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real t1 = R(9.81) * s2;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
-        const real wd1_x = qdd1 * s2;
-        const real wd1_y = qdd1 * c2;
+        const real t1 = R(9.81) * sin2;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
+        const real wd1_x = qdd1 * sin2;
+        const real wd1_y = qdd1 * cos2;
         const real wd2_x = wd1_x + qd2 * w1_y;
         const real wd2_y = wd1_y - qd2 * w1_x;
         const real w3_x = qd3 + w1_x;
         const real wd3_x = qdd3 + wd2_x;
         const real wd3_y = wd2_y + qd2 * qd3;
         const real wd3_z = qdd2 - qd3 * w1_y;
-        const real t2 = R(0.21) * c3 - R(0.012) * s3;
-        const real t3 = R(0.21) * s3 + R(0.012) * c3;
+        const real t2 = R(0.21) * cos3 - R(0.012) * sin3;
+        const real t3 = R(0.21) * sin3 + R(0.012) * cos3;
         const real f3_c2_z = R(12.5) * t2;
         const real t4 = R(12.5) * t3;
-        const real t5 = R(0.009) * s3;
-        const real t6 = R(0.155) * c3 + t5;
-        const real t7 = R(0.009) * c3;
-        const real t8 = t7 + R(0.032) * s3;
-        const real t9 = R(0.003) * c3 + R(0.002) * s3 + R(0.0375) * t2;
-        const real t10 = R(0.003) * s3 - R(0.002) * c3 + R(0.0375) * t3;
+        const real t5 = R(0.009) * sin3;
+        const real t6 = R(0.155) * cos3 + t5;
+        const real t7 = R(0.009) * cos3;
+        const real t8 = t7 + R(0.032) * sin3;
+        const real t9 = R(0.003) * cos3 + R(0.002) * sin3 + R(0.0375) * t2;
+        const real t10 = R(0.003) * sin3 - R(0.002) * cos3 + R(0.0375) * t3;
         const real t11 = t2 * f3_c2_z;
-        const real t12 = c3 * t6 + s3 * t8 + t11;
-        const real t13 = s3 * t6 - c3 * t8 + t3 * f3_c2_z;
+        const real t12 = cos3 * t6 + sin3 * t8 + t11;
+        const real t13 = sin3 * t6 - cos3 * t8 + t3 * f3_c2_z;
         const real t14 = t3 * t4;
-        const real t15 = s3 * (R(0.155) * s3 - t7) + c3 * (R(0.032) * c3 - t5) + t14;
+        const real t15 = sin3 * (R(0.155) * sin3 - t7) + cos3 * (R(0.032) * cos3 - t5) + t14;
         const real t16 = R(0.273) + t14 + R(0.0001125) + t11;
         const real n3_c2_x = t16 - R(0.0861125);
         const real n2_c2_z = t16 - t15;
@@ -167,12 +166,12 @@ KERNEL(link_1_torque)(
         const real t20 = w3_x * (w3_x * t10 - R(0.0861125) * qd2) + w1_y * (t19 - t17);
         const real t21 = w3_x * (R(0.0861125) * w1_y - w3_x * t9) + w1_y * (w1_y * t9 - w3_x * t12);
         const real t22 = w3_x * (t17 - t18) + w1_y * (qd2 * t12 - w1_y * t13) + qd2 * (qd2 * t13 - w1_y * t15);
-        const real t23 = wd3_x * n3_c2_x - wd3_y * t9 - wd3_z * t10 - R(9.81) * c2 * t4 + t22;
-        tau_out[2 * W + b] = t23; /* tau(3, 1) */
+        const real t23 = wd3_x * n3_c2_x - wd3_y * t9 - wd3_z * t10 - R(9.81) * cos2 * t4 + t22;
+        tau[2 * W + b] = t23; /* tau(3, 1) */
         const real t24 = t1 * t4 + wd3_y * (t16 - t12) - wd3_x * t9 - wd3_z * t13;
-        tau_out[0 * W + b] = s2 * t23 + c2 * (t24 + t20 + qd2 * (w3_x * t15 - qd2 * t10)); /* tau(1, 1) */
-        const real t25 = R(0.367875) * c2 - t1 * f3_c2_z + wd3_z * n2_c2_z - (wd3_x * t10 + wd3_y * t13);
-        tau_out[1 * W + b] = t25 + t21 + qd2 * (t18 - t19); /* tau(2, 1) */
+        tau[0 * W + b] = sin2 * t23 + cos2 * (t24 + t20 + qd2 * (w3_x * t15 - qd2 * t10)); /* tau(1, 1) */
+        const real t25 = R(0.367875) * cos2 - t1 * f3_c2_z + wd3_z * n2_c2_z - (wd3_x * t10 + wd3_y * t13);
+        tau[1 * W + b] = t25 + t21 + qd2 * (t18 - t19); /* tau(2, 1) */
     }
 }
 #endif
@@ -181,7 +180,7 @@ KERNEL(link_1_torque)(
 /* Position gradient: 228 additions and multiplications, 4 sines and cosines apart. */
 KERNEL(link_1_position_gradient)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -191,19 +190,19 @@ KERNEL(link_1_position_gradient)(
         const real qdd1 = qdd[0 * W + b];
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c0_out[3 * W + b] = R(0.0); /* c0(2, 1, 1) */
-        const real t1 = R(9.81) * s2;
-        const real t2 = R(9.81) * c2;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
-        const real wd1_x = qdd1 * s2;
-        const real wd1_y = qdd1 * c2;
+        c0[3 * W + b] = R(0.0); /* c0(2, 1, 1) */
+        const real t1 = R(9.81) * sin2;
+        const real t2 = R(9.81) * cos2;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
+        const real wd1_x = qdd1 * sin2;
+        const real wd1_y = qdd1 * cos2;
         const real t3 = w1_y * w1_y;
         const real t4 = w1_x * w1_x + t3;
         const real t5 = qd2 * w1_x;
@@ -216,22 +215,22 @@ KERNEL(link_1_position_gradient)(
         const real wd3_x = qdd3 + wd2_x;
         const real wd3_y = wd2_y + qd2 * qd3;
         const real wd3_z = qdd2 - qd3 * w1_y;
-        const real t9 = R(0.21) * c3 - R(0.012) * s3;
-        const real t10 = R(0.21) * s3 + R(0.012) * c3;
-        const real t11 = c2 * t1 - s2 * t2;
+        const real t9 = R(0.21) * cos3 - R(0.012) * sin3;
+        const real t10 = R(0.21) * sin3 + R(0.012) * cos3;
+        const real t11 = cos2 * t1 - sin2 * t2;
         const real f3_c2_z = R(12.5) * t9;
         const real t12 = R(12.5) * t10;
-        const real t13 = R(0.009) * s3;
-        const real t14 = R(0.155) * c3 + t13;
-        const real t15 = R(0.009) * c3;
-        const real t16 = t15 + R(0.032) * s3;
-        const real t17 = R(0.003) * c3 + R(0.002) * s3 + R(0.0375) * t9;
-        const real t18 = R(0.003) * s3 - R(0.002) * c3 + R(0.0375) * t10;
+        const real t13 = R(0.009) * sin3;
+        const real t14 = R(0.155) * cos3 + t13;
+        const real t15 = R(0.009) * cos3;
+        const real t16 = t15 + R(0.032) * sin3;
+        const real t17 = R(0.003) * cos3 + R(0.002) * sin3 + R(0.0375) * t9;
+        const real t18 = R(0.003) * sin3 - R(0.002) * cos3 + R(0.0375) * t10;
         const real t19 = t9 * f3_c2_z;
-        const real t20 = c3 * t14 + s3 * t16 + t19;
-        const real t21 = s3 * t14 - c3 * t16 + t10 * f3_c2_z;
+        const real t20 = cos3 * t14 + sin3 * t16 + t19;
+        const real t21 = sin3 * t14 - cos3 * t16 + t10 * f3_c2_z;
         const real t22 = t10 * t12;
-        const real t23 = s3 * (R(0.155) * s3 - t15) + c3 * (R(0.032) * c3 - t13) + t22;
+        const real t23 = sin3 * (R(0.155) * sin3 - t15) + cos3 * (R(0.032) * cos3 - t13) + t22;
         const real t24 = R(0.273) + t22 + R(0.0001125) + t19;
         const real n3_c2_x = t24 - R(0.0861125);
         const real t25 = t24 - t20;
@@ -248,28 +247,28 @@ KERNEL(link_1_position_gradient)(
         const real t35 = qd2 * t21 - w1_y * t23;
         const real t36 = w3_x * t23 - qd2 * t18;
         const real t37 = t27 - t32;
-        const real t38 = R(0.367875) * c2;
+        const real t38 = R(0.367875) * cos2;
         const real t39 = t2 * t12;
         const real t40 = t1 * t12;
         const real t41 = t40 + wd3_y * t25 - wd3_x * t17 - wd3_z * t21 + w3_x * t29 + w1_y * t33 + qd2 * t36;
-        c0_out[5 * W + b] = t41 + t6 * t18 - t7 * t21 + t8 * n2_c2_z + R(2.0) * (qd2 * t34 - w1_y * t37); /* c0(2, 1, 3) */
+        c0[5 * W + b] = t41 + t6 * t18 - t7 * t21 + t8 * n2_c2_z + R(2.0) * (qd2 * t34 - w1_y * t37); /* c0(2, 1, 3) */
         const real t42 = t38 - t1 * f3_c2_z + wd3_z * n2_c2_z - (wd3_x * t18 + wd3_y * t21);
         const real t43 = t42 + w3_x * t30 + w1_y * t34 + qd2 * t37;
         const real t44 = t11 * f3_c2_z;
-        c0_out[0 * W + b] = s2 * (t44 + c2 * t43) - c2 * (R(0.0375) * t11 + s2 * t43); /* c0(1, 1, 1) */
-        c0_out[6 * W + b] = t44; /* c0(3, 1, 1) */
+        c0[0 * W + b] = sin2 * (t44 + cos2 * t43) - cos2 * (R(0.0375) * t11 + sin2 * t43); /* c0(1, 1, 1) */
+        c0[6 * W + b] = t44; /* c0(3, 1, 1) */
         const real t45 = t2 * f3_c2_z;
         const real t46 = t40 + wd1_y * n3_c2_x + wd1_x * t17 + t4 * t18 + R(2.0) * (w1_y * t28 - w1_x * t31);
-        c0_out[7 * W + b] = t46; /* c0(3, 1, 2) */
-        const real t47 = wd1_x * t21 - wd1_y * t18 - t4 * n2_c2_z - (R(0.367875) * s2 + t45);
-        c0_out[4 * W + b] = t47 + R(2.0) * (w1_y * t30 - w1_x * t34); /* c0(2, 1, 2) */
+        c0[7 * W + b] = t46; /* c0(3, 1, 2) */
+        const real t47 = wd1_x * t21 - wd1_y * t18 - t4 * n2_c2_z - (R(0.367875) * sin2 + t45);
+        c0[4 * W + b] = t47 + R(2.0) * (w1_y * t30 - w1_x * t34); /* c0(2, 1, 2) */
         const real t48 = wd3_x * n3_c2_x - wd3_y * t17 - wd3_z * t18 - t39 + w3_x * t28 + w1_y * t31 + qd2 * t35;
         const real t49 = t48 + t39 + t4 * t21 - (wd1_y * t17 + wd1_x * t25) + R(2.0) * (w1_y * t29 - w1_x * t33);
-        c0_out[1 * W + b] = s2 * (t46 - t41) + c2 * t49; /* c0(1, 1, 2) */
+        c0[1 * W + b] = sin2 * (t46 - t41) + cos2 * t49; /* c0(1, 1, 2) */
         const real t50 = R(2.0) * (qd2 * t31 - w1_y * t35) - (t45 + t6 * n3_c2_x + t7 * t17 + t8 * t18);
-        c0_out[8 * W + b] = t50; /* c0(3, 1, 3) */
-        const real t51 = c2 * (t38 + t6 * t17 + t7 * t25 - t8 * t21 + R(2.0) * (qd2 * t33 - w1_y * t36) - t43);
-        c0_out[2 * W + b] = s2 * t50 + t51; /* c0(1, 1, 3) */
+        c0[8 * W + b] = t50; /* c0(3, 1, 3) */
+        const real t51 = cos2 * (t38 + t6 * t17 + t7 * t25 - t8 * t21 + R(2.0) * (qd2 * t33 - w1_y * t36) - t43);
+        c0[2 * W + b] = sin2 * t50 + t51; /* c0(1, 1, 3) */
     }
 }
 #endif

@@ -8,16 +8,15 @@
        axes    of the frame that joint 2 moves
        origin  where joint 2 is at the instant, at rest
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 315 additions and multiplications, 6 sines and cosines apart. */
 KERNEL(link_2_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -29,22 +28,22 @@ KERNEL(link_2_decomposition)(
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
         const real qdd4 = qdd[3 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s4 = sine[3 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c4 = cosine[3 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin4 = sine[3 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos4 = cosine[3 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x4_y = c3 * c4 - s3 * s4;
-        const real x4_z = s3 * c4 + c3 * s4;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
+        const real x4_y = cos3 * cos4 - sin3 * sin4;
+        const real x4_z = sin3 * cos4 + cos3 * sin4;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
         const real w3_x = qd3 + w1_x;
         const real w4_x = qd4 + w3_x;
-        const real t1 = R(0.37) * c3;
-        const real s4_y = R(0.37) * s3;
+        const real t1 = R(0.37) * cos3;
+        const real s4_y = R(0.37) * sin3;
         const real t2 = t1 - (R(0.125) * x4_y + R(0.008) * x4_z);
         const real t3 = R(0.008) * x4_y - R(0.125) * x4_z + s4_y;
         const real v4_y = qd4 * s4_y;
@@ -60,7 +59,7 @@ KERNEL(link_2_decomposition)(
         const real t10 = t9 + R(0.0014) * x4_z;
         const real t11 = R(0.0009) * x4_y + R(0.0002) * x4_z + R(0.4536) * t2;
         const real t12 = R(0.0009) * x4_z - R(0.0002) * x4_y + R(0.4536) * t3;
-        c2_out[5 * W + b] = -t12; /* c2(2, 2, 3) */
+        c2[5 * W + b] = -t12; /* c2(2, 2, 3) */
         const real t13 = t2 * f3_c2_z;
         const real t14 = x4_y * t8 + x4_z * t10 + t13;
         const real t15 = x4_z * t8 - x4_y * t10 + t3 * f3_c2_z;
@@ -68,10 +67,10 @@ KERNEL(link_2_decomposition)(
         const real t17 = x4_z * (R(0.0125) * x4_z - t9) + x4_y * (R(0.0014) * x4_y - t7) + t16;
         const real t18 = R(0.0156) + t16 + R(0.0979776) + t13;
         const real n3_c2_x = t18 - R(0.0996776);
-        c2_out[7 * W + b] = n3_c2_x; /* c2(3, 2, 3) */
+        c2[7 * W + b] = n3_c2_x; /* c2(3, 2, 3) */
         const real t19 = t18 - t14;
         const real n2_c2_z = t18 - t17;
-        c2_out[4 * W + b] = n2_c2_z; /* c2(2, 2, 2) */
+        c2[4 * W + b] = n2_c2_z; /* c2(2, 2, 2) */
         const real t20 = w1_y * t6;
         const real t21 = t20 - qd2 * f3_c2_z;
         const real t22 = R(0.4536) * qd2;
@@ -91,48 +90,48 @@ KERNEL(link_2_decomposition)(
         const real t36 = t28 + t31;
         const real t37 = w4_x * t12 - R(0.0996776) * qd2 - R(0.4536) * v4_y;
         const real t38 = R(0.0996776) * w1_y - w4_x * t11 + R(0.4536) * t4;
-        const real t39 = R(20.601) * s2;
-        const real t40 = R(20.601) * c2;
+        const real t39 = R(20.601) * sin2;
+        const real t40 = R(20.601) * cos2;
         const real t41 = t3 * t40;
-        g_out[2 * W + b] = -t41; /* g(3, 2) */
-        const real g_2 = R(4.449816) * c2 - t2 * t39;
-        g_out[1 * W + b] = g_2; /* g(2, 2) */
-        const real g_1 = c2 * (t3 * t39) - s2 * t41;
-        g_out[0 * W + b] = g_1; /* g(1, 2) */
+        g[2 * W + b] = -t41; /* g(3, 2) */
+        const real g_2 = R(4.449816) * cos2 - t2 * t39;
+        g[1 * W + b] = g_2; /* g(2, 2) */
+        const real g_1 = cos2 * (t3 * t39) - sin2 * t41;
+        g[0 * W + b] = g_1; /* g(1, 2) */
         const real g_4 = s4_y * t40 - t41;
-        g_out[3 * W + b] = g_4; /* g(4, 2) */
-        const real n1_c2_x = s2 * n3_c2_x - c2 * t11;
-        c2_out[2 * W + b] = n1_c2_x; /* c2(1, 2, 3) */
-        const real n1_c2_y = c2 * t19 - s2 * t11;
-        const real t42 = s2 * t12 + c2 * t15;
-        c2_out[1 * W + b] = -t42; /* c2(1, 2, 2) */
-        const real n1_c1_x = s2 * t36 + c2 * (qd2 * t14 - t32);
-        c1_out[8 * W + b] = n1_c1_x; /* c1(3, 2, 1) */
-        const real n1_c1_y = s2 * t37 + c2 * (t33 - t29 + t28 - t26);
-        const real n1_c1_z = s2 * t38 + c2 * (t34 - w4_x * t14 + t4 * f3_c2_z);
-        c1_out[4 * W + b] = n1_c1_z; /* c1(2, 2, 1) */
-        const real f1_c1_z = s2 * t24 - c2 * t21;
-        const real c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y;
-        c2_out[0 * W + b] = c2_1_1; /* c2(1, 2, 1) */
-        const real c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y;
-        c1_out[0 * W + b] = c1_1_1; /* c1(1, 2, 1) */
-        const real c1_4_1 = n1_c1_x - (s4_y * (s2 * t25) + t1 * f1_c1_z);
-        c1_out[12 * W + b] = c1_4_1; /* c1(4, 2, 1) */
+        g[3 * W + b] = g_4; /* g(4, 2) */
+        const real n1_c2_x = sin2 * n3_c2_x - cos2 * t11;
+        c2[2 * W + b] = n1_c2_x; /* c2(1, 2, 3) */
+        const real n1_c2_y = cos2 * t19 - sin2 * t11;
+        const real t42 = sin2 * t12 + cos2 * t15;
+        c2[1 * W + b] = -t42; /* c2(1, 2, 2) */
+        const real n1_c1_x = sin2 * t36 + cos2 * (qd2 * t14 - t32);
+        c1[8 * W + b] = n1_c1_x; /* c1(3, 2, 1) */
+        const real n1_c1_y = sin2 * t37 + cos2 * (t33 - t29 + t28 - t26);
+        const real n1_c1_z = sin2 * t38 + cos2 * (t34 - w4_x * t14 + t4 * f3_c2_z);
+        c1[4 * W + b] = n1_c1_z; /* c1(2, 2, 1) */
+        const real f1_c1_z = sin2 * t24 - cos2 * t21;
+        const real c2_1_1 = sin2 * n1_c2_x + cos2 * n1_c2_y;
+        c2[0 * W + b] = c2_1_1; /* c2(1, 2, 1) */
+        const real c1_1_1 = sin2 * n1_c1_x + cos2 * n1_c1_y;
+        c1[0 * W + b] = c1_1_1; /* c1(1, 2, 1) */
+        const real c1_4_1 = n1_c1_x - (s4_y * (sin2 * t25) + t1 * f1_c1_z);
+        c1[12 * W + b] = c1_4_1; /* c1(4, 2, 1) */
         const real tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1;
         const real tau2_1 = g_2 + qd1 * n1_c1_z;
         const real tau3_1 = qd1 * n1_c1_x - t41;
         const real tau4_1 = g_4 + qd1 * c1_4_1;
         const real f2_c1_z = w1_y * f3_c2_z + R(0.4536) * w1_x;
         const real n2_c1_x = t35 - w1_y * t17 + w1_y * n3_c2_x + w1_x * t11;
-        c1_out[9 * W + b] = n2_c1_x; /* c1(3, 2, 2) */
+        c1[9 * W + b] = n2_c1_x; /* c1(3, 2, 2) */
         const real n2_c1_y = w4_x * t17 - qd2 * t12 - v4_y * t6 - (t34 + w1_x * t19);
         const real n2_c1_z = t30 - t33 + t27 + t28 + w1_x * t15 - t30;
-        c1_out[5 * W + b] = n2_c1_z; /* c1(2, 2, 2) */
+        c1[5 * W + b] = n2_c1_z; /* c1(2, 2, 2) */
         const real f2_c1_y = t21 - t20;
-        const real c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y;
-        c1_out[1 * W + b] = c1_1_2; /* c1(1, 2, 2) */
+        const real c1_1_2 = sin2 * n2_c1_x + cos2 * n2_c1_y;
+        c1[1 * W + b] = c1_1_2; /* c1(1, 2, 2) */
         const real c1_4_2 = n2_c1_x + s4_y * f2_c1_y - t1 * f2_c1_z;
-        c1_out[13 * W + b] = c1_4_2; /* c1(4, 2, 2) */
+        c1[13 * W + b] = c1_4_2; /* c1(4, 2, 2) */
         const real tau1_2 = tau1_1 - qdd2 * t42 + qd2 * c1_1_2;
         const real tau2_2 = tau2_1 - qdd1 * t42 + qdd2 * n2_c2_z + qd2 * n2_c1_z;
         const real tau3_2 = tau3_1 + qd2 * n2_c1_x;
@@ -140,45 +139,45 @@ KERNEL(link_2_decomposition)(
         const real t43 = t32 + qd2 * t19;
         const real t44 = t35 + w1_y * n2_c2_z;
         const real n3_c1_x = t36 - t31;
-        c1_out[10 * W + b] = n3_c1_x; /* c1(3, 2, 3) */
+        c1[10 * W + b] = n3_c1_x; /* c1(3, 2, 3) */
         const real n3_c1_y = t37 + t43;
         const real n3_c1_z = t38 - t44;
-        c1_out[6 * W + b] = n3_c1_z; /* c1(2, 2, 3) */
+        c1[6 * W + b] = n3_c1_z; /* c1(2, 2, 3) */
         const real f3_c1_z = t24 - t22;
-        const real c1_1_3 = s2 * n3_c1_x + c2 * n3_c1_y;
-        c1_out[2 * W + b] = c1_1_3; /* c1(1, 2, 3) */
+        const real c1_1_3 = sin2 * n3_c1_x + cos2 * n3_c1_y;
+        c1[2 * W + b] = c1_1_3; /* c1(1, 2, 3) */
         const real c1_4_3 = n3_c1_x - (s4_y * (t23 + t25) + t1 * f3_c1_z);
-        c1_out[14 * W + b] = c1_4_3; /* c1(4, 2, 3) */
+        c1[14 * W + b] = c1_4_3; /* c1(4, 2, 3) */
         const real tau1_3 = tau1_2 + qdd3 * n1_c2_x + qd3 * c1_1_3;
         const real tau2_3 = tau2_2 - qdd3 * t12 + qd3 * n3_c1_z;
         const real tau3_3 = tau3_2 + qdd1 * n1_c2_x - qdd2 * t12 + qdd3 * n3_c2_x + qd3 * n3_c1_x;
         const real tau4_3 = tau4_2 + qd3 * c1_4_3;
         const real n4_c2_x = n3_c2_x - (t1 * f3_c2_z + s4_y * t6);
-        c2_out[8 * W + b] = n4_c2_x; /* c2(3, 2, 4) */
-        const real n4_c2_y = R(0.167832) * c3 - t11;
-        const real n4_c2_z = R(0.167832) * s3 - t12;
-        c2_out[6 * W + b] = n4_c2_z; /* c2(2, 2, 4) */
-        const real f4_c2_y = R(0.777) * s3 - t6;
-        const real f4_c2_z = f3_c2_z - R(0.777) * c3;
+        c2[8 * W + b] = n4_c2_x; /* c2(3, 2, 4) */
+        const real n4_c2_y = R(0.167832) * cos3 - t11;
+        const real n4_c2_z = R(0.167832) * sin3 - t12;
+        c2[6 * W + b] = n4_c2_z; /* c2(2, 2, 4) */
+        const real f4_c2_y = R(0.777) * sin3 - t6;
+        const real f4_c2_z = f3_c2_z - R(0.777) * cos3;
         const real n4_c1_x = t36 + sd4_z * f3_c2_z - sd4_y * t6 - t31;
-        c1_out[11 * W + b] = n4_c1_x; /* c1(3, 2, 4) */
-        tau_out[2 * W + b] = tau3_3 + qdd4 * n4_c2_x + qd4 * n4_c1_x; /* tau(3, 2) */
+        c1[11 * W + b] = n4_c1_x; /* c1(3, 2, 4) */
+        tau[2 * W + b] = tau3_3 + qdd4 * n4_c2_x + qd4 * n4_c1_x; /* tau(3, 2) */
         const real n4_c1_y = t37 + t43 - (t5 * t6 + R(0.4536) * sd4_z);
         const real n4_c1_z = t38 + R(0.4536) * sd4_y + t5 * f3_c2_z - t44;
-        c1_out[7 * W + b] = n4_c1_z; /* c1(2, 2, 4) */
-        tau_out[1 * W + b] = tau2_3 + qdd4 * n4_c2_z + qd4 * n4_c1_z; /* tau(2, 2) */
+        c1[7 * W + b] = n4_c1_z; /* c1(2, 2, 4) */
+        tau[1 * W + b] = tau2_3 + qdd4 * n4_c2_z + qd4 * n4_c1_z; /* tau(2, 2) */
         const real f4_c1_y = R(2.1) * sd4_y - t23 - t25;
         const real f4_c1_z = t24 + R(2.1) * sd4_z - t22;
-        const real c2_1_4 = s2 * n4_c2_x + c2 * n4_c2_y;
-        c2_out[3 * W + b] = c2_1_4; /* c2(1, 2, 4) */
-        const real c1_1_4 = s2 * n4_c1_x + c2 * n4_c1_y;
-        c1_out[3 * W + b] = c1_1_4; /* c1(1, 2, 4) */
-        tau_out[0 * W + b] = tau1_3 + qdd4 * c2_1_4 + qd4 * c1_1_4; /* tau(1, 2) */
+        const real c2_1_4 = sin2 * n4_c2_x + cos2 * n4_c2_y;
+        c2[3 * W + b] = c2_1_4; /* c2(1, 2, 4) */
+        const real c1_1_4 = sin2 * n4_c1_x + cos2 * n4_c1_y;
+        c1[3 * W + b] = c1_1_4; /* c1(1, 2, 4) */
+        tau[0 * W + b] = tau1_3 + qdd4 * c2_1_4 + qd4 * c1_1_4; /* tau(1, 2) */
         const real c2_4_4 = n4_c2_x + s4_y * f4_c2_y - t1 * f4_c2_z;
-        c2_out[9 * W + b] = c2_4_4; /* c2(4, 2, 4) */
+        c2[9 * W + b] = c2_4_4; /* c2(4, 2, 4) */
         const real c1_4_4 = n4_c1_x + s4_y * f4_c1_y - t1 * f4_c1_z;
-        c1_out[15 * W + b] = c1_4_4; /* c1(4, 2, 4) */
-        tau_out[3 * W + b] = tau4_3 + qdd1 * c2_1_4 + qdd2 * n4_c2_z + qdd3 * n4_c2_x + qdd4 * c2_4_4 + qd4 * c1_4_4; /* tau(4, 2) */
+        c1[15 * W + b] = c1_4_4; /* c1(4, 2, 4) */
+        tau[3 * W + b] = tau4_3 + qdd1 * c2_1_4 + qdd2 * n4_c2_z + qdd3 * n4_c2_x + qdd4 * c2_4_4 + qd4 * c1_4_4; /* tau(4, 2) */
     }
 }
 #endif
@@ -187,7 +186,7 @@ KERNEL(link_2_decomposition)(
 /* Torques alone: 220 additions and multiplications, 6 sines and cosines apart. */
 KERNEL(link_2_torque)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -199,20 +198,20 @@ KERNEL(link_2_torque)(
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
         const real qdd4 = qdd[3 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s4 = sine[3 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c4 = cosine[3 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin4 = sine[3 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos4 = cosine[3 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x4_y = c3 * c4 - s3 * s4;
-        const real x4_z = s3 * c4 + c3 * s4;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
-        const real wd1_x = qdd1 * s2;
-        const real wd1_y = qdd1 * c2;
+        const real x4_y = cos3 * cos4 - sin3 * sin4;
+        const real x4_z = sin3 * cos4 + cos3 * sin4;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
+        const real wd1_x = qdd1 * sin2;
+        const real wd1_y = qdd1 * cos2;
         const real wd2_x = wd1_x + qd2 * w1_y;
         const real wd2_y = wd1_y - qd2 * w1_x;
         const real w3_x = qd3 + w1_x;
@@ -223,16 +222,16 @@ KERNEL(link_2_torque)(
         const real wd4_x = qdd4 + wd3_x;
         const real wd4_y = wd3_y + qd2 * qd4;
         const real wd4_z = wd3_z - qd4 * w1_y;
-        const real t1 = R(0.37) * c3;
-        const real s4_y = R(0.37) * s3;
+        const real t1 = R(0.37) * cos3;
+        const real s4_y = R(0.37) * sin3;
         const real t2 = t1 - (R(0.125) * x4_y + R(0.008) * x4_z);
         const real t3 = R(0.008) * x4_y - R(0.125) * x4_z + s4_y;
         const real v4_y = qd4 * s4_y;
         const real t4 = qd4 * t1;
         const real sd4_y = w3_x * t1;
         const real sd4_z = w3_x * s4_y;
-        const real t5 = R(9.81) * s2 - qd4 * (w1_y * t1 + qd2 * s4_y);
-        const real t6 = qdd4 * s4_y + R(9.81) * c2 + qd4 * sd4_y;
+        const real t5 = R(9.81) * sin2 - qd4 * (w1_y * t1 + qd2 * s4_y);
+        const real t6 = qdd4 * s4_y + R(9.81) * cos2 + qd4 * sd4_y;
         const real t7 = qd4 * sd4_z - qdd4 * t1;
         const real f3_c2_z = R(2.1) * t2;
         const real t8 = R(2.1) * t3;
@@ -262,16 +261,16 @@ KERNEL(link_2_torque)(
         const real t30 = w4_x * (R(0.0996776) * w1_y - w4_x * t13 + R(0.4536) * t4);
         const real t31 = t7 * f3_c2_z - t6 * t8 + wd4_x * n3_c2_x - wd4_y * t13 - wd4_z * t14;
         const real t32 = t31 + t28 + qd2 * (qd2 * t17 - w1_y * t19);
-        tau_out[2 * W + b] = t32; /* tau(3, 2) */
+        tau[2 * W + b] = t32; /* tau(3, 2) */
         const real t33 = t29 + w1_y * (t27 - t25 + t24 - t22) + qd2 * (w4_x * t19 - qd2 * t14 - v4_y * t8);
         const real t34 = t30 + w1_y * (w1_y * t13 - w4_x * t16 + t4 * f3_c2_z) + qd2 * (t26 - t27 + t23 + t24);
-        tau_out[1 * W + b] = R(0.4536) * t6 - t5 * f3_c2_z + wd4_z * n2_c2_z - (wd4_x * t14 + wd4_y * t17) + t34; /* tau(2, 2) */
+        tau[1 * W + b] = R(0.4536) * t6 - t5 * f3_c2_z + wd4_z * n2_c2_z - (wd4_x * t14 + wd4_y * t17) + t34; /* tau(2, 2) */
         const real t35 = qd2 * t21 - w4_x * (w4_x * f3_c2_z - R(0.4536) * w1_y - R(2.1) * t4);
         const real t36 = w4_x * (R(2.1) * v4_y + R(0.4536) * qd2 - w4_x * t8) - w1_y * t21;
-        const real t37 = c2 * (t5 * t8 - R(0.4536) * t7 + wd4_y * (t20 - t16) - wd4_x * t13 - wd4_z * t17 + t33);
-        tau_out[0 * W + b] = s2 * t32 + t37; /* tau(1, 2) */
+        const real t37 = t5 * t8 - R(0.4536) * t7 + wd4_y * (t20 - t16) - wd4_x * t13 - wd4_z * t17 + t33;
+        tau[0 * W + b] = sin2 * t32 + cos2 * t37; /* tau(1, 2) */
         const real t38 = t1 * (R(2.1) * t7 + wd4_x * f3_c2_z - R(0.4536) * wd4_y + t36);
-        tau_out[3 * W + b] = t32 + s4_y * (R(2.1) * t6 + R(0.4536) * wd4_z - wd4_x * t8 + t35) - t38; /* tau(4, 2) */
+        tau[3 * W + b] = t32 + s4_y * (R(2.1) * t6 + R(0.4536) * wd4_z - wd4_x * t8 + t35) - t38; /* tau(4, 2) */
     }
 }
 #endif
@@ -280,7 +279,7 @@ KERNEL(link_2_torque)(
 /* Position gradient: 439 additions and multiplications, 6 sines and cosines apart. */
 KERNEL(link_2_position_gradient)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -292,23 +291,23 @@ KERNEL(link_2_position_gradient)(
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
         const real qdd4 = qdd[3 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s4 = sine[3 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c4 = cosine[3 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin4 = sine[3 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos4 = cosine[3 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c0_out[4 * W + b] = R(0.0); /* c0(2, 2, 1) */
-        const real x4_y = c3 * c4 - s3 * s4;
-        const real x4_z = s3 * c4 + c3 * s4;
-        const real t1 = R(9.81) * s2;
-        const real t2 = R(9.81) * c2;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
-        const real wd1_x = qdd1 * s2;
-        const real wd1_y = qdd1 * c2;
+        c0[4 * W + b] = R(0.0); /* c0(2, 2, 1) */
+        const real x4_y = cos3 * cos4 - sin3 * sin4;
+        const real x4_z = sin3 * cos4 + cos3 * sin4;
+        const real t1 = R(9.81) * sin2;
+        const real t2 = R(9.81) * cos2;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
+        const real wd1_x = qdd1 * sin2;
+        const real wd1_y = qdd1 * cos2;
         const real t3 = w1_y * w1_y;
         const real t4 = w1_x * w1_x + t3;
         const real t5 = qd2 * w1_x;
@@ -327,8 +326,8 @@ KERNEL(link_2_position_gradient)(
         const real wd4_x = qdd4 + wd3_x;
         const real wd4_y = wd3_y + qd2 * qd4;
         const real wd4_z = wd3_z - qd4 * w1_y;
-        const real t11 = R(0.37) * c3;
-        const real s4_y = R(0.37) * s3;
+        const real t11 = R(0.37) * cos3;
+        const real s4_y = R(0.37) * sin3;
         const real t12 = t11 - (R(0.125) * x4_y + R(0.008) * x4_z);
         const real t13 = R(0.008) * x4_y - R(0.125) * x4_z + s4_y;
         const real v4_y = qd4 * s4_y;
@@ -336,7 +335,7 @@ KERNEL(link_2_position_gradient)(
         const real t15 = w1_y * t11 + qd2 * s4_y;
         const real sd4_y = w3_x * t11;
         const real sd4_z = w3_x * s4_y;
-        const real t16 = c2 * t1 - s2 * t2;
+        const real t16 = cos2 * t1 - sin2 * t2;
         const real t17 = w1_y * sd4_z - qd2 * sd4_y - (wd3_y * t11 + wd3_z * s4_y);
         const real t18 = wd3_x * t11 - (qd2 * t15 + w3_x * sd4_z);
         const real t19 = wd3_x * s4_y - t2 + w3_x * sd4_y + w1_y * t15;
@@ -390,18 +389,18 @@ KERNEL(link_2_position_gradient)(
         const real t64 = R(2.1) * t21 + R(0.4536) * wd4_z - wd4_x * t23 + t56 - w4_x * t39;
         const real t65 = R(2.1) * t22 + wd4_x * f3_c2_z - R(0.4536) * wd4_y + w4_x * t38 - t57;
         const real t66 = t16 * f3_c2_z;
-        c0_out[0 * W + b] = s2 * (t66 + c2 * t62) - c2 * (R(0.4536) * t16 + s2 * t62); /* c0(1, 2, 1) */
-        c0_out[8 * W + b] = t66; /* c0(3, 2, 1) */
-        c0_out[12 * W + b] = t66 - t11 * (R(2.1) * t16); /* c0(4, 2, 1) */
+        c0[0 * W + b] = sin2 * (t66 + cos2 * t62) - cos2 * (R(0.4536) * t16 + sin2 * t62); /* c0(1, 2, 1) */
+        c0[8 * W + b] = t66; /* c0(3, 2, 1) */
+        c0[12 * W + b] = t66 - t11 * (R(2.1) * t16); /* c0(4, 2, 1) */
         const real t67 = t2 * f3_c2_z;
         const real t68 = t1 * t23 + wd1_y * n3_c2_x + wd1_x * t28 + t4 * t29 + R(2.0) * (w1_y * t48 - w1_x * t45);
-        c0_out[9 * W + b] = t68; /* c0(3, 2, 2) */
-        const real t69 = wd1_x * t32 - wd1_y * t29 - t4 * n2_c2_z - (R(4.449816) * s2 + t67);
-        c0_out[5 * W + b] = t69 + R(2.0) * (w1_y * t52 - w1_x * t53); /* c0(2, 2, 2) */
+        c0[9 * W + b] = t68; /* c0(3, 2, 2) */
+        const real t69 = wd1_x * t32 - wd1_y * t29 - t4 * n2_c2_z - (R(4.449816) * sin2 + t67);
+        c0[5 * W + b] = t69 + R(2.0) * (w1_y * t52 - w1_x * t53); /* c0(2, 2, 2) */
         const real t70 = t2 * t23 + t4 * t32 - (wd1_y * t28 + wd1_x * t36) + R(2.0) * (w1_y * t49 - w1_x * t50);
-        c0_out[1 * W + b] = s2 * (t68 - t60) + c2 * (t58 + w4_x * t48 + w1_y * t45 + qd2 * t47 + t70); /* c0(1, 2, 2) */
+        c0[1 * W + b] = sin2 * (t68 - t60) + cos2 * (t58 + w4_x * t48 + w1_y * t45 + qd2 * t47 + t70); /* c0(1, 2, 2) */
         const real t71 = t11 * (wd1_y * f3_c2_z + R(0.4536) * wd1_x + R(2.0) * (w1_y * t38 + w1_x * t37));
-        c0_out[13 * W + b] = t68 - (s4_y * (R(20.601) * s2 + R(0.4536) * t4 + wd1_y * t23 + R(2.0) * t55) + t71); /* c0(4, 2, 2) */
+        c0[13 * W + b] = t68 - (s4_y * (R(20.601) * sin2 + R(0.4536) * t4 + wd1_y * t23 + R(2.0) * t55) + t71); /* c0(4, 2, 2) */
         const real t72 = t6 * n3_c2_x;
         const real t73 = t6 * t28;
         const real t74 = t6 * t29;
@@ -410,22 +409,22 @@ KERNEL(link_2_position_gradient)(
         const real t77 = R(2.0) * (qd2 * t45 - w1_y * t47);
         const real t78 = R(2.0) * (qd2 * t50 - w1_y * t51);
         const real t79 = R(2.0) * (qd2 * t53 - w1_y * t54);
-        c0_out[6 * W + b] = t60 + t74 - t7 * t32 + t8 * n2_c2_z + t79; /* c0(2, 2, 3) */
+        c0[6 * W + b] = t60 + t74 - t7 * t32 + t8 * n2_c2_z + t79; /* c0(2, 2, 3) */
         const real t80 = R(2.0) * t57;
         const real t81 = R(2.0) * t56;
         const real t82 = t77 - (t67 + t72 + t7 * t28 + t8 * t29);
-        c0_out[2 * W + b] = s2 * t82 + c2 * (R(4.449816) * c2 + t73 + t7 * t36 - t8 * t32 + t78 - t62); /* c0(1, 2, 3) */
-        c0_out[10 * W + b] = t82; /* c0(3, 2, 3) */
-        const real t83 = t11 * (R(20.601) * c2 + t76 + R(0.4536) * t7 + t81);
-        c0_out[14 * W + b] = t82 + s4_y * (R(0.4536) * t8 + t75 - t80) + t83; /* c0(4, 2, 3) */
+        c0[2 * W + b] = sin2 * t82 + cos2 * (R(4.449816) * cos2 + t73 + t7 * t36 - t8 * t32 + t78 - t62); /* c0(1, 2, 3) */
+        c0[10 * W + b] = t82; /* c0(3, 2, 3) */
+        const real t83 = t11 * (R(20.601) * cos2 + t76 + R(0.4536) * t7 + t81);
+        c0[14 * W + b] = t82 + s4_y * (R(0.4536) * t8 + t75 - t80) + t83; /* c0(4, 2, 3) */
         const real t84 = t77 + t19 * f3_c2_z - t18 * t23 - (t72 + t9 * t28 + t10 * t29) + s4_y * t65 + t11 * t64;
-        c0_out[11 * W + b] = t84; /* c0(3, 2, 4) */
+        c0[11 * W + b] = t84; /* c0(3, 2, 4) */
         const real t85 = t79 + R(0.4536) * t18 - t17 * f3_c2_z + t74 - t9 * t32 + t10 * n2_c2_z;
-        c0_out[7 * W + b] = t85 + t60 - s4_y * t63; /* c0(2, 2, 4) */
+        c0[7 * W + b] = t85 + t60 - s4_y * t63; /* c0(2, 2, 4) */
         const real t86 = t78 + t17 * t23 - R(0.4536) * t19 + t73 + t9 * t36 - t10 * t32 - (t62 + t11 * t63);
-        c0_out[3 * W + b] = s2 * t84 + c2 * t86; /* c0(1, 2, 4) */
+        c0[3 * W + b] = sin2 * t84 + cos2 * t86; /* c0(1, 2, 4) */
         const real t87 = s4_y * (R(2.1) * t18 + t75 + R(0.4536) * t10 - t80 - t65);
-        c0_out[15 * W + b] = t84 + t87 - t11 * (t64 + R(2.1) * t19 - (t76 + R(0.4536) * t9) - t81); /* c0(4, 2, 4) */
+        c0[15 * W + b] = t84 + t87 - t11 * (t64 + R(2.1) * t19 - (t76 + R(0.4536) * t9) - t81); /* c0(4, 2, 4) */
     }
 }
 #endif

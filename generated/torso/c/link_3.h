@@ -8,16 +8,15 @@
        axes    of the frame that joint 2 moves
        origin  the link's centre of mass, moving with it; lengths are times the square root of its mass, 1.4 kg
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 448 additions and multiplications, 8 sines and cosines apart. */
 KERNEL(link_3_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -31,36 +30,36 @@ KERNEL(link_3_decomposition)(
         const real qdd3 = qdd[2 * W + b];
         const real qdd4 = qdd[3 * W + b];
         const real qdd5 = qdd[4 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s4 = sine[3 * W + b];
-        const real s5 = sine[4 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c4 = cosine[3 * W + b];
-        const real c5 = cosine[4 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin4 = sine[3 * W + b];
+        const real sin5 = sine[4 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos4 = cosine[3 * W + b];
+        const real cos5 = cosine[4 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x4_y = c3 * c4 - s3 * s4;
-        const real x4_z = s3 * c4 + c3 * s4;
-        const real x5_y = c5 * x4_y - s5 * x4_z;
-        const real x5_z = c5 * x4_z + s5 * x4_y;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
+        const real x4_y = cos3 * cos4 - sin3 * sin4;
+        const real x4_z = sin3 * cos4 + cos3 * sin4;
+        const real x5_y = cos5 * x4_y - sin5 * x4_z;
+        const real x5_z = cos5 * x4_z + sin5 * x4_y;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
         const real w3_x = qd3 + w1_x;
         const real w4_x = qd4 + w3_x;
         const real w5_x = qd5 + w4_x;
-        const real t1 = R(11.607348534441448) * s2;
-        const real t2 = R(11.607348534441448) * c2;
+        const real t1 = R(11.607348534441448) * sin2;
+        const real t2 = R(11.607348534441448) * cos2;
         const real t3 = R(0.15618450627382988) * x5_y + R(0.020114671262538696) * x5_z;
         const real t4 = R(0.020114671262538696) * x5_y - R(0.15618450627382988) * x5_z;
         const real t5 = t3 + R(0.3313004678535785) * x4_y + R(0.023664319132398463) * x4_z;
         const real t6 = t4 + R(0.023664319132398463) * x4_y - R(0.3313004678535785) * x4_z;
-        const real s2_x = t5 - R(0.43778990394937156) * c3;
-        const real t7 = t6 + R(0.43778990394937156) * s3;
-        const real s1_x = c2 * t7;
-        const real t8 = s2 * t7;
-        const real t9 = R(0.25320821471666355) * c2 + s2 * s2_x;
+        const real s2_x = t5 - R(0.43778990394937156) * cos3;
+        const real t7 = t6 + R(0.43778990394937156) * sin3;
+        const real s1_x = cos2 * t7;
+        const real t8 = sin2 * t7;
+        const real t9 = R(0.25320821471666355) * cos2 + sin2 * s2_x;
         const real v4_y = qd5 * t4;
         const real v4_z = qd5 * t3;
         const real v3_y = v4_y + qd4 * t6;
@@ -71,9 +70,9 @@ KERNEL(link_3_decomposition)(
         const real v1_y = v2_y - R(0.25320821471666355) * qd2;
         const real v0_y = v1_y + qd1 * t8;
         const real v0_z = v2_z + qd1 * t9;
-        const real t10 = c2 * v0_z;
-        const real sd1_y = s2 * v0_z;
-        const real t11 = c2 * (sd2_y + qd1 * s1_x) + s2 * v0_y;
+        const real t10 = cos2 * v0_z;
+        const real sd1_y = sin2 * v0_z;
+        const real t11 = cos2 * (sd2_y + qd1 * s1_x) + sin2 * v0_y;
         const real t12 = w1_y * s2_x;
         const real sd2_z = R(0.25320821471666355) * w1_x - t12;
         const real sd3_x = qd2 * t7 - t12;
@@ -105,32 +104,32 @@ KERNEL(link_3_decomposition)(
         const real t31 = w1_y * n3_c2_y;
         const real t32 = qd2 * t22;
         const real g_1 = t1 * s1_x - t2 * t8;
-        g_out[0 * W + b] = g_1; /* g(1, 3) */
-        const real g_2 = t1 * s2_x + R(2.939076) * c2;
-        g_out[1 * W + b] = g_2; /* g(2, 3) */
+        g[0 * W + b] = g_1; /* g(1, 3) */
+        const real g_2 = t1 * s2_x + R(2.939076) * cos2;
+        g[1 * W + b] = g_2; /* g(2, 3) */
         const real t33 = t2 * t7;
-        g_out[2 * W + b] = -t33; /* g(3, 3) */
+        g[2 * W + b] = -t33; /* g(3, 3) */
         const real t34 = t2 * t6;
-        g_out[3 * W + b] = -t34; /* g(4, 3) */
+        g[3 * W + b] = -t34; /* g(4, 3) */
         const real t35 = t2 * t4;
-        g_out[4 * W + b] = -t35; /* g(5, 3) */
-        const real n1_c2_x = R(0.0101) * s2 + c2 * n3_c2_y;
-        const real n1_c2_y = s2 * n3_c2_y + c2 * t24;
-        const real n1_c1_x = c2 * (qd2 * t21 - t29) - s2 * (t25 + t26);
-        const real n1_c1_y = s2 * t27 + c2 * (t25 + t30);
-        const real n1_c1_z = s2 * t28 - c2 * (t31 + w5_x * t21);
-        const real c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y + s1_x * s1_x + t8 * t8 + t9 * t9;
-        c2_out[0 * W + b] = c2_1_1; /* c2(1, 3, 1) */
-        const real c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y + t9 * t11 - (s1_x * t10 + t8 * sd1_y);
-        c1_out[0 * W + b] = c1_1_1; /* c1(1, 3, 1) */
+        g[4 * W + b] = -t35; /* g(5, 3) */
+        const real n1_c2_x = R(0.0101) * sin2 + cos2 * n3_c2_y;
+        const real n1_c2_y = sin2 * n3_c2_y + cos2 * t24;
+        const real n1_c1_x = cos2 * (qd2 * t21 - t29) - sin2 * (t25 + t26);
+        const real n1_c1_y = sin2 * t27 + cos2 * (t25 + t30);
+        const real n1_c1_z = sin2 * t28 - cos2 * (t31 + w5_x * t21);
+        const real c2_1_1 = sin2 * n1_c2_x + cos2 * n1_c2_y + s1_x * s1_x + t8 * t8 + t9 * t9;
+        c2[0 * W + b] = c2_1_1; /* c2(1, 3, 1) */
+        const real c1_1_1 = sin2 * n1_c1_x + cos2 * n1_c1_y + t9 * t11 - (s1_x * t10 + t8 * sd1_y);
+        c1[0 * W + b] = c1_1_1; /* c1(1, 3, 1) */
         const real c1_2_1 = n1_c1_z + R(0.25320821471666355) * sd1_y - s2_x * t10;
-        c1_out[5 * W + b] = c1_2_1; /* c1(2, 3, 1) */
+        c1[5 * W + b] = c1_2_1; /* c1(2, 3, 1) */
         const real c1_3_1 = n1_c1_x + s2_x * t11 - t7 * sd1_y;
-        c1_out[10 * W + b] = c1_3_1; /* c1(3, 3, 1) */
+        c1[10 * W + b] = c1_3_1; /* c1(3, 3, 1) */
         const real c1_4_1 = n1_c1_x + t5 * t11 - t6 * sd1_y;
-        c1_out[15 * W + b] = c1_4_1; /* c1(4, 3, 1) */
+        c1[15 * W + b] = c1_4_1; /* c1(4, 3, 1) */
         const real c1_5_1 = n1_c1_x + t3 * t11 - t4 * sd1_y;
-        c1_out[20 * W + b] = c1_5_1; /* c1(5, 3, 1) */
+        c1[20 * W + b] = c1_5_1; /* c1(5, 3, 1) */
         const real tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1;
         const real tau2_1 = g_2 + qd1 * c1_2_1;
         const real tau3_1 = qd1 * c1_3_1 - t33;
@@ -139,21 +138,21 @@ KERNEL(link_3_decomposition)(
         const real n2_c1_x = t32 - w1_y * t23 + R(0.0101) * w1_y - w1_x * n3_c2_y;
         const real n2_c1_y = w5_x * t23 - qd2 * t20 + t31 - w1_x * t24;
         const real n2_c1_z = t26 - t30 + w1_x * t22 - t26;
-        const real c2_1_2 = s2_x * s1_x - R(0.25320821471666355) * t8 - (s2 * t20 + c2 * t22);
-        c2_out[1 * W + b] = c2_1_2; /* c2(1, 3, 2) */
-        const real c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y + s1_x * v1_y - t8 * sd2_y - t9 * sd2_z;
-        c1_out[1 * W + b] = c1_1_2; /* c1(1, 3, 2) */
+        const real c2_1_2 = s2_x * s1_x - R(0.25320821471666355) * t8 - (sin2 * t20 + cos2 * t22);
+        c2[1 * W + b] = c2_1_2; /* c2(1, 3, 2) */
+        const real c1_1_2 = sin2 * n2_c1_x + cos2 * n2_c1_y + s1_x * v1_y - t8 * sd2_y - t9 * sd2_z;
+        c1[1 * W + b] = c1_1_2; /* c1(1, 3, 2) */
         const real t36 = s2_x * s2_x;
         const real c2_2_2 = n2_c2_z + t36 + R(0.0641144);
-        c2_out[5 * W + b] = c2_2_2; /* c2(2, 3, 2) */
+        c2[5 * W + b] = c2_2_2; /* c2(2, 3, 2) */
         const real c1_2_2 = n2_c1_z + s2_x * v1_y + R(0.25320821471666355) * sd2_y;
-        c1_out[6 * W + b] = c1_2_2; /* c1(2, 3, 2) */
+        c1[6 * W + b] = c1_2_2; /* c1(2, 3, 2) */
         const real c1_3_2 = n2_c1_x - (t7 * sd2_y + s2_x * sd2_z);
-        c1_out[11 * W + b] = c1_3_2; /* c1(3, 3, 2) */
+        c1[11 * W + b] = c1_3_2; /* c1(3, 3, 2) */
         const real c1_4_2 = n2_c1_x - (t6 * sd2_y + t5 * sd2_z);
-        c1_out[16 * W + b] = c1_4_2; /* c1(4, 3, 2) */
+        c1[16 * W + b] = c1_4_2; /* c1(4, 3, 2) */
         const real c1_5_2 = n2_c1_x - (t4 * sd2_y + t3 * sd2_z);
-        c1_out[21 * W + b] = c1_5_2; /* c1(5, 3, 2) */
+        c1[21 * W + b] = c1_5_2; /* c1(5, 3, 2) */
         const real tau1_2 = tau1_1 + qdd2 * c2_1_2 + qd2 * c1_1_2;
         const real tau2_2 = tau2_1 + qdd1 * c2_1_2 + qdd2 * c2_2_2 + qd2 * c1_2_2;
         const real tau3_2 = tau3_1 + qd2 * c1_3_2;
@@ -162,76 +161,76 @@ KERNEL(link_3_decomposition)(
         const real n3_c1_y = t27 + t29 + qd2 * t24;
         const real n3_c1_z = t28 - (t32 + w1_y * n2_c2_z);
         const real c2_1_3 = n1_c2_x + t7 * t8 + s2_x * t9;
-        c2_out[2 * W + b] = c2_1_3; /* c2(1, 3, 3) */
-        const real t37 = c2 * n3_c1_y;
+        c2[2 * W + b] = c2_1_3; /* c2(1, 3, 3) */
+        const real t37 = cos2 * n3_c1_y;
         const real c1_1_3 = t37 + s1_x * sd3_x - t8 * sd3_y + t9 * t13;
-        c1_out[2 * W + b] = c1_1_3; /* c1(1, 3, 3) */
+        c1[2 * W + b] = c1_1_3; /* c1(1, 3, 3) */
         const real t38 = t20 + R(0.25320821471666355) * t7;
-        c2_out[6 * W + b] = -t38; /* c2(2, 3, 3) */
+        c2[6 * W + b] = -t38; /* c2(2, 3, 3) */
         const real c1_2_3 = n3_c1_z + s2_x * sd3_x + R(0.25320821471666355) * sd3_y;
-        c1_out[7 * W + b] = c1_2_3; /* c1(2, 3, 3) */
+        c1[7 * W + b] = c1_2_3; /* c1(2, 3, 3) */
         const real c2_3_3 = R(0.0101) + t36 + t7 * t7;
-        c2_out[9 * W + b] = c2_3_3; /* c2(3, 3, 3) */
+        c2[9 * W + b] = c2_3_3; /* c2(3, 3, 3) */
         const real c1_3_3 = s2_x * t13 - t7 * sd3_y;
-        c1_out[12 * W + b] = c1_3_3; /* c1(3, 3, 3) */
+        c1[12 * W + b] = c1_3_3; /* c1(3, 3, 3) */
         const real c1_4_3 = t5 * t13 - t6 * sd3_y;
-        c1_out[17 * W + b] = c1_4_3; /* c1(4, 3, 3) */
+        c1[17 * W + b] = c1_4_3; /* c1(4, 3, 3) */
         const real c1_5_3 = t3 * t13 - t4 * sd3_y;
-        c1_out[22 * W + b] = c1_5_3; /* c1(5, 3, 3) */
+        c1[22 * W + b] = c1_5_3; /* c1(5, 3, 3) */
         const real tau1_3 = tau1_2 + qdd3 * c2_1_3 + qd3 * c1_1_3;
         const real tau2_3 = tau2_2 - qdd3 * t38 + qd3 * c1_2_3;
         const real tau3_3 = tau3_2 + qdd1 * c2_1_3 - qdd2 * t38 + qdd3 * c2_3_3 + qd3 * c1_3_3;
         const real tau4_3 = tau4_2 + qd3 * c1_4_3;
         const real tau5_3 = tau5_2 + qd3 * c1_5_3;
         const real c2_1_4 = n1_c2_x + t6 * t8 + t5 * t9;
-        c2_out[3 * W + b] = c2_1_4; /* c2(1, 3, 4) */
+        c2[3 * W + b] = c2_1_4; /* c2(1, 3, 4) */
         const real c1_1_4 = t37 + s1_x * sd4_x - t8 * sd4_y + t9 * t14;
-        c1_out[3 * W + b] = c1_1_4; /* c1(1, 3, 4) */
+        c1[3 * W + b] = c1_1_4; /* c1(1, 3, 4) */
         const real t39 = t20 + R(0.25320821471666355) * t6;
-        c2_out[7 * W + b] = -t39; /* c2(2, 3, 4) */
+        c2[7 * W + b] = -t39; /* c2(2, 3, 4) */
         const real c1_2_4 = n3_c1_z + s2_x * sd4_x + R(0.25320821471666355) * sd4_y;
-        c1_out[8 * W + b] = c1_2_4; /* c1(2, 3, 4) */
+        c1[8 * W + b] = c1_2_4; /* c1(2, 3, 4) */
         const real c2_3_4 = R(0.0101) + t6 * t7 + t5 * s2_x;
-        c2_out[10 * W + b] = c2_3_4; /* c2(3, 3, 4) */
+        c2[10 * W + b] = c2_3_4; /* c2(3, 3, 4) */
         const real c1_3_4 = s2_x * t14 - t7 * sd4_y;
-        c1_out[13 * W + b] = c1_3_4; /* c1(3, 3, 4) */
+        c1[13 * W + b] = c1_3_4; /* c1(3, 3, 4) */
         const real c2_4_4 = R(0.0101) + t6 * t6 + t5 * t5;
-        c2_out[12 * W + b] = c2_4_4; /* c2(4, 3, 4) */
+        c2[12 * W + b] = c2_4_4; /* c2(4, 3, 4) */
         const real c1_4_4 = t5 * t14 - t6 * sd4_y;
-        c1_out[18 * W + b] = c1_4_4; /* c1(4, 3, 4) */
+        c1[18 * W + b] = c1_4_4; /* c1(4, 3, 4) */
         const real c1_5_4 = t3 * t14 - t4 * sd4_y;
-        c1_out[23 * W + b] = c1_5_4; /* c1(5, 3, 4) */
+        c1[23 * W + b] = c1_5_4; /* c1(5, 3, 4) */
         const real tau1_4 = tau1_3 + qdd4 * c2_1_4 + qd4 * c1_1_4;
         const real tau2_4 = tau2_3 - qdd4 * t39 + qd4 * c1_2_4;
         const real tau3_4 = tau3_3 + qdd4 * c2_3_4 + qd4 * c1_3_4;
         const real tau4_4 = tau4_3 + qdd1 * c2_1_4 - qdd2 * t39 + qdd3 * c2_3_4 + qdd4 * c2_4_4 + qd4 * c1_4_4;
         const real tau5_4 = tau5_3 + qd4 * c1_5_4;
         const real c2_1_5 = n1_c2_x + t4 * t8 + t3 * t9;
-        c2_out[4 * W + b] = c2_1_5; /* c2(1, 3, 5) */
+        c2[4 * W + b] = c2_1_5; /* c2(1, 3, 5) */
         const real c1_1_5 = t37 + s1_x * sd5_x - t8 * sd5_y + t9 * t15;
-        c1_out[4 * W + b] = c1_1_5; /* c1(1, 3, 5) */
-        tau_out[0 * W + b] = tau1_4 + qdd5 * c2_1_5 + qd5 * c1_1_5; /* tau(1, 3) */
+        c1[4 * W + b] = c1_1_5; /* c1(1, 3, 5) */
+        tau[0 * W + b] = tau1_4 + qdd5 * c2_1_5 + qd5 * c1_1_5; /* tau(1, 3) */
         const real t40 = t20 + R(0.25320821471666355) * t4;
-        c2_out[8 * W + b] = -t40; /* c2(2, 3, 5) */
+        c2[8 * W + b] = -t40; /* c2(2, 3, 5) */
         const real c1_2_5 = n3_c1_z + s2_x * sd5_x + R(0.25320821471666355) * sd5_y;
-        c1_out[9 * W + b] = c1_2_5; /* c1(2, 3, 5) */
-        tau_out[1 * W + b] = tau2_4 - qdd5 * t40 + qd5 * c1_2_5; /* tau(2, 3) */
+        c1[9 * W + b] = c1_2_5; /* c1(2, 3, 5) */
+        tau[1 * W + b] = tau2_4 - qdd5 * t40 + qd5 * c1_2_5; /* tau(2, 3) */
         const real c2_3_5 = R(0.0101) + t4 * t7 + t3 * s2_x;
-        c2_out[11 * W + b] = c2_3_5; /* c2(3, 3, 5) */
+        c2[11 * W + b] = c2_3_5; /* c2(3, 3, 5) */
         const real c1_3_5 = s2_x * t15 - t7 * sd5_y;
-        c1_out[14 * W + b] = c1_3_5; /* c1(3, 3, 5) */
-        tau_out[2 * W + b] = tau3_4 + qdd5 * c2_3_5 + qd5 * c1_3_5; /* tau(3, 3) */
+        c1[14 * W + b] = c1_3_5; /* c1(3, 3, 5) */
+        tau[2 * W + b] = tau3_4 + qdd5 * c2_3_5 + qd5 * c1_3_5; /* tau(3, 3) */
         const real c2_4_5 = R(0.0101) + t4 * t6 + t3 * t5;
-        c2_out[13 * W + b] = c2_4_5; /* c2(4, 3, 5) */
+        c2[13 * W + b] = c2_4_5; /* c2(4, 3, 5) */
         const real c1_4_5 = t5 * t15 - t6 * sd5_y;
-        c1_out[19 * W + b] = c1_4_5; /* c1(4, 3, 5) */
-        tau_out[3 * W + b] = tau4_4 + qdd5 * c2_4_5 + qd5 * c1_4_5; /* tau(4, 3) */
+        c1[19 * W + b] = c1_4_5; /* c1(4, 3, 5) */
+        tau[3 * W + b] = tau4_4 + qdd5 * c2_4_5 + qd5 * c1_4_5; /* tau(4, 3) */
         const real c2_5_5 = R(0.0101) + t4 * t4 + t3 * t3;
-        c2_out[14 * W + b] = c2_5_5; /* c2(5, 3, 5) */
+        c2[14 * W + b] = c2_5_5; /* c2(5, 3, 5) */
         const real c1_5_5 = t3 * t15 - t4 * sd5_y;
-        c1_out[24 * W + b] = c1_5_5; /* c1(5, 3, 5) */
+        c1[24 * W + b] = c1_5_5; /* c1(5, 3, 5) */
         const real t41 = tau5_4 + qdd1 * c2_1_5 - qdd2 * t40 + qdd3 * c2_3_5 + qdd4 * c2_4_5 + qdd5 * c2_5_5;
-        tau_out[4 * W + b] = t41 + qd5 * c1_5_5; /* tau(5, 3) */
+        tau[4 * W + b] = t41 + qd5 * c1_5_5; /* tau(5, 3) */
     }
 }
 #endif
@@ -240,7 +239,7 @@ KERNEL(link_3_decomposition)(
 /* Torques alone: 270 additions and multiplications, 8 sines and cosines apart. */
 KERNEL(link_3_torque)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -254,24 +253,24 @@ KERNEL(link_3_torque)(
         const real qdd3 = qdd[2 * W + b];
         const real qdd4 = qdd[3 * W + b];
         const real qdd5 = qdd[4 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s4 = sine[3 * W + b];
-        const real s5 = sine[4 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c4 = cosine[3 * W + b];
-        const real c5 = cosine[4 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin4 = sine[3 * W + b];
+        const real sin5 = sine[4 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos4 = cosine[3 * W + b];
+        const real cos5 = cosine[4 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x4_y = c3 * c4 - s3 * s4;
-        const real x4_z = s3 * c4 + c3 * s4;
-        const real x5_y = c5 * x4_y - s5 * x4_z;
-        const real x5_z = c5 * x4_z + s5 * x4_y;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
-        const real wd1_x = qdd1 * s2;
-        const real wd1_y = qdd1 * c2;
+        const real x4_y = cos3 * cos4 - sin3 * sin4;
+        const real x4_z = sin3 * cos4 + cos3 * sin4;
+        const real x5_y = cos5 * x4_y - sin5 * x4_z;
+        const real x5_z = cos5 * x4_z + sin5 * x4_y;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
+        const real wd1_x = qdd1 * sin2;
+        const real wd1_y = qdd1 * cos2;
         const real wd2_x = wd1_x + qd2 * w1_y;
         const real wd2_y = wd1_y - qd2 * w1_x;
         const real w3_x = qd3 + w1_x;
@@ -290,11 +289,11 @@ KERNEL(link_3_torque)(
         const real t2 = R(0.020114671262538696) * x5_y - R(0.15618450627382988) * x5_z;
         const real t3 = t1 + R(0.3313004678535785) * x4_y + R(0.023664319132398463) * x4_z;
         const real t4 = t2 + R(0.023664319132398463) * x4_y - R(0.3313004678535785) * x4_z;
-        const real s2_x = t3 - R(0.43778990394937156) * c3;
-        const real t5 = t4 + R(0.43778990394937156) * s3;
-        const real s1_x = c2 * t5;
-        const real t6 = s2 * t5;
-        const real t7 = R(0.25320821471666355) * c2 + s2 * s2_x;
+        const real s2_x = t3 - R(0.43778990394937156) * cos3;
+        const real t5 = t4 + R(0.43778990394937156) * sin3;
+        const real s1_x = cos2 * t5;
+        const real t6 = sin2 * t5;
+        const real t7 = R(0.25320821471666355) * cos2 + sin2 * s2_x;
         const real v4_y = qd5 * t2;
         const real v4_z = qd5 * t1;
         const real v3_y = v4_y + qd4 * t4;
@@ -305,7 +304,7 @@ KERNEL(link_3_torque)(
         const real v1_y = v2_y - R(0.25320821471666355) * qd2;
         const real v0_y = v1_y + qd1 * t6;
         const real v0_z = v2_z + qd1 * t7;
-        const real sd1_y = s2 * v0_z;
+        const real sd1_y = sin2 * v0_z;
         const real t8 = w1_y * s2_x;
         const real sd2_z = R(0.25320821471666355) * w1_x - t8;
         const real sd3_x = qd2 * t5 - t8;
@@ -314,11 +313,11 @@ KERNEL(link_3_torque)(
         const real sd4_y = v3_z + w3_x * t3;
         const real sd5_x = qd2 * t2 - w1_y * t1;
         const real sd5_y = v4_z + w4_x * t1;
-        const real t9 = R(11.607348534441448) * c2 + qd1 * sd1_y - qdd1 * t6 + qd2 * sd2_y;
-        const real t10 = qdd2 * s2_x + qdd1 * s1_x + R(11.607348534441448) * s2 - qd1 * (c2 * v0_z) + qd2 * v1_y;
-        const real t11 = qd2 * sd2_z - (qd1 * (c2 * (sd2_y + qd1 * s1_x) + s2 * v0_y) + qdd1 * t7);
-        const real t12 = t10 + qd3 * sd3_x + qd4 * sd4_x + qd5 * sd5_x;
-        const real t13 = R(0.25320821471666355) * qdd2 + t9 + qd3 * sd3_y - qdd3 * t5 + qd4 * sd4_y - qdd4 * t4;
+        const real t9 = qdd1 * s1_x + R(11.607348534441448) * sin2 - qd1 * (cos2 * v0_z) + qd2 * v1_y;
+        const real t10 = R(11.607348534441448) * cos2 + qd1 * sd1_y - qdd1 * t6 + qd2 * sd2_y;
+        const real t11 = qd2 * sd2_z - (qd1 * (cos2 * (sd2_y + qd1 * s1_x) + sin2 * v0_y) + qdd1 * t7);
+        const real t12 = qdd2 * s2_x + t9 + qd3 * sd3_x + qd4 * sd4_x + qd5 * sd5_x;
+        const real t13 = R(0.25320821471666355) * qdd2 + t10 + qd3 * sd3_y - qdd3 * t5 + qd4 * sd4_y - qdd4 * t4;
         const real t14 = t13 + qd5 * sd5_y - qdd5 * t2;
         const real t15 = t11 - qd3 * (v2_y + w1_x * t5) - qdd3 * s2_x - qd4 * (v3_y + w3_x * t4) - qdd4 * t3;
         const real t16 = t15 - qd5 * (v4_y + w4_x * t2) - qdd5 * t1;
@@ -339,14 +338,14 @@ KERNEL(link_3_torque)(
         const real t29 = w5_x * (R(0.00055) * w1_y + w5_x * n3_c2_y) - w1_y * (w1_y * n3_c2_y + w5_x * t22);
         const real t30 = w1_y * (qd2 * t22 - w1_y * t23) - w5_x * (t25 + t26) + qd2 * (qd2 * t23 - w1_y * t24);
         const real t31 = R(0.0101) * wd5_x + wd5_y * n3_c2_y - wd5_z * t21 + t30;
-        tau_out[2 * W + b] = t31 - (t5 * t14 + s2_x * t16); /* tau(3, 3) */
-        tau_out[3 * W + b] = t31 - (t4 * t14 + t3 * t16); /* tau(4, 3) */
-        tau_out[4 * W + b] = t31 - (t2 * t14 + t1 * t16); /* tau(5, 3) */
+        tau[2 * W + b] = t31 - (t5 * t14 + s2_x * t16); /* tau(3, 3) */
+        tau[3 * W + b] = t31 - (t4 * t14 + t3 * t16); /* tau(4, 3) */
+        tau[4 * W + b] = t31 - (t2 * t14 + t1 * t16); /* tau(5, 3) */
         const real t32 = wd5_x * n3_c2_y + wd5_y * (R(0.01065) - t22) - wd5_z * t23;
-        const real t33 = s2 * t31 + c2 * (t32 + t28 + qd2 * (w5_x * t24 - qd2 * t21));
-        tau_out[0 * W + b] = t33 + s1_x * t12 - t6 * t14 - t7 * t16; /* tau(1, 3) */
+        const real t33 = sin2 * t31 + cos2 * (t32 + t28 + qd2 * (w5_x * t24 - qd2 * t21));
+        tau[0 * W + b] = t33 + s1_x * t12 - t6 * t14 - t7 * t16; /* tau(1, 3) */
         const real t34 = wd5_z * n2_c2_z - (wd5_x * t21 + wd5_y * t23) + t29 + qd2 * (t26 - t27);
-        tau_out[1 * W + b] = t34 + s2_x * t12 + R(0.25320821471666355) * t14; /* tau(2, 3) */
+        tau[1 * W + b] = t34 + s2_x * t12 + R(0.25320821471666355) * t14; /* tau(2, 3) */
     }
 }
 #endif
@@ -355,7 +354,7 @@ KERNEL(link_3_torque)(
 /* Position gradient: 614 additions and multiplications, 8 sines and cosines apart. */
 KERNEL(link_3_position_gradient)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -369,25 +368,25 @@ KERNEL(link_3_position_gradient)(
         const real qdd3 = qdd[2 * W + b];
         const real qdd4 = qdd[3 * W + b];
         const real qdd5 = qdd[4 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s4 = sine[3 * W + b];
-        const real s5 = sine[4 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c4 = cosine[3 * W + b];
-        const real c5 = cosine[4 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin4 = sine[3 * W + b];
+        const real sin5 = sine[4 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos4 = cosine[3 * W + b];
+        const real cos5 = cosine[4 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c0_out[5 * W + b] = R(0.0); /* c0(2, 3, 1) */
-        const real x4_y = c3 * c4 - s3 * s4;
-        const real x4_z = s3 * c4 + c3 * s4;
-        const real x5_y = c5 * x4_y - s5 * x4_z;
-        const real x5_z = c5 * x4_z + s5 * x4_y;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
-        const real wd1_x = qdd1 * s2;
-        const real wd1_y = qdd1 * c2;
+        c0[5 * W + b] = R(0.0); /* c0(2, 3, 1) */
+        const real x4_y = cos3 * cos4 - sin3 * sin4;
+        const real x4_z = sin3 * cos4 + cos3 * sin4;
+        const real x5_y = cos5 * x4_y - sin5 * x4_z;
+        const real x5_z = cos5 * x4_z + sin5 * x4_y;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
+        const real wd1_x = qdd1 * sin2;
+        const real wd1_y = qdd1 * cos2;
         const real t1 = w1_y * w1_y;
         const real t2 = w1_x * w1_x + t1;
         const real t3 = qd2 * w1_x;
@@ -412,17 +411,17 @@ KERNEL(link_3_position_gradient)(
         const real wd5_x = qdd5 + wd4_x;
         const real wd5_y = wd4_y + qd2 * qd5;
         const real wd5_z = wd4_z - qd5 * w1_y;
-        const real t11 = R(11.607348534441448) * s2;
-        const real t12 = R(11.607348534441448) * c2;
+        const real t11 = R(11.607348534441448) * sin2;
+        const real t12 = R(11.607348534441448) * cos2;
         const real t13 = R(0.15618450627382988) * x5_y + R(0.020114671262538696) * x5_z;
         const real t14 = R(0.020114671262538696) * x5_y - R(0.15618450627382988) * x5_z;
         const real t15 = t13 + R(0.3313004678535785) * x4_y + R(0.023664319132398463) * x4_z;
         const real t16 = t14 + R(0.023664319132398463) * x4_y - R(0.3313004678535785) * x4_z;
-        const real s2_x = t15 - R(0.43778990394937156) * c3;
-        const real t17 = t16 + R(0.43778990394937156) * s3;
-        const real s1_x = c2 * t17;
-        const real t18 = s2 * t17;
-        const real t19 = R(0.25320821471666355) * c2 + s2 * s2_x;
+        const real s2_x = t15 - R(0.43778990394937156) * cos3;
+        const real t17 = t16 + R(0.43778990394937156) * sin3;
+        const real s1_x = cos2 * t17;
+        const real t18 = sin2 * t17;
+        const real t19 = R(0.25320821471666355) * cos2 + sin2 * s2_x;
         const real v4_y = qd5 * t14;
         const real v4_z = qd5 * t13;
         const real v3_y = v4_y + qd4 * t16;
@@ -433,7 +432,7 @@ KERNEL(link_3_position_gradient)(
         const real v1_y = v2_y - R(0.25320821471666355) * qd2;
         const real v0_y = v1_y + qd1 * t18;
         const real v0_z = v2_z + qd1 * t19;
-        const real sd1_y = s2 * v0_z;
+        const real sd1_y = sin2 * v0_z;
         const real t20 = w1_y * s2_x;
         const real sd2_z = R(0.25320821471666355) * w1_x - t20;
         const real sd3_x = qd2 * t17 - t20;
@@ -445,16 +444,16 @@ KERNEL(link_3_position_gradient)(
         const real sd5_x = qd2 * t14 - w1_y * t13;
         const real sd5_y = v4_z + w4_x * t13;
         const real t23 = v4_y + w4_x * t14;
-        const real t24 = c2 * t11 - s2 * t12;
-        c0_out[10 * W + b] = -s2_x * t24; /* c0(3, 3, 1) */
-        c0_out[15 * W + b] = -t15 * t24; /* c0(4, 3, 1) */
-        c0_out[20 * W + b] = -t13 * t24; /* c0(5, 3, 1) */
-        const real t25 = qdd1 * s1_x + t11 - qd1 * (c2 * v0_z);
+        const real t24 = cos2 * t11 - sin2 * t12;
+        c0[10 * W + b] = -s2_x * t24; /* c0(3, 3, 1) */
+        c0[15 * W + b] = -t15 * t24; /* c0(4, 3, 1) */
+        c0[20 * W + b] = -t13 * t24; /* c0(5, 3, 1) */
+        const real t25 = qdd1 * s1_x + t11 - qd1 * (cos2 * v0_z);
         const real t26 = t12 + qd1 * sd1_y - qdd1 * t18;
         const real t27 = w1_y * v2_z - w1_x * sd2_z - t25;
         const real t28 = R(0.25320821471666355) * wd1_x - wd1_y * s2_x + R(2.0) * (w1_x * sd2_y - w1_y * v1_y);
         const real t29 = R(0.25320821471666355) * qdd2 + t26 + qd2 * sd2_y;
-        const real t30 = qd2 * sd2_z - (qd1 * (c2 * (sd2_y + qd1 * s1_x) + s2 * v0_y) + qdd1 * t19);
+        const real t30 = qd2 * sd2_z - (qd1 * (cos2 * (sd2_y + qd1 * s1_x) + sin2 * v0_y) + qdd1 * t19);
         const real t31 = qdd2 * t17 - wd2_y * s2_x - (w1_y * t21 + qd2 * sd3_y + w1_y * v2_y + qd2 * v2_z);
         const real t32 = t30 + wd2_x * s2_x + qd2 * sd3_x + w1_x * t21;
         const real t33 = w1_x * sd3_y - w1_y * sd3_x - (t29 + wd2_x * t17);
@@ -494,59 +493,60 @@ KERNEL(link_3_position_gradient)(
         const real t65 = t55 - t60;
         const real t66 = wd5_x * n3_c2_y + wd5_y * t53 - wd5_z * t51 + w5_x * t57 + w1_y * t61 + qd2 * t64;
         const real t67 = wd5_z * n2_c2_z - (wd5_x * t49 + wd5_y * t51) + w5_x * t58 - w1_y * t62 + qd2 * t65;
-        const real t68 = s2 * (c2 * t67 + t19 * t43 - t18 * t44) - c2 * (s2 * t67 + t19 * t42 + s1_x * t44);
-        c0_out[0 * W + b] = t68 + s1_x * (c2 * t44) + t18 * (s2 * t44) - t19 * (t24 + s2 * t43 - c2 * t42); /* c0(1, 3, 1) */
-        const real t69 = R(0.0101) * wd1_y - wd1_x * n3_c2_y + t2 * t49 - R(2.0) * (w1_y * t56 + w1_x * t59);
-        c0_out[11 * W + b] = t69 - (t17 * t27 + s2_x * t28); /* c0(3, 3, 2) */
-        c0_out[16 * W + b] = t69 - (t16 * t27 + t15 * t28); /* c0(4, 3, 2) */
-        c0_out[21 * W + b] = t69 - (t14 * t27 + t13 * t28); /* c0(5, 3, 2) */
-        const real t70 = s2_x * t43;
-        const real t71 = R(0.0101) * wd5_x + wd5_y * n3_c2_y - wd5_z * t49 + w1_y * t59 - w5_x * t56 + qd2 * t63;
-        const real t72 = wd1_y * n3_c2_y - wd1_x * t53 + t2 * t51 + R(2.0) * (w1_y * t57 - w1_x * t61);
-        const real t73 = wd1_x * t51 - wd1_y * t49 - t2 * n2_c2_z + R(2.0) * (w1_y * t58 + w1_x * t62);
-        const real t74 = t26 + w1_y * sd2_z + w1_x * v2_z - t43;
-        const real t75 = t27 + t42;
-        c0_out[6 * W + b] = t73 + t70 - R(0.25320821471666355) * t42 + s2_x * t74 + R(0.25320821471666355) * t75; /* c0(2, 3, 2) */
-        const real t76 = s2 * (t69 + R(0.25320821471666355) * t44 - t66) + c2 * (t72 + t71 - s2_x * t44);
-        c0_out[1 * W + b] = t76 + s1_x * t74 - t18 * t75 - t19 * t28; /* c0(1, 3, 2) */
-        const real t77 = R(0.0101) * t4;
-        const real t78 = t4 * n3_c2_y;
-        const real t79 = t4 * t49;
-        const real t80 = R(2.0) * (qd2 * t59 - w1_y * t63);
-        const real t81 = R(2.0) * (qd2 * t61 - w1_y * t64);
-        const real t82 = R(2.0) * (qd2 * t62 + w1_y * t65);
-        const real t83 = t5 * n3_c2_y - t77 - t6 * t49 + t80;
-        c0_out[17 * W + b] = t83 - (t16 * t32 + t15 * t33); /* c0(4, 3, 3) */
-        c0_out[22 * W + b] = t83 - (t14 * t32 + t13 * t33); /* c0(5, 3, 3) */
-        const real t84 = t83 + t70 - t17 * t44;
-        const real t85 = t32 - t44;
-        const real t86 = t33 + t43;
-        c0_out[12 * W + b] = t84 - (t17 * t85 + s2_x * t86); /* c0(3, 3, 3) */
-        const real t87 = s2 * t84 + c2 * (t5 * t53 - t78 - t6 * t51 + t81 - (t67 + s2_x * t42));
-        c0_out[2 * W + b] = t87 + s1_x * t31 - t18 * t85 - t19 * t86; /* c0(1, 3, 3) */
-        const real t88 = t79 - t5 * t51 + t6 * n2_c2_z - t82 + t66 + t17 * t42;
-        c0_out[7 * W + b] = t88 + s2_x * t31 + R(0.25320821471666355) * t85; /* c0(2, 3, 3) */
-        const real t89 = t80 + t7 * n3_c2_y - t77 - t8 * t49;
-        c0_out[23 * W + b] = t89 - (t14 * t37 + t13 * t38); /* c0(5, 3, 4) */
-        const real t90 = t89 + t15 * t43 - t16 * t44;
-        const real t91 = t37 - t44;
-        const real t92 = t38 + t43;
-        c0_out[13 * W + b] = t90 - (t17 * t91 + s2_x * t92); /* c0(3, 3, 4) */
-        c0_out[18 * W + b] = t90 - (t16 * t91 + t15 * t92); /* c0(4, 3, 4) */
-        const real t93 = s2 * t90 + c2 * (t81 + t7 * t53 - t78 - t8 * t51 - (t67 + t15 * t42));
-        c0_out[3 * W + b] = t93 + s1_x * t36 - t18 * t91 - t19 * t92; /* c0(1, 3, 4) */
-        const real t94 = t79 - t7 * t51 + t8 * n2_c2_z - t82 + t66 + t16 * t42;
-        c0_out[8 * W + b] = t94 + s2_x * t36 + R(0.25320821471666355) * t91; /* c0(2, 3, 4) */
-        const real t95 = t80 + t9 * n3_c2_y - t77 - t10 * t49 + t13 * t43 - t14 * t44;
-        const real t96 = t40 + wd4_x * t13 + qd2 * sd5_x + w4_x * t23 - t44;
-        const real t97 = w4_x * sd5_y - w1_y * sd5_x - (t39 + wd4_x * t14) + t43;
-        c0_out[14 * W + b] = t95 - (t17 * t96 + s2_x * t97); /* c0(3, 3, 5) */
-        c0_out[19 * W + b] = t95 - (t16 * t96 + t15 * t97); /* c0(4, 3, 5) */
-        c0_out[24 * W + b] = t95 - (t14 * t96 + t13 * t97); /* c0(5, 3, 5) */
-        const real t98 = s2 * t95 + c2 * (t81 + t9 * t53 - t78 - t10 * t51 - (t67 + t13 * t42));
-        c0_out[4 * W + b] = t98 + s1_x * t41 - t18 * t96 - t19 * t97; /* c0(1, 3, 5) */
-        const real t99 = t79 - t9 * t51 + t10 * n2_c2_z - t82 + t66 + t14 * t42;
-        c0_out[9 * W + b] = t99 + s2_x * t41 + R(0.25320821471666355) * t96; /* c0(2, 3, 5) */
+        const real t68 = cos2 * (sin2 * t67 + t19 * t42 + s1_x * t44);
+        const real t69 = s1_x * (cos2 * t44) + t18 * (sin2 * t44) - t19 * (t24 + sin2 * t43 - cos2 * t42);
+        c0[0 * W + b] = sin2 * (cos2 * t67 + t19 * t43 - t18 * t44) - t68 + t69; /* c0(1, 3, 1) */
+        const real t70 = R(0.0101) * wd1_y - wd1_x * n3_c2_y + t2 * t49 - R(2.0) * (w1_y * t56 + w1_x * t59);
+        c0[11 * W + b] = t70 - (t17 * t27 + s2_x * t28); /* c0(3, 3, 2) */
+        c0[16 * W + b] = t70 - (t16 * t27 + t15 * t28); /* c0(4, 3, 2) */
+        c0[21 * W + b] = t70 - (t14 * t27 + t13 * t28); /* c0(5, 3, 2) */
+        const real t71 = s2_x * t43;
+        const real t72 = R(0.0101) * wd5_x + wd5_y * n3_c2_y - wd5_z * t49 + w1_y * t59 - w5_x * t56 + qd2 * t63;
+        const real t73 = wd1_y * n3_c2_y - wd1_x * t53 + t2 * t51 + R(2.0) * (w1_y * t57 - w1_x * t61);
+        const real t74 = wd1_x * t51 - wd1_y * t49 - t2 * n2_c2_z + R(2.0) * (w1_y * t58 + w1_x * t62);
+        const real t75 = t26 + w1_y * sd2_z + w1_x * v2_z - t43;
+        const real t76 = t27 + t42;
+        c0[6 * W + b] = t74 + t71 - R(0.25320821471666355) * t42 + s2_x * t75 + R(0.25320821471666355) * t76; /* c0(2, 3, 2) */
+        const real t77 = sin2 * (t70 + R(0.25320821471666355) * t44 - t66) + cos2 * (t73 + t72 - s2_x * t44);
+        c0[1 * W + b] = t77 + s1_x * t75 - t18 * t76 - t19 * t28; /* c0(1, 3, 2) */
+        const real t78 = R(0.0101) * t4;
+        const real t79 = t4 * n3_c2_y;
+        const real t80 = t4 * t49;
+        const real t81 = R(2.0) * (qd2 * t59 - w1_y * t63);
+        const real t82 = R(2.0) * (qd2 * t61 - w1_y * t64);
+        const real t83 = R(2.0) * (qd2 * t62 + w1_y * t65);
+        const real t84 = t5 * n3_c2_y - t78 - t6 * t49 + t81;
+        c0[17 * W + b] = t84 - (t16 * t32 + t15 * t33); /* c0(4, 3, 3) */
+        c0[22 * W + b] = t84 - (t14 * t32 + t13 * t33); /* c0(5, 3, 3) */
+        const real t85 = t84 + t71 - t17 * t44;
+        const real t86 = t32 - t44;
+        const real t87 = t33 + t43;
+        c0[12 * W + b] = t85 - (t17 * t86 + s2_x * t87); /* c0(3, 3, 3) */
+        const real t88 = sin2 * t85 + cos2 * (t5 * t53 - t79 - t6 * t51 + t82 - (t67 + s2_x * t42));
+        c0[2 * W + b] = t88 + s1_x * t31 - t18 * t86 - t19 * t87; /* c0(1, 3, 3) */
+        const real t89 = t80 - t5 * t51 + t6 * n2_c2_z - t83 + t66 + t17 * t42;
+        c0[7 * W + b] = t89 + s2_x * t31 + R(0.25320821471666355) * t86; /* c0(2, 3, 3) */
+        const real t90 = t81 + t7 * n3_c2_y - t78 - t8 * t49;
+        c0[23 * W + b] = t90 - (t14 * t37 + t13 * t38); /* c0(5, 3, 4) */
+        const real t91 = t90 + t15 * t43 - t16 * t44;
+        const real t92 = t37 - t44;
+        const real t93 = t38 + t43;
+        c0[13 * W + b] = t91 - (t17 * t92 + s2_x * t93); /* c0(3, 3, 4) */
+        c0[18 * W + b] = t91 - (t16 * t92 + t15 * t93); /* c0(4, 3, 4) */
+        const real t94 = sin2 * t91 + cos2 * (t82 + t7 * t53 - t79 - t8 * t51 - (t67 + t15 * t42));
+        c0[3 * W + b] = t94 + s1_x * t36 - t18 * t92 - t19 * t93; /* c0(1, 3, 4) */
+        const real t95 = t80 - t7 * t51 + t8 * n2_c2_z - t83 + t66 + t16 * t42;
+        c0[8 * W + b] = t95 + s2_x * t36 + R(0.25320821471666355) * t92; /* c0(2, 3, 4) */
+        const real t96 = t81 + t9 * n3_c2_y - t78 - t10 * t49 + t13 * t43 - t14 * t44;
+        const real t97 = t40 + wd4_x * t13 + qd2 * sd5_x + w4_x * t23 - t44;
+        const real t98 = w4_x * sd5_y - w1_y * sd5_x - (t39 + wd4_x * t14) + t43;
+        c0[14 * W + b] = t96 - (t17 * t97 + s2_x * t98); /* c0(3, 3, 5) */
+        c0[19 * W + b] = t96 - (t16 * t97 + t15 * t98); /* c0(4, 3, 5) */
+        c0[24 * W + b] = t96 - (t14 * t97 + t13 * t98); /* c0(5, 3, 5) */
+        const real t99 = sin2 * t96 + cos2 * (t82 + t9 * t53 - t79 - t10 * t51 - (t67 + t13 * t42));
+        c0[4 * W + b] = t99 + s1_x * t41 - t18 * t97 - t19 * t98; /* c0(1, 3, 5) */
+        const real t100 = t80 - t9 * t51 + t10 * n2_c2_z - t83 + t66 + t14 * t42;
+        c0[9 * W + b] = t100 + s2_x * t41 + R(0.25320821471666355) * t97; /* c0(2, 3, 5) */
     }
 }
 #endif

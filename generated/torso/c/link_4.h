@@ -8,16 +8,15 @@
        axes    of the frame that joint 2 moves
        origin  where joint 2 is at the instant, at rest
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 315 additions and multiplications, 6 sines and cosines apart. */
 KERNEL(link_4_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -29,22 +28,22 @@ KERNEL(link_4_decomposition)(
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
         const real qdd6 = qdd[5 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s6 = sine[5 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c6 = cosine[5 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin6 = sine[5 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos6 = cosine[5 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x6_y = c3 * c6 - s3 * s6;
-        const real x6_z = s3 * c6 + c3 * s6;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
+        const real x6_y = cos3 * cos6 - sin3 * sin6;
+        const real x6_z = sin3 * cos6 + cos3 * sin6;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
         const real w3_x = qd3 + w1_x;
         const real w6_x = qd6 + w3_x;
-        const real t1 = R(0.37) * c3;
-        const real s6_y = R(0.37) * s3;
+        const real t1 = R(0.37) * cos3;
+        const real s6_y = R(0.37) * sin3;
         const real t2 = t1 - (R(0.125) * x6_y + R(0.008) * x6_z);
         const real t3 = R(0.008) * x6_y - R(0.125) * x6_z + s6_y;
         const real v6_y = qd6 * s6_y;
@@ -60,7 +59,7 @@ KERNEL(link_4_decomposition)(
         const real t10 = t9 + R(0.0014) * x6_z;
         const real n3_c2_y = R(0.0009) * x6_y + R(0.0002) * x6_z + R(0.4536) * t2;
         const real t11 = R(0.0002) * x6_y - R(0.0009) * x6_z - R(0.4536) * t3;
-        c2_out[5 * W + b] = -t11; /* c2(2, 4, 3) */
+        c2[5 * W + b] = -t11; /* c2(2, 4, 3) */
         const real t12 = t2 * f3_c2_z;
         const real t13 = x6_y * t8 + x6_z * t10 + t12;
         const real t14 = x6_z * t8 - x6_y * t10 + t3 * f3_c2_z;
@@ -68,10 +67,10 @@ KERNEL(link_4_decomposition)(
         const real t16 = x6_z * (R(0.0125) * x6_z - t9) + x6_y * (R(0.0014) * x6_y - t7) + t15;
         const real t17 = R(0.0156) + t15 + R(0.0979776) + t12;
         const real n3_c2_x = t17 - R(0.0996776);
-        c2_out[7 * W + b] = n3_c2_x; /* c2(3, 4, 3) */
+        c2[7 * W + b] = n3_c2_x; /* c2(3, 4, 3) */
         const real t18 = t17 - t13;
         const real n2_c2_z = t17 - t16;
-        c2_out[4 * W + b] = n2_c2_z; /* c2(2, 4, 2) */
+        c2[4 * W + b] = n2_c2_z; /* c2(2, 4, 2) */
         const real t19 = w1_y * t6;
         const real t20 = t19 - qd2 * f3_c2_z;
         const real t21 = R(0.4536) * qd2;
@@ -91,48 +90,48 @@ KERNEL(link_4_decomposition)(
         const real t35 = t27 - t30;
         const real t36 = w6_x * t11 - R(0.0996776) * qd2 + R(0.4536) * v6_y;
         const real t37 = R(0.0996776) * w1_y + w6_x * n3_c2_y - R(0.4536) * t4;
-        const real t38 = R(20.601) * s2;
-        const real t39 = R(20.601) * c2;
+        const real t38 = R(20.601) * sin2;
+        const real t39 = R(20.601) * cos2;
         const real t40 = t3 * t39;
-        g_out[2 * W + b] = -t40; /* g(3, 4) */
-        const real t41 = R(4.449816) * c2 + t2 * t38;
-        g_out[1 * W + b] = -t41; /* g(2, 4) */
-        const real g_1 = c2 * (t3 * t38) - s2 * t40;
-        g_out[0 * W + b] = g_1; /* g(1, 4) */
+        g[2 * W + b] = -t40; /* g(3, 4) */
+        const real t41 = R(4.449816) * cos2 + t2 * t38;
+        g[1 * W + b] = -t41; /* g(2, 4) */
+        const real g_1 = cos2 * (t3 * t38) - sin2 * t40;
+        g[0 * W + b] = g_1; /* g(1, 4) */
         const real g_6 = s6_y * t39 - t40;
-        g_out[3 * W + b] = g_6; /* g(6, 4) */
-        const real n1_c2_x = s2 * n3_c2_x + c2 * n3_c2_y;
-        c2_out[2 * W + b] = n1_c2_x; /* c2(1, 4, 3) */
-        const real n1_c2_y = s2 * n3_c2_y + c2 * t18;
-        const real t42 = s2 * t11 + c2 * t14;
-        c2_out[1 * W + b] = -t42; /* c2(1, 4, 2) */
-        const real n1_c1_x = s2 * t35 + c2 * (qd2 * t13 - t31);
-        c1_out[8 * W + b] = n1_c1_x; /* c1(3, 4, 1) */
-        const real n1_c1_y = s2 * t36 + c2 * (t28 + t32 + t27 - t25);
-        const real n1_c1_z = s2 * t37 + c2 * (t4 * f3_c2_z - (t33 + w6_x * t13));
-        c1_out[4 * W + b] = n1_c1_z; /* c1(2, 4, 1) */
-        const real f1_c1_z = s2 * t23 - c2 * t20;
-        const real c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y;
-        c2_out[0 * W + b] = c2_1_1; /* c2(1, 4, 1) */
-        const real c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y;
-        c1_out[0 * W + b] = c1_1_1; /* c1(1, 4, 1) */
-        const real c1_6_1 = n1_c1_x - (s6_y * (s2 * t24) + t1 * f1_c1_z);
-        c1_out[12 * W + b] = c1_6_1; /* c1(6, 4, 1) */
+        g[3 * W + b] = g_6; /* g(6, 4) */
+        const real n1_c2_x = sin2 * n3_c2_x + cos2 * n3_c2_y;
+        c2[2 * W + b] = n1_c2_x; /* c2(1, 4, 3) */
+        const real n1_c2_y = sin2 * n3_c2_y + cos2 * t18;
+        const real t42 = sin2 * t11 + cos2 * t14;
+        c2[1 * W + b] = -t42; /* c2(1, 4, 2) */
+        const real n1_c1_x = sin2 * t35 + cos2 * (qd2 * t13 - t31);
+        c1[8 * W + b] = n1_c1_x; /* c1(3, 4, 1) */
+        const real n1_c1_y = sin2 * t36 + cos2 * (t28 + t32 + t27 - t25);
+        const real n1_c1_z = sin2 * t37 + cos2 * (t4 * f3_c2_z - (t33 + w6_x * t13));
+        c1[4 * W + b] = n1_c1_z; /* c1(2, 4, 1) */
+        const real f1_c1_z = sin2 * t23 - cos2 * t20;
+        const real c2_1_1 = sin2 * n1_c2_x + cos2 * n1_c2_y;
+        c2[0 * W + b] = c2_1_1; /* c2(1, 4, 1) */
+        const real c1_1_1 = sin2 * n1_c1_x + cos2 * n1_c1_y;
+        c1[0 * W + b] = c1_1_1; /* c1(1, 4, 1) */
+        const real c1_6_1 = n1_c1_x - (s6_y * (sin2 * t24) + t1 * f1_c1_z);
+        c1[12 * W + b] = c1_6_1; /* c1(6, 4, 1) */
         const real tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1;
         const real tau2_1 = qd1 * n1_c1_z - t41;
         const real tau3_1 = qd1 * n1_c1_x - t40;
         const real tau6_1 = g_6 + qd1 * c1_6_1;
         const real f2_c1_z = w1_y * f3_c2_z - R(0.4536) * w1_x;
         const real n2_c1_x = t34 - w1_y * t16 + w1_y * n3_c2_x - w1_x * n3_c2_y;
-        c1_out[9 * W + b] = n2_c1_x; /* c1(3, 4, 2) */
+        c1[9 * W + b] = n2_c1_x; /* c1(3, 4, 2) */
         const real n2_c1_y = w6_x * t16 - qd2 * t11 - v6_y * t6 + t33 - w1_x * t18;
         const real n2_c1_z = t29 - t32 + t26 + t27 + w1_x * t14 - t29;
-        c1_out[5 * W + b] = n2_c1_z; /* c1(2, 4, 2) */
+        c1[5 * W + b] = n2_c1_z; /* c1(2, 4, 2) */
         const real f2_c1_y = t20 - t19;
-        const real c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y;
-        c1_out[1 * W + b] = c1_1_2; /* c1(1, 4, 2) */
+        const real c1_1_2 = sin2 * n2_c1_x + cos2 * n2_c1_y;
+        c1[1 * W + b] = c1_1_2; /* c1(1, 4, 2) */
         const real c1_6_2 = n2_c1_x + s6_y * f2_c1_y - t1 * f2_c1_z;
-        c1_out[13 * W + b] = c1_6_2; /* c1(6, 4, 2) */
+        c1[13 * W + b] = c1_6_2; /* c1(6, 4, 2) */
         const real tau1_2 = tau1_1 - qdd2 * t42 + qd2 * c1_1_2;
         const real tau2_2 = tau2_1 - qdd1 * t42 + qdd2 * n2_c2_z + qd2 * n2_c1_z;
         const real tau3_2 = tau3_1 + qd2 * n2_c1_x;
@@ -140,46 +139,46 @@ KERNEL(link_4_decomposition)(
         const real t43 = t31 + qd2 * t18;
         const real t44 = t34 + w1_y * n2_c2_z;
         const real n3_c1_x = t30 + t35;
-        c1_out[10 * W + b] = n3_c1_x; /* c1(3, 4, 3) */
+        c1[10 * W + b] = n3_c1_x; /* c1(3, 4, 3) */
         const real n3_c1_y = t36 + t43;
         const real n3_c1_z = t37 - t44;
-        c1_out[6 * W + b] = n3_c1_z; /* c1(2, 4, 3) */
+        c1[6 * W + b] = n3_c1_z; /* c1(2, 4, 3) */
         const real f3_c1_y = t22 - t24;
         const real f3_c1_z = t21 + t23;
-        const real c1_1_3 = s2 * n3_c1_x + c2 * n3_c1_y;
-        c1_out[2 * W + b] = c1_1_3; /* c1(1, 4, 3) */
+        const real c1_1_3 = sin2 * n3_c1_x + cos2 * n3_c1_y;
+        c1[2 * W + b] = c1_1_3; /* c1(1, 4, 3) */
         const real c1_6_3 = n3_c1_x + s6_y * f3_c1_y - t1 * f3_c1_z;
-        c1_out[14 * W + b] = c1_6_3; /* c1(6, 4, 3) */
+        c1[14 * W + b] = c1_6_3; /* c1(6, 4, 3) */
         const real tau1_3 = tau1_2 + qdd3 * n1_c2_x + qd3 * c1_1_3;
         const real tau2_3 = tau2_2 - qdd3 * t11 + qd3 * n3_c1_z;
         const real tau3_3 = tau3_2 + qdd1 * n1_c2_x - qdd2 * t11 + qdd3 * n3_c2_x + qd3 * n3_c1_x;
         const real tau6_3 = tau6_2 + qd3 * c1_6_3;
         const real n6_c2_x = n3_c2_x - (t1 * f3_c2_z + s6_y * t6);
-        c2_out[8 * W + b] = n6_c2_x; /* c2(3, 4, 6) */
-        const real n6_c2_y = n3_c2_y - R(0.167832) * c3;
-        const real t45 = t11 + R(0.167832) * s3;
-        c2_out[6 * W + b] = -t45; /* c2(2, 4, 6) */
-        const real f6_c2_y = R(0.777) * s3 - t6;
-        const real f6_c2_z = f3_c2_z - R(0.777) * c3;
+        c2[8 * W + b] = n6_c2_x; /* c2(3, 4, 6) */
+        const real n6_c2_y = n3_c2_y - R(0.167832) * cos3;
+        const real t45 = t11 + R(0.167832) * sin3;
+        c2[6 * W + b] = -t45; /* c2(2, 4, 6) */
+        const real f6_c2_y = R(0.777) * sin3 - t6;
+        const real f6_c2_z = f3_c2_z - R(0.777) * cos3;
         const real n6_c1_x = t35 + t30 + sd6_z * f3_c2_z - sd6_y * t6;
-        c1_out[11 * W + b] = n6_c1_x; /* c1(3, 4, 6) */
-        tau_out[2 * W + b] = tau3_3 + qdd6 * n6_c2_x + qd6 * n6_c1_x; /* tau(3, 4) */
+        c1[11 * W + b] = n6_c1_x; /* c1(3, 4, 6) */
+        tau[2 * W + b] = tau3_3 + qdd6 * n6_c2_x + qd6 * n6_c1_x; /* tau(3, 4) */
         const real n6_c1_y = t36 + t43 + R(0.4536) * sd6_z - t5 * t6;
         const real n6_c1_z = t37 + t5 * f3_c2_z - R(0.4536) * sd6_y - t44;
-        c1_out[7 * W + b] = n6_c1_z; /* c1(2, 4, 6) */
-        tau_out[1 * W + b] = tau2_3 - qdd6 * t45 + qd6 * n6_c1_z; /* tau(2, 4) */
+        c1[7 * W + b] = n6_c1_z; /* c1(2, 4, 6) */
+        tau[1 * W + b] = tau2_3 - qdd6 * t45 + qd6 * n6_c1_z; /* tau(2, 4) */
         const real f6_c1_y = t22 + R(2.1) * sd6_y - t24;
         const real f6_c1_z = t23 + t21 + R(2.1) * sd6_z;
-        const real c2_1_6 = s2 * n6_c2_x + c2 * n6_c2_y;
-        c2_out[3 * W + b] = c2_1_6; /* c2(1, 4, 6) */
-        const real c1_1_6 = s2 * n6_c1_x + c2 * n6_c1_y;
-        c1_out[3 * W + b] = c1_1_6; /* c1(1, 4, 6) */
-        tau_out[0 * W + b] = tau1_3 + qdd6 * c2_1_6 + qd6 * c1_1_6; /* tau(1, 4) */
+        const real c2_1_6 = sin2 * n6_c2_x + cos2 * n6_c2_y;
+        c2[3 * W + b] = c2_1_6; /* c2(1, 4, 6) */
+        const real c1_1_6 = sin2 * n6_c1_x + cos2 * n6_c1_y;
+        c1[3 * W + b] = c1_1_6; /* c1(1, 4, 6) */
+        tau[0 * W + b] = tau1_3 + qdd6 * c2_1_6 + qd6 * c1_1_6; /* tau(1, 4) */
         const real c2_6_6 = n6_c2_x + s6_y * f6_c2_y - t1 * f6_c2_z;
-        c2_out[9 * W + b] = c2_6_6; /* c2(6, 4, 6) */
+        c2[9 * W + b] = c2_6_6; /* c2(6, 4, 6) */
         const real c1_6_6 = n6_c1_x + s6_y * f6_c1_y - t1 * f6_c1_z;
-        c1_out[15 * W + b] = c1_6_6; /* c1(6, 4, 6) */
-        tau_out[3 * W + b] = tau6_3 + qdd1 * c2_1_6 - qdd2 * t45 + qdd3 * n6_c2_x + qdd6 * c2_6_6 + qd6 * c1_6_6; /* tau(6, 4) */
+        c1[15 * W + b] = c1_6_6; /* c1(6, 4, 6) */
+        tau[3 * W + b] = tau6_3 + qdd1 * c2_1_6 - qdd2 * t45 + qdd3 * n6_c2_x + qdd6 * c2_6_6 + qd6 * c1_6_6; /* tau(6, 4) */
     }
 }
 #endif
@@ -188,7 +187,7 @@ KERNEL(link_4_decomposition)(
 /* Torques alone: 220 additions and multiplications, 6 sines and cosines apart. */
 KERNEL(link_4_torque)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -200,20 +199,20 @@ KERNEL(link_4_torque)(
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
         const real qdd6 = qdd[5 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s6 = sine[5 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c6 = cosine[5 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin6 = sine[5 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos6 = cosine[5 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x6_y = c3 * c6 - s3 * s6;
-        const real x6_z = s3 * c6 + c3 * s6;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
-        const real wd1_x = qdd1 * s2;
-        const real wd1_y = qdd1 * c2;
+        const real x6_y = cos3 * cos6 - sin3 * sin6;
+        const real x6_z = sin3 * cos6 + cos3 * sin6;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
+        const real wd1_x = qdd1 * sin2;
+        const real wd1_y = qdd1 * cos2;
         const real wd2_x = wd1_x + qd2 * w1_y;
         const real wd2_y = wd1_y - qd2 * w1_x;
         const real w3_x = qd3 + w1_x;
@@ -224,16 +223,16 @@ KERNEL(link_4_torque)(
         const real wd6_x = qdd6 + wd3_x;
         const real wd6_y = wd3_y + qd2 * qd6;
         const real wd6_z = wd3_z - qd6 * w1_y;
-        const real t1 = R(0.37) * c3;
-        const real s6_y = R(0.37) * s3;
+        const real t1 = R(0.37) * cos3;
+        const real s6_y = R(0.37) * sin3;
         const real t2 = t1 - (R(0.125) * x6_y + R(0.008) * x6_z);
         const real t3 = R(0.008) * x6_y - R(0.125) * x6_z + s6_y;
         const real v6_y = qd6 * s6_y;
         const real t4 = qd6 * t1;
         const real sd6_y = w3_x * t1;
         const real sd6_z = w3_x * s6_y;
-        const real t5 = R(9.81) * s2 - qd6 * (w1_y * t1 + qd2 * s6_y);
-        const real t6 = qdd6 * s6_y + R(9.81) * c2 + qd6 * sd6_y;
+        const real t5 = R(9.81) * sin2 - qd6 * (w1_y * t1 + qd2 * s6_y);
+        const real t6 = qdd6 * s6_y + R(9.81) * cos2 + qd6 * sd6_y;
         const real t7 = qd6 * sd6_z - qdd6 * t1;
         const real f3_c2_z = R(2.1) * t2;
         const real t8 = R(2.1) * t3;
@@ -264,16 +263,16 @@ KERNEL(link_4_torque)(
         const real t30 = t29 + w1_y * (t4 * f3_c2_z - (w1_y * n3_c2_y + w6_x * t15));
         const real t31 = t7 * f3_c2_z - t6 * t8 + wd6_x * n3_c2_x + wd6_y * n3_c2_y - wd6_z * t13;
         const real t32 = t31 + t27 + qd2 * (qd2 * t16 - w1_y * t18);
-        tau_out[2 * W + b] = t32; /* tau(3, 4) */
+        tau[2 * W + b] = t32; /* tau(3, 4) */
         const real t33 = t28 + w1_y * (t24 + t26 + t23 - t21) + qd2 * (w6_x * t18 - qd2 * t13 - v6_y * t8);
         const real t34 = wd6_z * n2_c2_z - (wd6_x * t13 + wd6_y * t16) - (R(0.4536) * t6 + t5 * f3_c2_z);
-        tau_out[1 * W + b] = t34 + t30 + qd2 * (t25 - t26 + t22 + t23); /* tau(2, 4) */
+        tau[1 * W + b] = t34 + t30 + qd2 * (t25 - t26 + t22 + t23); /* tau(2, 4) */
         const real t35 = qd2 * t20 - w6_x * (w6_x * f3_c2_z + R(0.4536) * w1_y - R(2.1) * t4);
         const real t36 = w6_x * (R(2.1) * v6_y - (R(0.4536) * qd2 + w6_x * t8)) - w1_y * t20;
         const real t37 = t5 * t8 + R(0.4536) * t7 + wd6_x * n3_c2_y + wd6_y * (t19 - t15) - wd6_z * t16 + t33;
-        tau_out[0 * W + b] = s2 * t32 + c2 * t37; /* tau(1, 4) */
+        tau[0 * W + b] = sin2 * t32 + cos2 * t37; /* tau(1, 4) */
         const real t38 = t1 * (R(2.1) * t7 + wd6_x * f3_c2_z + R(0.4536) * wd6_y + t36);
-        tau_out[3 * W + b] = t32 + s6_y * (R(2.1) * t6 - (R(0.4536) * wd6_z + wd6_x * t8) + t35) - t38; /* tau(6, 4) */
+        tau[3 * W + b] = t32 + s6_y * (R(2.1) * t6 - (R(0.4536) * wd6_z + wd6_x * t8) + t35) - t38; /* tau(6, 4) */
     }
 }
 #endif
@@ -282,7 +281,7 @@ KERNEL(link_4_torque)(
 /* Position gradient: 439 additions and multiplications, 6 sines and cosines apart. */
 KERNEL(link_4_position_gradient)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -294,23 +293,23 @@ KERNEL(link_4_position_gradient)(
         const real qdd2 = qdd[1 * W + b];
         const real qdd3 = qdd[2 * W + b];
         const real qdd6 = qdd[5 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s6 = sine[5 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c6 = cosine[5 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin6 = sine[5 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos6 = cosine[5 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c0_out[4 * W + b] = R(0.0); /* c0(2, 4, 1) */
-        const real x6_y = c3 * c6 - s3 * s6;
-        const real x6_z = s3 * c6 + c3 * s6;
-        const real t1 = R(9.81) * s2;
-        const real t2 = R(9.81) * c2;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
-        const real wd1_x = qdd1 * s2;
-        const real wd1_y = qdd1 * c2;
+        c0[4 * W + b] = R(0.0); /* c0(2, 4, 1) */
+        const real x6_y = cos3 * cos6 - sin3 * sin6;
+        const real x6_z = sin3 * cos6 + cos3 * sin6;
+        const real t1 = R(9.81) * sin2;
+        const real t2 = R(9.81) * cos2;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
+        const real wd1_x = qdd1 * sin2;
+        const real wd1_y = qdd1 * cos2;
         const real t3 = w1_y * w1_y;
         const real t4 = w1_x * w1_x + t3;
         const real t5 = qd2 * w1_x;
@@ -329,8 +328,8 @@ KERNEL(link_4_position_gradient)(
         const real wd6_x = qdd6 + wd3_x;
         const real wd6_y = wd3_y + qd2 * qd6;
         const real wd6_z = wd3_z - qd6 * w1_y;
-        const real t11 = R(0.37) * c3;
-        const real s6_y = R(0.37) * s3;
+        const real t11 = R(0.37) * cos3;
+        const real s6_y = R(0.37) * sin3;
         const real t12 = t11 - (R(0.125) * x6_y + R(0.008) * x6_z);
         const real t13 = R(0.008) * x6_y - R(0.125) * x6_z + s6_y;
         const real v6_y = qd6 * s6_y;
@@ -338,7 +337,7 @@ KERNEL(link_4_position_gradient)(
         const real t15 = w1_y * t11 + qd2 * s6_y;
         const real sd6_y = w3_x * t11;
         const real sd6_z = w3_x * s6_y;
-        const real t16 = c2 * t1 - s2 * t2;
+        const real t16 = cos2 * t1 - sin2 * t2;
         const real t17 = w1_y * sd6_z - qd2 * sd6_y - (wd3_y * t11 + wd3_z * s6_y);
         const real t18 = wd3_x * t11 - (qd2 * t15 + w3_x * sd6_z);
         const real t19 = wd3_x * s6_y - t2 + w3_x * sd6_y + w1_y * t15;
@@ -392,19 +391,19 @@ KERNEL(link_4_position_gradient)(
         const real t63 = R(2.1) * t21 - (R(0.4536) * wd6_z + wd6_x * t23) + t55 - w6_x * t38;
         const real t64 = R(2.1) * t22 + wd6_x * f3_c2_z + R(0.4536) * wd6_y + w6_x * t37 - t56;
         const real t65 = t16 * f3_c2_z;
-        c0_out[0 * W + b] = s2 * (t65 + c2 * t61) + c2 * (R(0.4536) * t16 - s2 * t61); /* c0(1, 4, 1) */
-        c0_out[8 * W + b] = t65; /* c0(3, 4, 1) */
-        c0_out[12 * W + b] = t65 - t11 * (R(2.1) * t16); /* c0(6, 4, 1) */
+        c0[0 * W + b] = sin2 * (t65 + cos2 * t61) + cos2 * (R(0.4536) * t16 - sin2 * t61); /* c0(1, 4, 1) */
+        c0[8 * W + b] = t65; /* c0(3, 4, 1) */
+        c0[12 * W + b] = t65 - t11 * (R(2.1) * t16); /* c0(6, 4, 1) */
         const real t66 = t2 * f3_c2_z;
         const real t67 = t1 * t23 + wd1_y * n3_c2_x - wd1_x * n3_c2_y + t4 * t28;
         const real t68 = t67 + R(2.0) * (w1_y * t47 - w1_x * t44);
-        c0_out[9 * W + b] = t68; /* c0(3, 4, 2) */
-        const real t69 = R(4.449816) * s2 - t66 + wd1_x * t31 - wd1_y * t28 - t4 * n2_c2_z;
-        c0_out[5 * W + b] = t69 + R(2.0) * (w1_y * t51 - w1_x * t52); /* c0(2, 4, 2) */
+        c0[9 * W + b] = t68; /* c0(3, 4, 2) */
+        const real t69 = R(4.449816) * sin2 - t66 + wd1_x * t31 - wd1_y * t28 - t4 * n2_c2_z;
+        c0[5 * W + b] = t69 + R(2.0) * (w1_y * t51 - w1_x * t52); /* c0(2, 4, 2) */
         const real t70 = t2 * t23 + wd1_y * n3_c2_y - wd1_x * t35 + t4 * t31 + R(2.0) * (w1_y * t48 - w1_x * t49);
-        c0_out[1 * W + b] = s2 * (t68 - t59) + c2 * (t57 + w6_x * t47 + w1_y * t44 + qd2 * t46 + t70); /* c0(1, 4, 2) */
+        c0[1 * W + b] = sin2 * (t68 - t59) + cos2 * (t57 + w6_x * t47 + w1_y * t44 + qd2 * t46 + t70); /* c0(1, 4, 2) */
         const real t71 = t11 * (wd1_y * f3_c2_z - R(0.4536) * wd1_x + R(2.0) * (w1_y * t37 + w1_x * t36));
-        c0_out[13 * W + b] = t68 + s6_y * (R(0.4536) * t4 - wd1_y * t23 - R(20.601) * s2 - R(2.0) * t54) - t71; /* c0(6, 4, 2) */
+        c0[13 * W + b] = t68 + s6_y * (R(0.4536) * t4 - wd1_y * t23 - R(20.601) * sin2 - R(2.0) * t54) - t71; /* c0(6, 4, 2) */
         const real t72 = t6 * n3_c2_x;
         const real t73 = t6 * n3_c2_y;
         const real t74 = t6 * t28;
@@ -413,23 +412,23 @@ KERNEL(link_4_position_gradient)(
         const real t77 = R(2.0) * (qd2 * t44 - w1_y * t46);
         const real t78 = R(2.0) * (qd2 * t49 - w1_y * t50);
         const real t79 = R(2.0) * (qd2 * t52 - w1_y * t53);
-        c0_out[6 * W + b] = t59 + t74 - t7 * t31 + t8 * n2_c2_z + t79; /* c0(2, 4, 3) */
+        c0[6 * W + b] = t59 + t74 - t7 * t31 + t8 * n2_c2_z + t79; /* c0(2, 4, 3) */
         const real t80 = R(2.0) * t56;
         const real t81 = R(2.0) * t55;
         const real t82 = t7 * n3_c2_y - t72 - t8 * t28 - t66 + t77;
-        c0_out[2 * W + b] = s2 * t82 + c2 * (t7 * t35 - t73 - t8 * t31 - R(4.449816) * c2 + t78 - t61); /* c0(1, 4, 3) */
-        c0_out[10 * W + b] = t82; /* c0(3, 4, 3) */
-        const real t83 = t11 * (R(0.4536) * t7 - t76 - R(20.601) * c2 - t81);
-        c0_out[14 * W + b] = t82 + s6_y * (t75 - R(0.4536) * t8 - t80) - t83; /* c0(6, 4, 3) */
+        c0[2 * W + b] = sin2 * t82 + cos2 * (t7 * t35 - t73 - t8 * t31 - R(4.449816) * cos2 + t78 - t61); /* c0(1, 4, 3) */
+        c0[10 * W + b] = t82; /* c0(3, 4, 3) */
+        const real t83 = t11 * (R(0.4536) * t7 - t76 - R(20.601) * cos2 - t81);
+        c0[14 * W + b] = t82 + s6_y * (t75 - R(0.4536) * t8 - t80) - t83; /* c0(6, 4, 3) */
         const real t84 = t77 + t19 * f3_c2_z - t18 * t23 + t9 * n3_c2_y - t72 - t10 * t28;
         const real t85 = t84 + s6_y * t64 + t11 * t63;
-        c0_out[11 * W + b] = t85; /* c0(3, 4, 6) */
+        c0[11 * W + b] = t85; /* c0(3, 4, 6) */
         const real t86 = t79 + t74 - t9 * t31 + t10 * n2_c2_z - (R(0.4536) * t18 + t17 * f3_c2_z);
-        c0_out[7 * W + b] = t86 + t59 - s6_y * t62; /* c0(2, 4, 6) */
+        c0[7 * W + b] = t86 + t59 - s6_y * t62; /* c0(2, 4, 6) */
         const real t87 = t78 + t17 * t23 + R(0.4536) * t19 + t9 * t35 - t73 - t10 * t31 - (t61 + t11 * t62);
-        c0_out[3 * W + b] = s2 * t85 + c2 * t87; /* c0(1, 4, 6) */
+        c0[3 * W + b] = sin2 * t85 + cos2 * t87; /* c0(1, 4, 6) */
         const real t88 = s6_y * (R(2.1) * t18 + t75 - R(0.4536) * t10 - t80 - t64);
-        c0_out[15 * W + b] = t85 + t88 - t11 * (t63 + R(2.1) * t19 + R(0.4536) * t9 - t76 - t81); /* c0(6, 4, 6) */
+        c0[15 * W + b] = t85 + t88 - t11 * (t63 + R(2.1) * t19 + R(0.4536) * t9 - t76 - t81); /* c0(6, 4, 6) */
     }
 }
 #endif

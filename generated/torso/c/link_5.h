@@ -8,16 +8,15 @@
        axes    of the frame that joint 2 moves
        origin  the link's centre of mass, moving with it; lengths are times the square root of its mass, 1.4 kg
 
-   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3; s3 alone is
-   its sine and c3 alone its cosine. The other names are explained in numbers.h. The arrays of outputs are c2_out and so
-   on. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's acceleration in the torque
-   at joint i through link j. The robot's header explains the other quantities. */
+   Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
+   are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
+   acceleration in the torque at joint i through link j. The robot's header explains the other quantities. */
 
 #ifdef WANT_DECOMPOSITION
 /* Decomposition: 448 additions and multiplications, 8 sines and cosines apart. */
 KERNEL(link_5_decomposition)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c2_out, real *RESTRICT c1_out, real *RESTRICT g_out, real *RESTRICT tau_out)
+    real *RESTRICT c2, real *RESTRICT c1, real *RESTRICT g, real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -31,36 +30,36 @@ KERNEL(link_5_decomposition)(
         const real qdd3 = qdd[2 * W + b];
         const real qdd6 = qdd[5 * W + b];
         const real qdd7 = qdd[6 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s6 = sine[5 * W + b];
-        const real s7 = sine[6 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c6 = cosine[5 * W + b];
-        const real c7 = cosine[6 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin6 = sine[5 * W + b];
+        const real sin7 = sine[6 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos6 = cosine[5 * W + b];
+        const real cos7 = cosine[6 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x6_y = c3 * c6 - s3 * s6;
-        const real x6_z = s3 * c6 + c3 * s6;
-        const real x7_y = c7 * x6_y - s7 * x6_z;
-        const real x7_z = c7 * x6_z + s7 * x6_y;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
+        const real x6_y = cos3 * cos6 - sin3 * sin6;
+        const real x6_z = sin3 * cos6 + cos3 * sin6;
+        const real x7_y = cos7 * x6_y - sin7 * x6_z;
+        const real x7_z = cos7 * x6_z + sin7 * x6_y;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
         const real w3_x = qd3 + w1_x;
         const real w6_x = qd6 + w3_x;
         const real w7_x = qd7 + w6_x;
-        const real t1 = R(11.607348534441448) * s2;
-        const real t2 = R(11.607348534441448) * c2;
+        const real t1 = R(11.607348534441448) * sin2;
+        const real t2 = R(11.607348534441448) * cos2;
         const real t3 = R(0.15618450627382988) * x7_y + R(0.020114671262538696) * x7_z;
         const real t4 = R(0.020114671262538696) * x7_y - R(0.15618450627382988) * x7_z;
         const real t5 = t3 + R(0.3313004678535785) * x6_y + R(0.023664319132398463) * x6_z;
         const real t6 = t4 + R(0.023664319132398463) * x6_y - R(0.3313004678535785) * x6_z;
-        const real s2_x = t5 - R(0.43778990394937156) * c3;
-        const real t7 = t6 + R(0.43778990394937156) * s3;
-        const real s1_x = c2 * t7;
-        const real t8 = s2 * t7;
-        const real s1_z = R(0.25320821471666355) * c2 - s2 * s2_x;
+        const real s2_x = t5 - R(0.43778990394937156) * cos3;
+        const real t7 = t6 + R(0.43778990394937156) * sin3;
+        const real s1_x = cos2 * t7;
+        const real t8 = sin2 * t7;
+        const real s1_z = R(0.25320821471666355) * cos2 - sin2 * s2_x;
         const real v6_y = qd7 * t4;
         const real v6_z = qd7 * t3;
         const real v3_y = v6_y + qd6 * t6;
@@ -71,9 +70,9 @@ KERNEL(link_5_decomposition)(
         const real v1_y = v2_y + R(0.25320821471666355) * qd2;
         const real v0_y = v1_y + qd1 * t8;
         const real v0_z = v2_z - qd1 * s1_z;
-        const real t9 = c2 * v0_z;
-        const real sd1_y = s2 * v0_z;
-        const real t10 = c2 * (sd2_y + qd1 * s1_x) + s2 * v0_y;
+        const real t9 = cos2 * v0_z;
+        const real sd1_y = sin2 * v0_z;
+        const real t10 = cos2 * (sd2_y + qd1 * s1_x) + sin2 * v0_y;
         const real t11 = w1_y * s2_x;
         const real t12 = R(0.25320821471666355) * w1_x + t11;
         const real sd3_x = qd2 * t7 - t11;
@@ -105,32 +104,32 @@ KERNEL(link_5_decomposition)(
         const real t32 = w1_y * t20;
         const real t33 = qd2 * t23;
         const real g_1 = t1 * s1_x - t2 * t8;
-        g_out[0 * W + b] = g_1; /* g(1, 5) */
-        const real g_2 = t1 * s2_x - R(2.939076) * c2;
-        g_out[1 * W + b] = g_2; /* g(2, 5) */
+        g[0 * W + b] = g_1; /* g(1, 5) */
+        const real g_2 = t1 * s2_x - R(2.939076) * cos2;
+        g[1 * W + b] = g_2; /* g(2, 5) */
         const real t34 = t2 * t7;
-        g_out[2 * W + b] = -t34; /* g(3, 5) */
+        g[2 * W + b] = -t34; /* g(3, 5) */
         const real t35 = t2 * t6;
-        g_out[3 * W + b] = -t35; /* g(6, 5) */
+        g[3 * W + b] = -t35; /* g(6, 5) */
         const real t36 = t2 * t4;
-        g_out[4 * W + b] = -t36; /* g(7, 5) */
-        const real n1_c2_x = R(0.0101) * s2 - c2 * t20;
-        const real n1_c2_y = c2 * t25 - s2 * t20;
-        const real n1_c1_x = s2 * (t26 - t27) + c2 * (qd2 * t22 - t30);
-        const real n1_c1_y = s2 * t28 + c2 * (t31 - t26);
-        const real n1_c1_z = s2 * t29 + c2 * (t32 - w7_x * t22);
-        const real c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y + s1_x * s1_x + t8 * t8 + s1_z * s1_z;
-        c2_out[0 * W + b] = c2_1_1; /* c2(1, 5, 1) */
-        const real c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y - (s1_x * t9 + t8 * sd1_y + s1_z * t10);
-        c1_out[0 * W + b] = c1_1_1; /* c1(1, 5, 1) */
+        g[4 * W + b] = -t36; /* g(7, 5) */
+        const real n1_c2_x = R(0.0101) * sin2 - cos2 * t20;
+        const real n1_c2_y = cos2 * t25 - sin2 * t20;
+        const real n1_c1_x = sin2 * (t26 - t27) + cos2 * (qd2 * t22 - t30);
+        const real n1_c1_y = sin2 * t28 + cos2 * (t31 - t26);
+        const real n1_c1_z = sin2 * t29 + cos2 * (t32 - w7_x * t22);
+        const real c2_1_1 = sin2 * n1_c2_x + cos2 * n1_c2_y + s1_x * s1_x + t8 * t8 + s1_z * s1_z;
+        c2[0 * W + b] = c2_1_1; /* c2(1, 5, 1) */
+        const real c1_1_1 = sin2 * n1_c1_x + cos2 * n1_c1_y - (s1_x * t9 + t8 * sd1_y + s1_z * t10);
+        c1[0 * W + b] = c1_1_1; /* c1(1, 5, 1) */
         const real c1_2_1 = n1_c1_z - (s2_x * t9 + R(0.25320821471666355) * sd1_y);
-        c1_out[5 * W + b] = c1_2_1; /* c1(2, 5, 1) */
+        c1[5 * W + b] = c1_2_1; /* c1(2, 5, 1) */
         const real c1_3_1 = n1_c1_x + s2_x * t10 - t7 * sd1_y;
-        c1_out[10 * W + b] = c1_3_1; /* c1(3, 5, 1) */
+        c1[10 * W + b] = c1_3_1; /* c1(3, 5, 1) */
         const real c1_6_1 = n1_c1_x + t5 * t10 - t6 * sd1_y;
-        c1_out[15 * W + b] = c1_6_1; /* c1(6, 5, 1) */
+        c1[15 * W + b] = c1_6_1; /* c1(6, 5, 1) */
         const real c1_7_1 = n1_c1_x + t3 * t10 - t4 * sd1_y;
-        c1_out[20 * W + b] = c1_7_1; /* c1(7, 5, 1) */
+        c1[20 * W + b] = c1_7_1; /* c1(7, 5, 1) */
         const real tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1;
         const real tau2_1 = g_2 + qd1 * c1_2_1;
         const real tau3_1 = qd1 * c1_3_1 - t34;
@@ -139,21 +138,21 @@ KERNEL(link_5_decomposition)(
         const real n2_c1_x = t33 - w1_y * t24 + R(0.0101) * w1_y + w1_x * t20;
         const real n2_c1_y = w7_x * t24 - qd2 * t21 - (t32 + w1_x * t25);
         const real n2_c1_z = t27 - t31 + w1_x * t23 - t27;
-        const real c2_1_2 = s2_x * s1_x + R(0.25320821471666355) * t8 - (s2 * t21 + c2 * t23);
-        c2_out[1 * W + b] = c2_1_2; /* c2(1, 5, 2) */
-        const real c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y + s1_x * v1_y - t8 * sd2_y - s1_z * t12;
-        c1_out[1 * W + b] = c1_1_2; /* c1(1, 5, 2) */
+        const real c2_1_2 = s2_x * s1_x + R(0.25320821471666355) * t8 - (sin2 * t21 + cos2 * t23);
+        c2[1 * W + b] = c2_1_2; /* c2(1, 5, 2) */
+        const real c1_1_2 = sin2 * n2_c1_x + cos2 * n2_c1_y + s1_x * v1_y - t8 * sd2_y - s1_z * t12;
+        c1[1 * W + b] = c1_1_2; /* c1(1, 5, 2) */
         const real t37 = s2_x * s2_x;
         const real c2_2_2 = n2_c2_z + t37 + R(0.0641144);
-        c2_out[5 * W + b] = c2_2_2; /* c2(2, 5, 2) */
+        c2[5 * W + b] = c2_2_2; /* c2(2, 5, 2) */
         const real c1_2_2 = n2_c1_z + s2_x * v1_y - R(0.25320821471666355) * sd2_y;
-        c1_out[6 * W + b] = c1_2_2; /* c1(2, 5, 2) */
+        c1[6 * W + b] = c1_2_2; /* c1(2, 5, 2) */
         const real c1_3_2 = n2_c1_x + s2_x * t12 - t7 * sd2_y;
-        c1_out[11 * W + b] = c1_3_2; /* c1(3, 5, 2) */
+        c1[11 * W + b] = c1_3_2; /* c1(3, 5, 2) */
         const real c1_6_2 = n2_c1_x + t5 * t12 - t6 * sd2_y;
-        c1_out[16 * W + b] = c1_6_2; /* c1(6, 5, 2) */
+        c1[16 * W + b] = c1_6_2; /* c1(6, 5, 2) */
         const real c1_7_2 = n2_c1_x + t3 * t12 - t4 * sd2_y;
-        c1_out[21 * W + b] = c1_7_2; /* c1(7, 5, 2) */
+        c1[21 * W + b] = c1_7_2; /* c1(7, 5, 2) */
         const real tau1_2 = tau1_1 + qdd2 * c2_1_2 + qd2 * c1_1_2;
         const real tau2_2 = tau2_1 + qdd1 * c2_1_2 + qdd2 * c2_2_2 + qd2 * c1_2_2;
         const real tau3_2 = tau3_1 + qd2 * c1_3_2;
@@ -162,76 +161,76 @@ KERNEL(link_5_decomposition)(
         const real n3_c1_y = t28 + t30 + qd2 * t25;
         const real n3_c1_z = t29 - (t33 + w1_y * n2_c2_z);
         const real c2_1_3 = n1_c2_x + t7 * t8 - s2_x * s1_z;
-        c2_out[2 * W + b] = c2_1_3; /* c2(1, 5, 3) */
-        const real t38 = c2 * n3_c1_y;
+        c2[2 * W + b] = c2_1_3; /* c2(1, 5, 3) */
+        const real t38 = cos2 * n3_c1_y;
         const real c1_1_3 = t38 + s1_x * sd3_x - t8 * sd3_y - s1_z * t13;
-        c1_out[2 * W + b] = c1_1_3; /* c1(1, 5, 3) */
+        c1[2 * W + b] = c1_1_3; /* c1(1, 5, 3) */
         const real c2_2_3 = R(0.25320821471666355) * t7 - t21;
-        c2_out[6 * W + b] = c2_2_3; /* c2(2, 5, 3) */
+        c2[6 * W + b] = c2_2_3; /* c2(2, 5, 3) */
         const real c1_2_3 = n3_c1_z + s2_x * sd3_x - R(0.25320821471666355) * sd3_y;
-        c1_out[7 * W + b] = c1_2_3; /* c1(2, 5, 3) */
+        c1[7 * W + b] = c1_2_3; /* c1(2, 5, 3) */
         const real c2_3_3 = R(0.0101) + t37 + t7 * t7;
-        c2_out[9 * W + b] = c2_3_3; /* c2(3, 5, 3) */
+        c2[9 * W + b] = c2_3_3; /* c2(3, 5, 3) */
         const real c1_3_3 = s2_x * t13 - t7 * sd3_y;
-        c1_out[12 * W + b] = c1_3_3; /* c1(3, 5, 3) */
+        c1[12 * W + b] = c1_3_3; /* c1(3, 5, 3) */
         const real c1_6_3 = t5 * t13 - t6 * sd3_y;
-        c1_out[17 * W + b] = c1_6_3; /* c1(6, 5, 3) */
+        c1[17 * W + b] = c1_6_3; /* c1(6, 5, 3) */
         const real c1_7_3 = t3 * t13 - t4 * sd3_y;
-        c1_out[22 * W + b] = c1_7_3; /* c1(7, 5, 3) */
+        c1[22 * W + b] = c1_7_3; /* c1(7, 5, 3) */
         const real tau1_3 = tau1_2 + qdd3 * c2_1_3 + qd3 * c1_1_3;
         const real tau2_3 = tau2_2 + qdd3 * c2_2_3 + qd3 * c1_2_3;
         const real tau3_3 = tau3_2 + qdd1 * c2_1_3 + qdd2 * c2_2_3 + qdd3 * c2_3_3 + qd3 * c1_3_3;
         const real tau6_3 = tau6_2 + qd3 * c1_6_3;
         const real tau7_3 = tau7_2 + qd3 * c1_7_3;
         const real c2_1_6 = n1_c2_x + t6 * t8 - t5 * s1_z;
-        c2_out[3 * W + b] = c2_1_6; /* c2(1, 5, 6) */
+        c2[3 * W + b] = c2_1_6; /* c2(1, 5, 6) */
         const real c1_1_6 = t38 + s1_x * sd6_x - t8 * sd6_y - s1_z * t14;
-        c1_out[3 * W + b] = c1_1_6; /* c1(1, 5, 6) */
+        c1[3 * W + b] = c1_1_6; /* c1(1, 5, 6) */
         const real c2_2_6 = R(0.25320821471666355) * t6 - t21;
-        c2_out[7 * W + b] = c2_2_6; /* c2(2, 5, 6) */
+        c2[7 * W + b] = c2_2_6; /* c2(2, 5, 6) */
         const real c1_2_6 = n3_c1_z + s2_x * sd6_x - R(0.25320821471666355) * sd6_y;
-        c1_out[8 * W + b] = c1_2_6; /* c1(2, 5, 6) */
+        c1[8 * W + b] = c1_2_6; /* c1(2, 5, 6) */
         const real c2_3_6 = R(0.0101) + t6 * t7 + t5 * s2_x;
-        c2_out[10 * W + b] = c2_3_6; /* c2(3, 5, 6) */
+        c2[10 * W + b] = c2_3_6; /* c2(3, 5, 6) */
         const real c1_3_6 = s2_x * t14 - t7 * sd6_y;
-        c1_out[13 * W + b] = c1_3_6; /* c1(3, 5, 6) */
+        c1[13 * W + b] = c1_3_6; /* c1(3, 5, 6) */
         const real c2_6_6 = R(0.0101) + t6 * t6 + t5 * t5;
-        c2_out[12 * W + b] = c2_6_6; /* c2(6, 5, 6) */
+        c2[12 * W + b] = c2_6_6; /* c2(6, 5, 6) */
         const real c1_6_6 = t5 * t14 - t6 * sd6_y;
-        c1_out[18 * W + b] = c1_6_6; /* c1(6, 5, 6) */
+        c1[18 * W + b] = c1_6_6; /* c1(6, 5, 6) */
         const real c1_7_6 = t3 * t14 - t4 * sd6_y;
-        c1_out[23 * W + b] = c1_7_6; /* c1(7, 5, 6) */
+        c1[23 * W + b] = c1_7_6; /* c1(7, 5, 6) */
         const real tau1_6 = tau1_3 + qdd6 * c2_1_6 + qd6 * c1_1_6;
         const real tau2_6 = tau2_3 + qdd6 * c2_2_6 + qd6 * c1_2_6;
         const real tau3_6 = tau3_3 + qdd6 * c2_3_6 + qd6 * c1_3_6;
         const real tau6_6 = tau6_3 + qdd1 * c2_1_6 + qdd2 * c2_2_6 + qdd3 * c2_3_6 + qdd6 * c2_6_6 + qd6 * c1_6_6;
         const real tau7_6 = tau7_3 + qd6 * c1_7_6;
         const real c2_1_7 = n1_c2_x + t4 * t8 - t3 * s1_z;
-        c2_out[4 * W + b] = c2_1_7; /* c2(1, 5, 7) */
+        c2[4 * W + b] = c2_1_7; /* c2(1, 5, 7) */
         const real c1_1_7 = t38 + s1_x * sd7_x - t8 * sd7_y - s1_z * t15;
-        c1_out[4 * W + b] = c1_1_7; /* c1(1, 5, 7) */
-        tau_out[0 * W + b] = tau1_6 + qdd7 * c2_1_7 + qd7 * c1_1_7; /* tau(1, 5) */
+        c1[4 * W + b] = c1_1_7; /* c1(1, 5, 7) */
+        tau[0 * W + b] = tau1_6 + qdd7 * c2_1_7 + qd7 * c1_1_7; /* tau(1, 5) */
         const real c2_2_7 = R(0.25320821471666355) * t4 - t21;
-        c2_out[8 * W + b] = c2_2_7; /* c2(2, 5, 7) */
+        c2[8 * W + b] = c2_2_7; /* c2(2, 5, 7) */
         const real c1_2_7 = n3_c1_z + s2_x * sd7_x - R(0.25320821471666355) * sd7_y;
-        c1_out[9 * W + b] = c1_2_7; /* c1(2, 5, 7) */
-        tau_out[1 * W + b] = tau2_6 + qdd7 * c2_2_7 + qd7 * c1_2_7; /* tau(2, 5) */
+        c1[9 * W + b] = c1_2_7; /* c1(2, 5, 7) */
+        tau[1 * W + b] = tau2_6 + qdd7 * c2_2_7 + qd7 * c1_2_7; /* tau(2, 5) */
         const real c2_3_7 = R(0.0101) + t4 * t7 + t3 * s2_x;
-        c2_out[11 * W + b] = c2_3_7; /* c2(3, 5, 7) */
+        c2[11 * W + b] = c2_3_7; /* c2(3, 5, 7) */
         const real c1_3_7 = s2_x * t15 - t7 * sd7_y;
-        c1_out[14 * W + b] = c1_3_7; /* c1(3, 5, 7) */
-        tau_out[2 * W + b] = tau3_6 + qdd7 * c2_3_7 + qd7 * c1_3_7; /* tau(3, 5) */
+        c1[14 * W + b] = c1_3_7; /* c1(3, 5, 7) */
+        tau[2 * W + b] = tau3_6 + qdd7 * c2_3_7 + qd7 * c1_3_7; /* tau(3, 5) */
         const real c2_6_7 = R(0.0101) + t4 * t6 + t3 * t5;
-        c2_out[13 * W + b] = c2_6_7; /* c2(6, 5, 7) */
+        c2[13 * W + b] = c2_6_7; /* c2(6, 5, 7) */
         const real c1_6_7 = t5 * t15 - t6 * sd7_y;
-        c1_out[19 * W + b] = c1_6_7; /* c1(6, 5, 7) */
-        tau_out[3 * W + b] = tau6_6 + qdd7 * c2_6_7 + qd7 * c1_6_7; /* tau(6, 5) */
+        c1[19 * W + b] = c1_6_7; /* c1(6, 5, 7) */
+        tau[3 * W + b] = tau6_6 + qdd7 * c2_6_7 + qd7 * c1_6_7; /* tau(6, 5) */
         const real c2_7_7 = R(0.0101) + t4 * t4 + t3 * t3;
-        c2_out[14 * W + b] = c2_7_7; /* c2(7, 5, 7) */
+        c2[14 * W + b] = c2_7_7; /* c2(7, 5, 7) */
         const real c1_7_7 = t3 * t15 - t4 * sd7_y;
-        c1_out[24 * W + b] = c1_7_7; /* c1(7, 5, 7) */
+        c1[24 * W + b] = c1_7_7; /* c1(7, 5, 7) */
         const real t39 = tau7_6 + qdd1 * c2_1_7 + qdd2 * c2_2_7 + qdd3 * c2_3_7 + qdd6 * c2_6_7 + qdd7 * c2_7_7;
-        tau_out[4 * W + b] = t39 + qd7 * c1_7_7; /* tau(7, 5) */
+        tau[4 * W + b] = t39 + qd7 * c1_7_7; /* tau(7, 5) */
     }
 }
 #endif
@@ -240,7 +239,7 @@ KERNEL(link_5_decomposition)(
 /* Torques alone: 270 additions and multiplications, 8 sines and cosines apart. */
 KERNEL(link_5_torque)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT tau_out)
+    real *RESTRICT tau)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -254,24 +253,24 @@ KERNEL(link_5_torque)(
         const real qdd3 = qdd[2 * W + b];
         const real qdd6 = qdd[5 * W + b];
         const real qdd7 = qdd[6 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s6 = sine[5 * W + b];
-        const real s7 = sine[6 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c6 = cosine[5 * W + b];
-        const real c7 = cosine[6 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin6 = sine[5 * W + b];
+        const real sin7 = sine[6 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos6 = cosine[5 * W + b];
+        const real cos7 = cosine[6 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        const real x6_y = c3 * c6 - s3 * s6;
-        const real x6_z = s3 * c6 + c3 * s6;
-        const real x7_y = c7 * x6_y - s7 * x6_z;
-        const real x7_z = c7 * x6_z + s7 * x6_y;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
-        const real wd1_x = qdd1 * s2;
-        const real wd1_y = qdd1 * c2;
+        const real x6_y = cos3 * cos6 - sin3 * sin6;
+        const real x6_z = sin3 * cos6 + cos3 * sin6;
+        const real x7_y = cos7 * x6_y - sin7 * x6_z;
+        const real x7_z = cos7 * x6_z + sin7 * x6_y;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
+        const real wd1_x = qdd1 * sin2;
+        const real wd1_y = qdd1 * cos2;
         const real wd2_x = wd1_x + qd2 * w1_y;
         const real wd2_y = wd1_y - qd2 * w1_x;
         const real w3_x = qd3 + w1_x;
@@ -290,11 +289,11 @@ KERNEL(link_5_torque)(
         const real t2 = R(0.020114671262538696) * x7_y - R(0.15618450627382988) * x7_z;
         const real t3 = t1 + R(0.3313004678535785) * x6_y + R(0.023664319132398463) * x6_z;
         const real t4 = t2 + R(0.023664319132398463) * x6_y - R(0.3313004678535785) * x6_z;
-        const real s2_x = t3 - R(0.43778990394937156) * c3;
-        const real t5 = t4 + R(0.43778990394937156) * s3;
-        const real s1_x = c2 * t5;
-        const real t6 = s2 * t5;
-        const real s1_z = R(0.25320821471666355) * c2 - s2 * s2_x;
+        const real s2_x = t3 - R(0.43778990394937156) * cos3;
+        const real t5 = t4 + R(0.43778990394937156) * sin3;
+        const real s1_x = cos2 * t5;
+        const real t6 = sin2 * t5;
+        const real s1_z = R(0.25320821471666355) * cos2 - sin2 * s2_x;
         const real v6_y = qd7 * t2;
         const real v6_z = qd7 * t1;
         const real v3_y = v6_y + qd6 * t4;
@@ -305,7 +304,7 @@ KERNEL(link_5_torque)(
         const real v1_y = v2_y + R(0.25320821471666355) * qd2;
         const real v0_y = v1_y + qd1 * t6;
         const real v0_z = v2_z - qd1 * s1_z;
-        const real sd1_y = s2 * v0_z;
+        const real sd1_y = sin2 * v0_z;
         const real t7 = w1_y * s2_x;
         const real sd3_x = qd2 * t5 - t7;
         const real sd3_y = v2_z + w1_x * s2_x;
@@ -313,39 +312,40 @@ KERNEL(link_5_torque)(
         const real sd6_y = v3_z + w3_x * t3;
         const real sd7_x = qd2 * t2 - w1_y * t1;
         const real sd7_y = v6_z + w6_x * t1;
-        const real t8 = R(11.607348534441448) * c2 + qd1 * sd1_y - qdd1 * t6 + qd2 * sd2_y;
-        const real t9 = qdd1 * s1_z - qd1 * (c2 * (sd2_y + qd1 * s1_x) + s2 * v0_y);
-        const real t10 = qdd2 * s2_x + qdd1 * s1_x + R(11.607348534441448) * s2 - qd1 * (c2 * v0_z) + qd2 * v1_y;
-        const real t11 = t9 - qd2 * (R(0.25320821471666355) * w1_x + t7) - qd3 * (v2_y + w1_x * t5) - qdd3 * s2_x;
-        const real t12 = t10 + qd3 * sd3_x + qd6 * sd6_x + qd7 * sd7_x;
-        const real t13 = t8 - R(0.25320821471666355) * qdd2 + qd3 * sd3_y - qdd3 * t5 + qd6 * sd6_y - qdd6 * t4;
+        const real t8 = qdd1 * s1_x + R(11.607348534441448) * sin2 - qd1 * (cos2 * v0_z) + qd2 * v1_y;
+        const real t9 = R(11.607348534441448) * cos2 + qd1 * sd1_y - qdd1 * t6 + qd2 * sd2_y;
+        const real t10 = qdd1 * s1_z - qd1 * (cos2 * (sd2_y + qd1 * s1_x) + sin2 * v0_y);
+        const real t11 = t10 - qd2 * (R(0.25320821471666355) * w1_x + t7) - qd3 * (v2_y + w1_x * t5);
+        const real t12 = qdd2 * s2_x + t8 + qd3 * sd3_x + qd6 * sd6_x + qd7 * sd7_x;
+        const real t13 = t9 - R(0.25320821471666355) * qdd2 + qd3 * sd3_y - qdd3 * t5 + qd6 * sd6_y - qdd6 * t4;
         const real t14 = t13 + qd7 * sd7_y - qdd7 * t2;
-        const real t15 = t11 - qd6 * (v3_y + w3_x * t4) - qdd6 * t3 - qd7 * (v6_y + w6_x * t2) - qdd7 * t1;
-        const real t16 = R(0.0007) * x7_z;
-        const real t17 = R(0.00925) * x7_y + t16;
-        const real t18 = R(0.0007) * x7_y;
-        const real t19 = t18 + R(0.00085) * x7_z;
-        const real t20 = R(0.0003) * x7_y + R(0.0001) * x7_z;
-        const real t21 = R(0.0003) * x7_z - R(0.0001) * x7_y;
-        const real t22 = x7_y * t17 + x7_z * t19;
-        const real t23 = x7_z * t17 - x7_y * t19;
-        const real t24 = x7_z * (R(0.00925) * x7_z - t18) + x7_y * (R(0.00085) * x7_y - t16);
-        const real n2_c2_z = R(0.01065) - t24;
-        const real t25 = qd2 * t20;
-        const real t26 = w1_y * t21;
-        const real t27 = w7_x * t23;
-        const real t28 = w7_x * (w7_x * t21 - R(0.00055) * qd2) + w1_y * (t27 - t25);
-        const real t29 = w7_x * (R(0.00055) * w1_y - w7_x * t20) + w1_y * (w1_y * t20 - w7_x * t22);
-        const real t30 = w7_x * (t25 - t26) + w1_y * (qd2 * t22 - w1_y * t23) + qd2 * (qd2 * t23 - w1_y * t24);
-        const real t31 = R(0.0101) * wd7_x - wd7_y * t20 - wd7_z * t21 + t30;
-        tau_out[2 * W + b] = t31 - (t5 * t14 + s2_x * t15); /* tau(3, 5) */
-        tau_out[3 * W + b] = t31 - (t4 * t14 + t3 * t15); /* tau(6, 5) */
-        tau_out[4 * W + b] = t31 - (t2 * t14 + t1 * t15); /* tau(7, 5) */
-        const real t32 = wd7_y * (R(0.01065) - t22) - wd7_x * t20 - wd7_z * t23;
-        const real t33 = s2 * t31 + c2 * (t32 + t28 + qd2 * (w7_x * t24 - qd2 * t21));
-        tau_out[0 * W + b] = t33 + s1_x * t12 - t6 * t14 + s1_z * t15; /* tau(1, 5) */
-        const real t34 = wd7_z * n2_c2_z - (wd7_x * t21 + wd7_y * t23) + t29 + qd2 * (t26 - t27);
-        tau_out[1 * W + b] = t34 + s2_x * t12 - R(0.25320821471666355) * t14; /* tau(2, 5) */
+        const real t15 = t11 - qdd3 * s2_x - qd6 * (v3_y + w3_x * t4) - qdd6 * t3 - qd7 * (v6_y + w6_x * t2);
+        const real t16 = t15 - qdd7 * t1;
+        const real t17 = R(0.0007) * x7_z;
+        const real t18 = R(0.00925) * x7_y + t17;
+        const real t19 = R(0.0007) * x7_y;
+        const real t20 = t19 + R(0.00085) * x7_z;
+        const real t21 = R(0.0003) * x7_y + R(0.0001) * x7_z;
+        const real t22 = R(0.0003) * x7_z - R(0.0001) * x7_y;
+        const real t23 = x7_y * t18 + x7_z * t20;
+        const real t24 = x7_z * t18 - x7_y * t20;
+        const real t25 = x7_z * (R(0.00925) * x7_z - t19) + x7_y * (R(0.00085) * x7_y - t17);
+        const real n2_c2_z = R(0.01065) - t25;
+        const real t26 = qd2 * t21;
+        const real t27 = w1_y * t22;
+        const real t28 = w7_x * t24;
+        const real t29 = w7_x * (w7_x * t22 - R(0.00055) * qd2) + w1_y * (t28 - t26);
+        const real t30 = w7_x * (R(0.00055) * w1_y - w7_x * t21) + w1_y * (w1_y * t21 - w7_x * t23);
+        const real t31 = w7_x * (t26 - t27) + w1_y * (qd2 * t23 - w1_y * t24) + qd2 * (qd2 * t24 - w1_y * t25);
+        const real t32 = R(0.0101) * wd7_x - wd7_y * t21 - wd7_z * t22 + t31;
+        tau[2 * W + b] = t32 - (t5 * t14 + s2_x * t16); /* tau(3, 5) */
+        tau[3 * W + b] = t32 - (t4 * t14 + t3 * t16); /* tau(6, 5) */
+        tau[4 * W + b] = t32 - (t2 * t14 + t1 * t16); /* tau(7, 5) */
+        const real t33 = wd7_y * (R(0.01065) - t23) - wd7_x * t21 - wd7_z * t24;
+        const real t34 = sin2 * t32 + cos2 * (t33 + t29 + qd2 * (w7_x * t25 - qd2 * t22));
+        tau[0 * W + b] = t34 + s1_x * t12 - t6 * t14 + s1_z * t16; /* tau(1, 5) */
+        const real t35 = wd7_z * n2_c2_z - (wd7_x * t22 + wd7_y * t24) + t30 + qd2 * (t27 - t28);
+        tau[1 * W + b] = t35 + s2_x * t12 - R(0.25320821471666355) * t14; /* tau(2, 5) */
     }
 }
 #endif
@@ -354,7 +354,7 @@ KERNEL(link_5_torque)(
 /* Position gradient: 614 additions and multiplications, 8 sines and cosines apart. */
 KERNEL(link_5_position_gradient)(
     const real *RESTRICT qd, const real *RESTRICT qdd, const real *RESTRICT sine, const real *RESTRICT cosine,
-    real *RESTRICT c0_out)
+    real *RESTRICT c0)
 {
     for (int b = 0; b < W; ++b) {
         /* Inputs. */
@@ -368,25 +368,25 @@ KERNEL(link_5_position_gradient)(
         const real qdd3 = qdd[2 * W + b];
         const real qdd6 = qdd[5 * W + b];
         const real qdd7 = qdd[6 * W + b];
-        const real s2 = sine[1 * W + b];
-        const real s3 = sine[2 * W + b];
-        const real s6 = sine[5 * W + b];
-        const real s7 = sine[6 * W + b];
-        const real c2 = cosine[1 * W + b];
-        const real c3 = cosine[2 * W + b];
-        const real c6 = cosine[5 * W + b];
-        const real c7 = cosine[6 * W + b];
+        const real sin2 = sine[1 * W + b];
+        const real sin3 = sine[2 * W + b];
+        const real sin6 = sine[5 * W + b];
+        const real sin7 = sine[6 * W + b];
+        const real cos2 = cosine[1 * W + b];
+        const real cos3 = cosine[2 * W + b];
+        const real cos6 = cosine[5 * W + b];
+        const real cos7 = cosine[6 * W + b];
 
         /* Intermediate values, and each output as soon as it is known. */
-        c0_out[5 * W + b] = R(0.0); /* c0(2, 5, 1) */
-        const real x6_y = c3 * c6 - s3 * s6;
-        const real x6_z = s3 * c6 + c3 * s6;
-        const real x7_y = c7 * x6_y - s7 * x6_z;
-        const real x7_z = c7 * x6_z + s7 * x6_y;
-        const real w1_x = qd1 * s2;
-        const real w1_y = qd1 * c2;
-        const real wd1_x = qdd1 * s2;
-        const real wd1_y = qdd1 * c2;
+        c0[5 * W + b] = R(0.0); /* c0(2, 5, 1) */
+        const real x6_y = cos3 * cos6 - sin3 * sin6;
+        const real x6_z = sin3 * cos6 + cos3 * sin6;
+        const real x7_y = cos7 * x6_y - sin7 * x6_z;
+        const real x7_z = cos7 * x6_z + sin7 * x6_y;
+        const real w1_x = qd1 * sin2;
+        const real w1_y = qd1 * cos2;
+        const real wd1_x = qdd1 * sin2;
+        const real wd1_y = qdd1 * cos2;
         const real t1 = w1_y * w1_y;
         const real t2 = w1_x * w1_x + t1;
         const real t3 = qd2 * w1_x;
@@ -411,17 +411,17 @@ KERNEL(link_5_position_gradient)(
         const real wd7_x = qdd7 + wd6_x;
         const real wd7_y = wd6_y + qd2 * qd7;
         const real wd7_z = wd6_z - qd7 * w1_y;
-        const real t11 = R(11.607348534441448) * s2;
-        const real t12 = R(11.607348534441448) * c2;
+        const real t11 = R(11.607348534441448) * sin2;
+        const real t12 = R(11.607348534441448) * cos2;
         const real t13 = R(0.15618450627382988) * x7_y + R(0.020114671262538696) * x7_z;
         const real t14 = R(0.020114671262538696) * x7_y - R(0.15618450627382988) * x7_z;
         const real t15 = t13 + R(0.3313004678535785) * x6_y + R(0.023664319132398463) * x6_z;
         const real t16 = t14 + R(0.023664319132398463) * x6_y - R(0.3313004678535785) * x6_z;
-        const real s2_x = t15 - R(0.43778990394937156) * c3;
-        const real t17 = t16 + R(0.43778990394937156) * s3;
-        const real s1_x = c2 * t17;
-        const real t18 = s2 * t17;
-        const real s1_z = R(0.25320821471666355) * c2 - s2 * s2_x;
+        const real s2_x = t15 - R(0.43778990394937156) * cos3;
+        const real t17 = t16 + R(0.43778990394937156) * sin3;
+        const real s1_x = cos2 * t17;
+        const real t18 = sin2 * t17;
+        const real s1_z = R(0.25320821471666355) * cos2 - sin2 * s2_x;
         const real v6_y = qd7 * t14;
         const real v6_z = qd7 * t13;
         const real v3_y = v6_y + qd6 * t16;
@@ -432,7 +432,7 @@ KERNEL(link_5_position_gradient)(
         const real v1_y = v2_y + R(0.25320821471666355) * qd2;
         const real v0_y = v1_y + qd1 * t18;
         const real v0_z = v2_z - qd1 * s1_z;
-        const real sd1_y = s2 * v0_z;
+        const real sd1_y = sin2 * v0_z;
         const real t19 = w1_y * s2_x;
         const real t20 = R(0.25320821471666355) * w1_x + t19;
         const real sd3_x = qd2 * t17 - t19;
@@ -444,16 +444,16 @@ KERNEL(link_5_position_gradient)(
         const real sd7_x = qd2 * t14 - w1_y * t13;
         const real sd7_y = v6_z + w6_x * t13;
         const real t23 = v6_y + w6_x * t14;
-        const real t24 = c2 * t11 - s2 * t12;
-        c0_out[10 * W + b] = -s2_x * t24; /* c0(3, 5, 1) */
-        c0_out[15 * W + b] = -t15 * t24; /* c0(6, 5, 1) */
-        c0_out[20 * W + b] = -t13 * t24; /* c0(7, 5, 1) */
-        const real t25 = qdd1 * s1_x + t11 - qd1 * (c2 * v0_z);
+        const real t24 = cos2 * t11 - sin2 * t12;
+        c0[10 * W + b] = -s2_x * t24; /* c0(3, 5, 1) */
+        c0[15 * W + b] = -t15 * t24; /* c0(6, 5, 1) */
+        c0[20 * W + b] = -t13 * t24; /* c0(7, 5, 1) */
+        const real t25 = qdd1 * s1_x + t11 - qd1 * (cos2 * v0_z);
         const real t26 = t12 + qd1 * sd1_y - qdd1 * t18;
         const real t27 = w1_x * t20 + w1_y * v2_z - t25;
         const real t28 = R(2.0) * (w1_x * sd2_y - w1_y * v1_y) - (R(0.25320821471666355) * wd1_x + wd1_y * s2_x);
         const real t29 = t26 + qd2 * sd2_y - R(0.25320821471666355) * qdd2;
-        const real t30 = qdd1 * s1_z - qd1 * (c2 * (sd2_y + qd1 * s1_x) + s2 * v0_y) - qd2 * t20;
+        const real t30 = qdd1 * s1_z - qd1 * (cos2 * (sd2_y + qd1 * s1_x) + sin2 * v0_y) - qd2 * t20;
         const real t31 = qdd2 * t17 - wd2_y * s2_x - (w1_y * t21 + qd2 * sd3_y + w1_y * v2_y + qd2 * v2_z);
         const real t32 = t30 + wd2_x * s2_x + qd2 * sd3_x + w1_x * t21;
         const real t33 = w1_x * sd3_y - w1_y * sd3_x - (t29 + wd2_x * t17);
@@ -493,59 +493,60 @@ KERNEL(link_5_position_gradient)(
         const real t66 = t56 - t61;
         const real t67 = wd7_y * t54 - wd7_x * t49 - wd7_z * t52 + w7_x * t58 + w1_y * t62 + qd2 * t65;
         const real t68 = wd7_z * n2_c2_z - (wd7_x * t50 + wd7_y * t52) + w7_x * t59 + w1_y * t63 + qd2 * t66;
-        const real t69 = s2 * (c2 * t68 - (t18 * t44 + s1_z * t43)) + c2 * (s1_z * t42 - s1_x * t44 - s2 * t68);
-        c0_out[0 * W + b] = t69 + s1_x * (c2 * t44) + t18 * (s2 * t44) + s1_z * (t24 + s2 * t43 - c2 * t42); /* c0(1, 5, 1) */
-        const real t70 = R(0.0101) * wd1_y + wd1_x * t49 + t2 * t50 + R(2.0) * (w1_y * t57 - w1_x * t60);
-        c0_out[11 * W + b] = t70 - (t17 * t27 + s2_x * t28); /* c0(3, 5, 2) */
-        c0_out[16 * W + b] = t70 - (t16 * t27 + t15 * t28); /* c0(6, 5, 2) */
-        c0_out[21 * W + b] = t70 - (t14 * t27 + t13 * t28); /* c0(7, 5, 2) */
-        const real t71 = s2_x * t43;
-        const real t72 = R(0.0101) * wd7_x - wd7_y * t49 - wd7_z * t50 + w7_x * t57 + w1_y * t60 + qd2 * t64;
-        const real t73 = t2 * t52 - (wd1_y * t49 + wd1_x * t54) + R(2.0) * (w1_y * t58 - w1_x * t62);
-        const real t74 = wd1_x * t52 - wd1_y * t50 - t2 * n2_c2_z + R(2.0) * (w1_y * t59 - w1_x * t63);
-        const real t75 = t26 + w1_x * v2_z - w1_y * t20 - t43;
-        const real t76 = t27 + t42;
-        c0_out[6 * W + b] = t74 + t71 + R(0.25320821471666355) * t42 + s2_x * t75 - R(0.25320821471666355) * t76; /* c0(2, 5, 2) */
-        const real t77 = s2 * (t70 - (t67 + R(0.25320821471666355) * t44)) + c2 * (t73 + t72 - s2_x * t44);
-        c0_out[1 * W + b] = t77 + s1_x * t75 - t18 * t76 + s1_z * t28; /* c0(1, 5, 2) */
-        const real t78 = R(0.0101) * t4;
-        const real t79 = t4 * t49;
-        const real t80 = t4 * t50;
-        const real t81 = R(2.0) * (qd2 * t60 - w1_y * t64);
-        const real t82 = R(2.0) * (qd2 * t62 - w1_y * t65);
-        const real t83 = R(2.0) * (qd2 * t63 - w1_y * t66);
-        const real t84 = t81 - (t78 + t5 * t49 + t6 * t50);
-        c0_out[17 * W + b] = t84 - (t16 * t32 + t15 * t33); /* c0(6, 5, 3) */
-        c0_out[22 * W + b] = t84 - (t14 * t32 + t13 * t33); /* c0(7, 5, 3) */
-        const real t85 = t84 + t71 - t17 * t44;
-        const real t86 = t32 - t44;
-        const real t87 = t33 + t43;
-        c0_out[12 * W + b] = t85 - (t17 * t86 + s2_x * t87); /* c0(3, 5, 3) */
-        const real t88 = s2 * t85 + c2 * (t79 + t5 * t54 - t6 * t52 + t82 - (t68 + s2_x * t42));
-        c0_out[2 * W + b] = t88 + s1_x * t31 - t18 * t86 + s1_z * t87; /* c0(1, 5, 3) */
-        const real t89 = t80 - t5 * t52 + t6 * n2_c2_z + t83 + t67 + t17 * t42;
-        c0_out[7 * W + b] = t89 + s2_x * t31 - R(0.25320821471666355) * t86; /* c0(2, 5, 3) */
-        const real t90 = t81 - (t78 + t7 * t49 + t8 * t50);
-        c0_out[23 * W + b] = t90 - (t14 * t37 + t13 * t38); /* c0(7, 5, 6) */
-        const real t91 = t90 + t15 * t43 - t16 * t44;
-        const real t92 = t37 - t44;
-        const real t93 = t38 + t43;
-        c0_out[13 * W + b] = t91 - (t17 * t92 + s2_x * t93); /* c0(3, 5, 6) */
-        c0_out[18 * W + b] = t91 - (t16 * t92 + t15 * t93); /* c0(6, 5, 6) */
-        const real t94 = s2 * t91 + c2 * (t82 + t79 + t7 * t54 - t8 * t52 - (t68 + t15 * t42));
-        c0_out[3 * W + b] = t94 + s1_x * t36 - t18 * t92 + s1_z * t93; /* c0(1, 5, 6) */
-        const real t95 = t83 + t80 - t7 * t52 + t8 * n2_c2_z + t67 + t16 * t42;
-        c0_out[8 * W + b] = t95 + s2_x * t36 - R(0.25320821471666355) * t92; /* c0(2, 5, 6) */
-        const real t96 = t81 - (t78 + t9 * t49 + t10 * t50) + t13 * t43 - t14 * t44;
-        const real t97 = t40 + wd6_x * t13 + qd2 * sd7_x + w6_x * t23 - t44;
-        const real t98 = w6_x * sd7_y - w1_y * sd7_x - (t39 + wd6_x * t14) + t43;
-        c0_out[14 * W + b] = t96 - (t17 * t97 + s2_x * t98); /* c0(3, 5, 7) */
-        c0_out[19 * W + b] = t96 - (t16 * t97 + t15 * t98); /* c0(6, 5, 7) */
-        c0_out[24 * W + b] = t96 - (t14 * t97 + t13 * t98); /* c0(7, 5, 7) */
-        const real t99 = s2 * t96 + c2 * (t82 + t79 + t9 * t54 - t10 * t52 - (t68 + t13 * t42));
-        c0_out[4 * W + b] = t99 + s1_x * t41 - t18 * t97 + s1_z * t98; /* c0(1, 5, 7) */
-        const real t100 = t83 + t80 - t9 * t52 + t10 * n2_c2_z + t67 + t14 * t42;
-        c0_out[9 * W + b] = t100 + s2_x * t41 - R(0.25320821471666355) * t97; /* c0(2, 5, 7) */
+        const real t69 = sin2 * (cos2 * t68 - (t18 * t44 + s1_z * t43));
+        const real t70 = s1_x * (cos2 * t44) + t18 * (sin2 * t44) + s1_z * (t24 + sin2 * t43 - cos2 * t42);
+        c0[0 * W + b] = t69 + cos2 * (s1_z * t42 - s1_x * t44 - sin2 * t68) + t70; /* c0(1, 5, 1) */
+        const real t71 = R(0.0101) * wd1_y + wd1_x * t49 + t2 * t50 + R(2.0) * (w1_y * t57 - w1_x * t60);
+        c0[11 * W + b] = t71 - (t17 * t27 + s2_x * t28); /* c0(3, 5, 2) */
+        c0[16 * W + b] = t71 - (t16 * t27 + t15 * t28); /* c0(6, 5, 2) */
+        c0[21 * W + b] = t71 - (t14 * t27 + t13 * t28); /* c0(7, 5, 2) */
+        const real t72 = s2_x * t43;
+        const real t73 = R(0.0101) * wd7_x - wd7_y * t49 - wd7_z * t50 + w7_x * t57 + w1_y * t60 + qd2 * t64;
+        const real t74 = t2 * t52 - (wd1_y * t49 + wd1_x * t54) + R(2.0) * (w1_y * t58 - w1_x * t62);
+        const real t75 = wd1_x * t52 - wd1_y * t50 - t2 * n2_c2_z + R(2.0) * (w1_y * t59 - w1_x * t63);
+        const real t76 = t26 + w1_x * v2_z - w1_y * t20 - t43;
+        const real t77 = t27 + t42;
+        c0[6 * W + b] = t75 + t72 + R(0.25320821471666355) * t42 + s2_x * t76 - R(0.25320821471666355) * t77; /* c0(2, 5, 2) */
+        const real t78 = sin2 * (t71 - (t67 + R(0.25320821471666355) * t44)) + cos2 * (t74 + t73 - s2_x * t44);
+        c0[1 * W + b] = t78 + s1_x * t76 - t18 * t77 + s1_z * t28; /* c0(1, 5, 2) */
+        const real t79 = R(0.0101) * t4;
+        const real t80 = t4 * t49;
+        const real t81 = t4 * t50;
+        const real t82 = R(2.0) * (qd2 * t60 - w1_y * t64);
+        const real t83 = R(2.0) * (qd2 * t62 - w1_y * t65);
+        const real t84 = R(2.0) * (qd2 * t63 - w1_y * t66);
+        const real t85 = t82 - (t79 + t5 * t49 + t6 * t50);
+        c0[17 * W + b] = t85 - (t16 * t32 + t15 * t33); /* c0(6, 5, 3) */
+        c0[22 * W + b] = t85 - (t14 * t32 + t13 * t33); /* c0(7, 5, 3) */
+        const real t86 = t85 + t72 - t17 * t44;
+        const real t87 = t32 - t44;
+        const real t88 = t33 + t43;
+        c0[12 * W + b] = t86 - (t17 * t87 + s2_x * t88); /* c0(3, 5, 3) */
+        const real t89 = sin2 * t86 + cos2 * (t80 + t5 * t54 - t6 * t52 + t83 - (t68 + s2_x * t42));
+        c0[2 * W + b] = t89 + s1_x * t31 - t18 * t87 + s1_z * t88; /* c0(1, 5, 3) */
+        const real t90 = t81 - t5 * t52 + t6 * n2_c2_z + t84 + t67 + t17 * t42;
+        c0[7 * W + b] = t90 + s2_x * t31 - R(0.25320821471666355) * t87; /* c0(2, 5, 3) */
+        const real t91 = t82 - (t79 + t7 * t49 + t8 * t50);
+        c0[23 * W + b] = t91 - (t14 * t37 + t13 * t38); /* c0(7, 5, 6) */
+        const real t92 = t91 + t15 * t43 - t16 * t44;
+        const real t93 = t37 - t44;
+        const real t94 = t38 + t43;
+        c0[13 * W + b] = t92 - (t17 * t93 + s2_x * t94); /* c0(3, 5, 6) */
+        c0[18 * W + b] = t92 - (t16 * t93 + t15 * t94); /* c0(6, 5, 6) */
+        const real t95 = sin2 * t92 + cos2 * (t83 + t80 + t7 * t54 - t8 * t52 - (t68 + t15 * t42));
+        c0[3 * W + b] = t95 + s1_x * t36 - t18 * t93 + s1_z * t94; /* c0(1, 5, 6) */
+        const real t96 = t84 + t81 - t7 * t52 + t8 * n2_c2_z + t67 + t16 * t42;
+        c0[8 * W + b] = t96 + s2_x * t36 - R(0.25320821471666355) * t93; /* c0(2, 5, 6) */
+        const real t97 = t82 - (t79 + t9 * t49 + t10 * t50) + t13 * t43 - t14 * t44;
+        const real t98 = t40 + wd6_x * t13 + qd2 * sd7_x + w6_x * t23 - t44;
+        const real t99 = w6_x * sd7_y - w1_y * sd7_x - (t39 + wd6_x * t14) + t43;
+        c0[14 * W + b] = t97 - (t17 * t98 + s2_x * t99); /* c0(3, 5, 7) */
+        c0[19 * W + b] = t97 - (t16 * t98 + t15 * t99); /* c0(6, 5, 7) */
+        c0[24 * W + b] = t97 - (t14 * t98 + t13 * t99); /* c0(7, 5, 7) */
+        const real t100 = sin2 * t97 + cos2 * (t83 + t80 + t9 * t54 - t10 * t52 - (t68 + t13 * t42));
+        c0[4 * W + b] = t100 + s1_x * t41 - t18 * t98 + s1_z * t99; /* c0(1, 5, 7) */
+        const real t101 = t84 + t81 - t9 * t52 + t10 * n2_c2_z + t67 + t14 * t42;
+        c0[9 * W + b] = t101 + s2_x * t41 - R(0.25320821471666355) * t98; /* c0(2, 5, 7) */
     }
 }
 #endif

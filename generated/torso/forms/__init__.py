@@ -5,7 +5,7 @@ m/s^2 of a prismatic joint); and p, the run-time parameters by name. It returns 
 numbers where nothing moves: c2 in kg m^2, c1 in kg m^2/s, g and tau in N m, c0 in N m/rad (for prismatic joints
 accordingly). Vectors have components _x, _y, _z; numbers in names count joints from 1, and 0 is the base:
 
-    s3, c3          sine and cosine of joint 3 (3b: of another joint that follows coordinate 3)
+    sin3, cos3      sine and cosine of joint 3 (3b: of another joint that follows coordinate 3)
     x3, y3, z3      axes of the frame that joint 3 moves; z3 is the joint's own axis
     s3_x, s3_y ...  moment (p - o) x z3 of the axis about the origin o, p a point on it
     zd3, sd3        how z3 and that moment change by the joints before

@@ -35,27 +35,27 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     qdd3 = qdd[..., 2]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
     w3_x = qd3 + w1_x
-    t1 = 0.21 * c3 - 0.012 * s3
-    t2 = 0.21 * s3 + 0.012 * c3
+    t1 = 0.21 * cos3 - 0.012 * sin3
+    t2 = 0.21 * sin3 + 0.012 * cos3
     f3_c2_z = 12.5 * t1
-    t3 = 0.009 * s3
-    t4 = 0.155 * c3 + t3
-    t5 = 0.009 * c3
-    t6 = t5 + 0.032 * s3
-    t7 = 0.003 * c3 + 0.002 * s3 + 0.0375 * t1
-    t8 = 0.003 * s3 - 0.002 * c3 + 0.0375 * t2
+    t3 = 0.009 * sin3
+    t4 = 0.155 * cos3 + t3
+    t5 = 0.009 * cos3
+    t6 = t5 + 0.032 * sin3
+    t7 = 0.003 * cos3 + 0.002 * sin3 + 0.0375 * t1
+    t8 = 0.003 * sin3 - 0.002 * cos3 + 0.0375 * t2
     t9 = t1 * f3_c2_z
-    t10 = c3 * t4 + s3 * t6 + t9
-    t11 = s3 * t4 - c3 * t6 + t2 * f3_c2_z
+    t10 = cos3 * t4 + sin3 * t6 + t9
+    t11 = sin3 * t4 - cos3 * t6 + t2 * f3_c2_z
     t12 = t2 * (12.5 * t2)
-    t13 = s3 * (0.155 * s3 - t5) + c3 * (0.032 * c3 - t3) + t12
+    t13 = sin3 * (0.155 * sin3 - t5) + cos3 * (0.032 * cos3 - t3) + t12
     t14 = 0.273 + t12 + 0.0001125 + t9
     n3_c2_x = t14 - 0.0861125
     t15 = t14 - t10
@@ -68,31 +68,31 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     t21 = w3_x * t11
     t22 = w1_y * t7
     t23 = qd2 * t11
-    t24 = 122.625 * s2
-    t25 = t2 * (122.625 * c2)
-    g_2 = 0.367875 * c2 - t1 * t24
-    g_1 = c2 * (t2 * t24) - s2 * t25
-    n1_c2_x = s2 * n3_c2_x - c2 * t7
-    n1_c2_y = c2 * t15 - s2 * t7
-    t26 = s2 * t8 + c2 * t11
-    n1_c1_x = s2 * (t16 - t17) + c2 * (qd2 * t10 - t20)
-    n1_c1_y = s2 * t18 + c2 * (t21 - t16)
-    n1_c1_z = s2 * t19 + c2 * (t22 - w3_x * t10)
-    c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y
-    c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y
+    t24 = 122.625 * sin2
+    t25 = t2 * (122.625 * cos2)
+    g_2 = 0.367875 * cos2 - t1 * t24
+    g_1 = cos2 * (t2 * t24) - sin2 * t25
+    n1_c2_x = sin2 * n3_c2_x - cos2 * t7
+    n1_c2_y = cos2 * t15 - sin2 * t7
+    t26 = sin2 * t8 + cos2 * t11
+    n1_c1_x = sin2 * (t16 - t17) + cos2 * (qd2 * t10 - t20)
+    n1_c1_y = sin2 * t18 + cos2 * (t21 - t16)
+    n1_c1_z = sin2 * t19 + cos2 * (t22 - w3_x * t10)
+    c2_1_1 = sin2 * n1_c2_x + cos2 * n1_c2_y
+    c1_1_1 = sin2 * n1_c1_x + cos2 * n1_c1_y
     tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1
     tau2_1 = g_2 + qd1 * n1_c1_z
     tau3_1 = qd1 * n1_c1_x - t25
     n2_c1_x = t23 - w1_y * t13 + w1_y * n3_c2_x + w1_x * t7
     n2_c1_y = w3_x * t13 - qd2 * t8 - (t22 + w1_x * t15)
     n2_c1_z = t17 - t21 + w1_x * t11 - t17
-    c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y
+    c1_1_2 = sin2 * n2_c1_x + cos2 * n2_c1_y
     tau1_2 = tau1_1 - qdd2 * t26 + qd2 * c1_1_2
     tau2_2 = tau2_1 - qdd1 * t26 + qdd2 * n2_c2_z + qd2 * n2_c1_z
     tau3_2 = tau3_1 + qd2 * n2_c1_x
     n3_c1_y = t18 + t20 + qd2 * t15
     n3_c1_z = t19 - (t23 + w1_y * n2_c2_z)
-    c1_1_3 = c2 * n3_c1_y
+    c1_1_3 = cos2 * n3_c1_y
 
     # outputs
     return (
@@ -144,36 +144,36 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     qdd3 = qdd[..., 2]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    t1 = 9.81 * s2
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    t1 = 9.81 * sin2
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
+    wd1_x = qdd1 * sin2
+    wd1_y = qdd1 * cos2
     wd2_x = wd1_x + qd2 * w1_y
     wd2_y = wd1_y - qd2 * w1_x
     w3_x = qd3 + w1_x
     wd3_x = qdd3 + wd2_x
     wd3_y = wd2_y + qd2 * qd3
     wd3_z = qdd2 - qd3 * w1_y
-    t2 = 0.21 * c3 - 0.012 * s3
-    t3 = 0.21 * s3 + 0.012 * c3
+    t2 = 0.21 * cos3 - 0.012 * sin3
+    t3 = 0.21 * sin3 + 0.012 * cos3
     f3_c2_z = 12.5 * t2
     t4 = 12.5 * t3
-    t5 = 0.009 * s3
-    t6 = 0.155 * c3 + t5
-    t7 = 0.009 * c3
-    t8 = t7 + 0.032 * s3
-    t9 = 0.003 * c3 + 0.002 * s3 + 0.0375 * t2
-    t10 = 0.003 * s3 - 0.002 * c3 + 0.0375 * t3
+    t5 = 0.009 * sin3
+    t6 = 0.155 * cos3 + t5
+    t7 = 0.009 * cos3
+    t8 = t7 + 0.032 * sin3
+    t9 = 0.003 * cos3 + 0.002 * sin3 + 0.0375 * t2
+    t10 = 0.003 * sin3 - 0.002 * cos3 + 0.0375 * t3
     t11 = t2 * f3_c2_z
-    t12 = c3 * t6 + s3 * t8 + t11
-    t13 = s3 * t6 - c3 * t8 + t3 * f3_c2_z
+    t12 = cos3 * t6 + sin3 * t8 + t11
+    t13 = sin3 * t6 - cos3 * t8 + t3 * f3_c2_z
     t14 = t3 * t4
-    t15 = s3 * (0.155 * s3 - t7) + c3 * (0.032 * c3 - t5) + t14
+    t15 = sin3 * (0.155 * sin3 - t7) + cos3 * (0.032 * cos3 - t5) + t14
     t16 = 0.273 + t14 + 0.0001125 + t11
     n3_c2_x = t16 - 0.0861125
     n2_c2_z = t16 - t15
@@ -183,13 +183,13 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     t20 = w3_x * (w3_x * t10 - 0.0861125 * qd2) + w1_y * (t19 - t17)
     t21 = w3_x * (0.0861125 * w1_y - w3_x * t9) + w1_y * (w1_y * t9 - w3_x * t12)
     t22 = w3_x * (t17 - t18) + w1_y * (qd2 * t12 - w1_y * t13) + qd2 * (qd2 * t13 - w1_y * t15)
-    t23 = wd3_x * n3_c2_x - wd3_y * t9 - wd3_z * t10 - 9.81 * c2 * t4 + t22
+    t23 = wd3_x * n3_c2_x - wd3_y * t9 - wd3_z * t10 - 9.81 * cos2 * t4 + t22
     t24 = t1 * t4 + wd3_y * (t16 - t12) - wd3_x * t9 - wd3_z * t13
-    t25 = 0.367875 * c2 - t1 * f3_c2_z + wd3_z * n2_c2_z - (wd3_x * t10 + wd3_y * t13)
+    t25 = 0.367875 * cos2 - t1 * f3_c2_z + wd3_z * n2_c2_z - (wd3_x * t10 + wd3_y * t13)
 
     # outputs
     return (
-        s2 * t23 + c2 * (t24 + t20 + qd2 * (w3_x * t15 - qd2 * t10)),  # tau(1, 1)
+        sin2 * t23 + cos2 * (t24 + t20 + qd2 * (w3_x * t15 - qd2 * t10)),  # tau(1, 1)
         t25 + t21 + qd2 * (t18 - t19),  # tau(2, 1)
         t23,  # tau(3, 1)
     )
@@ -211,16 +211,16 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     qdd3 = qdd[..., 2]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    t1 = 9.81 * s2
-    t2 = 9.81 * c2
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    t1 = 9.81 * sin2
+    t2 = 9.81 * cos2
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
+    wd1_x = qdd1 * sin2
+    wd1_y = qdd1 * cos2
     t3 = w1_y * w1_y
     t4 = w1_x * w1_x + t3
     t5 = qd2 * w1_x
@@ -233,22 +233,22 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     wd3_x = qdd3 + wd2_x
     wd3_y = wd2_y + qd2 * qd3
     wd3_z = qdd2 - qd3 * w1_y
-    t9 = 0.21 * c3 - 0.012 * s3
-    t10 = 0.21 * s3 + 0.012 * c3
-    t11 = c2 * t1 - s2 * t2
+    t9 = 0.21 * cos3 - 0.012 * sin3
+    t10 = 0.21 * sin3 + 0.012 * cos3
+    t11 = cos2 * t1 - sin2 * t2
     f3_c2_z = 12.5 * t9
     t12 = 12.5 * t10
-    t13 = 0.009 * s3
-    t14 = 0.155 * c3 + t13
-    t15 = 0.009 * c3
-    t16 = t15 + 0.032 * s3
-    t17 = 0.003 * c3 + 0.002 * s3 + 0.0375 * t9
-    t18 = 0.003 * s3 - 0.002 * c3 + 0.0375 * t10
+    t13 = 0.009 * sin3
+    t14 = 0.155 * cos3 + t13
+    t15 = 0.009 * cos3
+    t16 = t15 + 0.032 * sin3
+    t17 = 0.003 * cos3 + 0.002 * sin3 + 0.0375 * t9
+    t18 = 0.003 * sin3 - 0.002 * cos3 + 0.0375 * t10
     t19 = t9 * f3_c2_z
-    t20 = c3 * t14 + s3 * t16 + t19
-    t21 = s3 * t14 - c3 * t16 + t10 * f3_c2_z
+    t20 = cos3 * t14 + sin3 * t16 + t19
+    t21 = sin3 * t14 - cos3 * t16 + t10 * f3_c2_z
     t22 = t10 * t12
-    t23 = s3 * (0.155 * s3 - t15) + c3 * (0.032 * c3 - t13) + t22
+    t23 = sin3 * (0.155 * sin3 - t15) + cos3 * (0.032 * cos3 - t13) + t22
     t24 = 0.273 + t22 + 0.0001125 + t19
     n3_c2_x = t24 - 0.0861125
     t25 = t24 - t20
@@ -265,7 +265,7 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t35 = qd2 * t21 - w1_y * t23
     t36 = w3_x * t23 - qd2 * t18
     t37 = t27 - t32
-    t38 = 0.367875 * c2
+    t38 = 0.367875 * cos2
     t39 = t2 * t12
     t40 = t1 * t12
     t41 = t40 + wd3_y * t25 - wd3_x * t17 - wd3_z * t21 + w3_x * t29 + w1_y * t33 + qd2 * t36
@@ -274,17 +274,17 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t44 = t11 * f3_c2_z
     t45 = t2 * f3_c2_z
     t46 = t40 + wd1_y * n3_c2_x + wd1_x * t17 + t4 * t18 + 2.0 * (w1_y * t28 - w1_x * t31)
-    t47 = wd1_x * t21 - wd1_y * t18 - t4 * n2_c2_z - (0.367875 * s2 + t45)
+    t47 = wd1_x * t21 - wd1_y * t18 - t4 * n2_c2_z - (0.367875 * sin2 + t45)
     t48 = wd3_x * n3_c2_x - wd3_y * t17 - wd3_z * t18 - t39 + w3_x * t28 + w1_y * t31 + qd2 * t35
     t49 = t48 + t39 + t4 * t21 - (wd1_y * t17 + wd1_x * t25) + 2.0 * (w1_y * t29 - w1_x * t33)
     t50 = 2.0 * (qd2 * t31 - w1_y * t35) - (t45 + t6 * n3_c2_x + t7 * t17 + t8 * t18)
-    t51 = c2 * (t38 + t6 * t17 + t7 * t25 - t8 * t21 + 2.0 * (qd2 * t33 - w1_y * t36) - t43)
+    t51 = cos2 * (t38 + t6 * t17 + t7 * t25 - t8 * t21 + 2.0 * (qd2 * t33 - w1_y * t36) - t43)
 
     # outputs
     return (
-        s2 * (t44 + c2 * t43) - c2 * (0.0375 * t11 + s2 * t43),  # c0(1, 1, 1)
-        s2 * (t46 - t41) + c2 * t49,  # c0(1, 1, 2)
-        s2 * t50 + t51,  # c0(1, 1, 3)
+        sin2 * (t44 + cos2 * t43) - cos2 * (0.0375 * t11 + sin2 * t43),  # c0(1, 1, 1)
+        sin2 * (t46 - t41) + cos2 * t49,  # c0(1, 1, 2)
+        sin2 * t50 + t51,  # c0(1, 1, 3)
         0.0,  # c0(2, 1, 1)
         t47 + 2.0 * (w1_y * t30 - w1_x * t34),  # c0(2, 1, 2)
         t41 + t6 * t18 - t7 * t21 + t8 * n2_c2_z + 2.0 * (qd2 * t34 - w1_y * t37),  # c0(2, 1, 3)

@@ -38,20 +38,20 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     qdd4 = qdd[..., 3]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    x4_y = c3 * c4 - s3 * s4
-    x4_z = s3 * c4 + c3 * s4
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    x4_y = cos3 * cos4 - sin3 * sin4
+    x4_z = sin3 * cos4 + cos3 * sin4
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
     w3_x = qd3 + w1_x
     w4_x = qd4 + w3_x
-    t1 = 0.37 * c3
-    s4_y = 0.37 * s3
+    t1 = 0.37 * cos3
+    s4_y = 0.37 * sin3
     t2 = t1 - (0.125 * x4_y + 0.008 * x4_z)
     t3 = 0.008 * x4_y - 0.125 * x4_z + s4_y
     v4_y = qd4 * s4_y
@@ -95,22 +95,22 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     t36 = t28 + t31
     t37 = w4_x * t12 - 0.0996776 * qd2 - 0.4536 * v4_y
     t38 = 0.0996776 * w1_y - w4_x * t11 + 0.4536 * t4
-    t39 = 20.601 * s2
-    t40 = 20.601 * c2
+    t39 = 20.601 * sin2
+    t40 = 20.601 * cos2
     t41 = t3 * t40
-    g_2 = 4.449816 * c2 - t2 * t39
-    g_1 = c2 * (t3 * t39) - s2 * t41
+    g_2 = 4.449816 * cos2 - t2 * t39
+    g_1 = cos2 * (t3 * t39) - sin2 * t41
     g_4 = s4_y * t40 - t41
-    n1_c2_x = s2 * n3_c2_x - c2 * t11
-    n1_c2_y = c2 * t19 - s2 * t11
-    t42 = s2 * t12 + c2 * t15
-    n1_c1_x = s2 * t36 + c2 * (qd2 * t14 - t32)
-    n1_c1_y = s2 * t37 + c2 * (t33 - t29 + t28 - t26)
-    n1_c1_z = s2 * t38 + c2 * (t34 - w4_x * t14 + t4 * f3_c2_z)
-    f1_c1_z = s2 * t24 - c2 * t21
-    c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y
-    c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y
-    c1_4_1 = n1_c1_x - (s4_y * (s2 * t25) + t1 * f1_c1_z)
+    n1_c2_x = sin2 * n3_c2_x - cos2 * t11
+    n1_c2_y = cos2 * t19 - sin2 * t11
+    t42 = sin2 * t12 + cos2 * t15
+    n1_c1_x = sin2 * t36 + cos2 * (qd2 * t14 - t32)
+    n1_c1_y = sin2 * t37 + cos2 * (t33 - t29 + t28 - t26)
+    n1_c1_z = sin2 * t38 + cos2 * (t34 - w4_x * t14 + t4 * f3_c2_z)
+    f1_c1_z = sin2 * t24 - cos2 * t21
+    c2_1_1 = sin2 * n1_c2_x + cos2 * n1_c2_y
+    c1_1_1 = sin2 * n1_c1_x + cos2 * n1_c1_y
+    c1_4_1 = n1_c1_x - (s4_y * (sin2 * t25) + t1 * f1_c1_z)
     tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1
     tau2_1 = g_2 + qd1 * n1_c1_z
     tau3_1 = qd1 * n1_c1_x - t41
@@ -120,7 +120,7 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     n2_c1_y = w4_x * t17 - qd2 * t12 - v4_y * t6 - (t34 + w1_x * t19)
     n2_c1_z = t30 - t33 + t27 + t28 + w1_x * t15 - t30
     f2_c1_y = t21 - t20
-    c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y
+    c1_1_2 = sin2 * n2_c1_x + cos2 * n2_c1_y
     c1_4_2 = n2_c1_x + s4_y * f2_c1_y - t1 * f2_c1_z
     tau1_2 = tau1_1 - qdd2 * t42 + qd2 * c1_1_2
     tau2_2 = tau2_1 - qdd1 * t42 + qdd2 * n2_c2_z + qd2 * n2_c1_z
@@ -132,24 +132,24 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     n3_c1_y = t37 + t43
     n3_c1_z = t38 - t44
     f3_c1_z = t24 - t22
-    c1_1_3 = s2 * n3_c1_x + c2 * n3_c1_y
+    c1_1_3 = sin2 * n3_c1_x + cos2 * n3_c1_y
     c1_4_3 = n3_c1_x - (s4_y * (t23 + t25) + t1 * f3_c1_z)
     tau1_3 = tau1_2 + qdd3 * n1_c2_x + qd3 * c1_1_3
     tau2_3 = tau2_2 - qdd3 * t12 + qd3 * n3_c1_z
     tau3_3 = tau3_2 + qdd1 * n1_c2_x - qdd2 * t12 + qdd3 * n3_c2_x + qd3 * n3_c1_x
     tau4_3 = tau4_2 + qd3 * c1_4_3
     n4_c2_x = n3_c2_x - (t1 * f3_c2_z + s4_y * t6)
-    n4_c2_y = 0.167832 * c3 - t11
-    n4_c2_z = 0.167832 * s3 - t12
-    f4_c2_y = 0.777 * s3 - t6
-    f4_c2_z = f3_c2_z - 0.777 * c3
+    n4_c2_y = 0.167832 * cos3 - t11
+    n4_c2_z = 0.167832 * sin3 - t12
+    f4_c2_y = 0.777 * sin3 - t6
+    f4_c2_z = f3_c2_z - 0.777 * cos3
     n4_c1_x = t36 + sd4_z * f3_c2_z - sd4_y * t6 - t31
     n4_c1_y = t37 + t43 - (t5 * t6 + 0.4536 * sd4_z)
     n4_c1_z = t38 + 0.4536 * sd4_y + t5 * f3_c2_z - t44
     f4_c1_y = 2.1 * sd4_y - t23 - t25
     f4_c1_z = t24 + 2.1 * sd4_z - t22
-    c2_1_4 = s2 * n4_c2_x + c2 * n4_c2_y
-    c1_1_4 = s2 * n4_c1_x + c2 * n4_c1_y
+    c2_1_4 = sin2 * n4_c2_x + cos2 * n4_c2_y
+    c1_1_4 = sin2 * n4_c1_x + cos2 * n4_c1_y
     c2_4_4 = n4_c2_x + s4_y * f4_c2_y - t1 * f4_c2_z
     c1_4_4 = n4_c1_x + s4_y * f4_c1_y - t1 * f4_c1_z
 
@@ -219,18 +219,18 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     qdd4 = qdd[..., 3]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    x4_y = c3 * c4 - s3 * s4
-    x4_z = s3 * c4 + c3 * s4
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    x4_y = cos3 * cos4 - sin3 * sin4
+    x4_z = sin3 * cos4 + cos3 * sin4
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
+    wd1_x = qdd1 * sin2
+    wd1_y = qdd1 * cos2
     wd2_x = wd1_x + qd2 * w1_y
     wd2_y = wd1_y - qd2 * w1_x
     w3_x = qd3 + w1_x
@@ -241,16 +241,16 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     wd4_x = qdd4 + wd3_x
     wd4_y = wd3_y + qd2 * qd4
     wd4_z = wd3_z - qd4 * w1_y
-    t1 = 0.37 * c3
-    s4_y = 0.37 * s3
+    t1 = 0.37 * cos3
+    s4_y = 0.37 * sin3
     t2 = t1 - (0.125 * x4_y + 0.008 * x4_z)
     t3 = 0.008 * x4_y - 0.125 * x4_z + s4_y
     v4_y = qd4 * s4_y
     t4 = qd4 * t1
     sd4_y = w3_x * t1
     sd4_z = w3_x * s4_y
-    t5 = 9.81 * s2 - qd4 * (w1_y * t1 + qd2 * s4_y)
-    t6 = qdd4 * s4_y + 9.81 * c2 + qd4 * sd4_y
+    t5 = 9.81 * sin2 - qd4 * (w1_y * t1 + qd2 * s4_y)
+    t6 = qdd4 * s4_y + 9.81 * cos2 + qd4 * sd4_y
     t7 = qd4 * sd4_z - qdd4 * t1
     f3_c2_z = 2.1 * t2
     t8 = 2.1 * t3
@@ -288,7 +288,7 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
 
     # outputs
     return (
-        s2 * t32 + c2 * (t33 + t29 + qd2 * (w4_x * t19 - qd2 * t14 - v4_y * t8)),  # tau(1, 2)
+        sin2 * t32 + cos2 * (t33 + t29 + qd2 * (w4_x * t19 - qd2 * t14 - v4_y * t8)),  # tau(1, 2)
         0.4536 * t6 - t5 * f3_c2_z + wd4_z * n2_c2_z - (wd4_x * t14 + wd4_y * t17) + t34,  # tau(2, 2)
         t32,  # tau(3, 2)
         t32 + s4_y * (2.1 * t6 + 0.4536 * wd4_z - wd4_x * t8 + t35) - t37,  # tau(4, 2)
@@ -314,20 +314,20 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     qdd4 = qdd[..., 3]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    x4_y = c3 * c4 - s3 * s4
-    x4_z = s3 * c4 + c3 * s4
-    t1 = 9.81 * s2
-    t2 = 9.81 * c2
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    x4_y = cos3 * cos4 - sin3 * sin4
+    x4_z = sin3 * cos4 + cos3 * sin4
+    t1 = 9.81 * sin2
+    t2 = 9.81 * cos2
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
+    wd1_x = qdd1 * sin2
+    wd1_y = qdd1 * cos2
     t3 = w1_y * w1_y
     t4 = w1_x * w1_x + t3
     t5 = qd2 * w1_x
@@ -346,8 +346,8 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     wd4_x = qdd4 + wd3_x
     wd4_y = wd3_y + qd2 * qd4
     wd4_z = wd3_z - qd4 * w1_y
-    t11 = 0.37 * c3
-    s4_y = 0.37 * s3
+    t11 = 0.37 * cos3
+    s4_y = 0.37 * sin3
     t12 = t11 - (0.125 * x4_y + 0.008 * x4_z)
     t13 = 0.008 * x4_y - 0.125 * x4_z + s4_y
     v4_y = qd4 * s4_y
@@ -355,7 +355,7 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t15 = w1_y * t11 + qd2 * s4_y
     sd4_y = w3_x * t11
     sd4_z = w3_x * s4_y
-    t16 = c2 * t1 - s2 * t2
+    t16 = cos2 * t1 - sin2 * t2
     t17 = w1_y * sd4_z - qd2 * sd4_y - (wd3_y * t11 + wd3_z * s4_y)
     t18 = wd3_x * t11 - (qd2 * t15 + w3_x * sd4_z)
     t19 = wd3_x * s4_y - t2 + w3_x * sd4_y + w1_y * t15
@@ -411,7 +411,7 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t66 = t16 * f3_c2_z
     t67 = t2 * f3_c2_z
     t68 = t1 * t23 + wd1_y * n3_c2_x + wd1_x * t28 + t4 * t29 + 2.0 * (w1_y * t48 - w1_x * t45)
-    t69 = wd1_x * t32 - wd1_y * t29 - t4 * n2_c2_z - (4.449816 * s2 + t67)
+    t69 = wd1_x * t32 - wd1_y * t29 - t4 * n2_c2_z - (4.449816 * sin2 + t67)
     t70 = t2 * t23 + t4 * t32 - (wd1_y * t28 + wd1_x * t36) + 2.0 * (w1_y * t49 - w1_x * t50)
     t71 = t11 * (wd1_y * f3_c2_z + 0.4536 * wd1_x + 2.0 * (w1_y * t38 + w1_x * t37))
     t72 = t6 * n3_c2_x
@@ -426,15 +426,15 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t81 = 2.0 * t56
     t82 = t77 - (t67 + t72 + t7 * t28 + t8 * t29)
     t83 = t77 + t19 * f3_c2_z - t18 * t23 - (t72 + t9 * t28 + t10 * t29) + s4_y * t65 + t11 * t64
-    t84 = c2 * (t78 + t17 * t23 - 0.4536 * t19 + t73 + t9 * t36 - t10 * t32 - (t62 + t11 * t63))
+    t84 = cos2 * (t78 + t17 * t23 - 0.4536 * t19 + t73 + t9 * t36 - t10 * t32 - (t62 + t11 * t63))
     t85 = s4_y * (2.1 * t18 + t75 + 0.4536 * t10 - t80 - t65)
 
     # outputs
     return (
-        s2 * (t66 + c2 * t62) - c2 * (0.4536 * t16 + s2 * t62),  # c0(1, 2, 1)
-        s2 * (t68 - t60) + c2 * (t58 + w4_x * t48 + w1_y * t45 + qd2 * t47 + t70),  # c0(1, 2, 2)
-        s2 * t82 + c2 * (4.449816 * c2 + t73 + t7 * t36 - t8 * t32 + t78 - t62),  # c0(1, 2, 3)
-        s2 * t83 + t84,  # c0(1, 2, 4)
+        sin2 * (t66 + cos2 * t62) - cos2 * (0.4536 * t16 + sin2 * t62),  # c0(1, 2, 1)
+        sin2 * (t68 - t60) + cos2 * (t58 + w4_x * t48 + w1_y * t45 + qd2 * t47 + t70),  # c0(1, 2, 2)
+        sin2 * t82 + cos2 * (4.449816 * cos2 + t73 + t7 * t36 - t8 * t32 + t78 - t62),  # c0(1, 2, 3)
+        sin2 * t83 + t84,  # c0(1, 2, 4)
         0.0,  # c0(2, 2, 1)
         t69 + 2.0 * (w1_y * t52 - w1_x * t53),  # c0(2, 2, 2)
         t60 + t74 - t7 * t32 + t8 * n2_c2_z + t79,  # c0(2, 2, 3)
@@ -444,7 +444,7 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
         t82,  # c0(3, 2, 3)
         t83,  # c0(3, 2, 4)
         t66 - t11 * (2.1 * t16),  # c0(4, 2, 1)
-        t68 - (s4_y * (20.601 * s2 + 0.4536 * t4 + wd1_y * t23 + 2.0 * t55) + t71),  # c0(4, 2, 2)
-        t82 + s4_y * (0.4536 * t8 + t75 - t80) + t11 * (20.601 * c2 + t76 + 0.4536 * t7 + t81),  # c0(4, 2, 3)
+        t68 - (s4_y * (20.601 * sin2 + 0.4536 * t4 + wd1_y * t23 + 2.0 * t55) + t71),  # c0(4, 2, 2)
+        t82 + s4_y * (0.4536 * t8 + t75 - t80) + t11 * (20.601 * cos2 + t76 + 0.4536 * t7 + t81),  # c0(4, 2, 3)
         t83 + t85 - t11 * (t64 + 2.1 * t19 - (t76 + 0.4536 * t9) - t81),  # c0(4, 2, 4)
     )

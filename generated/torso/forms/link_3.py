@@ -41,34 +41,34 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     qdd5 = qdd[..., 4]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    s5 = xp.sin(q5)
-    c5 = xp.cos(q5)
-    x4_y = c3 * c4 - s3 * s4
-    x4_z = s3 * c4 + c3 * s4
-    x5_y = c5 * x4_y - s5 * x4_z
-    x5_z = c5 * x4_z + s5 * x4_y
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    sin5 = xp.sin(q5)
+    cos5 = xp.cos(q5)
+    x4_y = cos3 * cos4 - sin3 * sin4
+    x4_z = sin3 * cos4 + cos3 * sin4
+    x5_y = cos5 * x4_y - sin5 * x4_z
+    x5_z = cos5 * x4_z + sin5 * x4_y
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
     w3_x = qd3 + w1_x
     w4_x = qd4 + w3_x
     w5_x = qd5 + w4_x
-    t1 = 11.607348534441448 * s2
-    t2 = 11.607348534441448 * c2
+    t1 = 11.607348534441448 * sin2
+    t2 = 11.607348534441448 * cos2
     t3 = 0.15618450627382988 * x5_y + 0.020114671262538696 * x5_z
     t4 = 0.020114671262538696 * x5_y - 0.15618450627382988 * x5_z
     t5 = t3 + 0.3313004678535785 * x4_y + 0.023664319132398463 * x4_z
     t6 = t4 + 0.023664319132398463 * x4_y - 0.3313004678535785 * x4_z
-    s2_x = t5 - 0.43778990394937156 * c3
-    t7 = t6 + 0.43778990394937156 * s3
-    s1_x = c2 * t7
-    t8 = s2 * t7
-    t9 = 0.25320821471666355 * c2 + s2 * s2_x
+    s2_x = t5 - 0.43778990394937156 * cos3
+    t7 = t6 + 0.43778990394937156 * sin3
+    s1_x = cos2 * t7
+    t8 = sin2 * t7
+    t9 = 0.25320821471666355 * cos2 + sin2 * s2_x
     v4_y = qd5 * t4
     v4_z = qd5 * t3
     v3_y = v4_y + qd4 * t6
@@ -79,9 +79,9 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     v1_y = v2_y - 0.25320821471666355 * qd2
     v0_y = v1_y + qd1 * t8
     v0_z = v2_z + qd1 * t9
-    t10 = c2 * v0_z
-    sd1_y = s2 * v0_z
-    t11 = c2 * (sd2_y + qd1 * s1_x) + s2 * v0_y
+    t10 = cos2 * v0_z
+    sd1_y = sin2 * v0_z
+    t11 = cos2 * (sd2_y + qd1 * s1_x) + sin2 * v0_y
     t12 = w1_y * s2_x
     sd2_z = 0.25320821471666355 * w1_x - t12
     sd3_x = qd2 * t7 - t12
@@ -113,17 +113,17 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     t31 = w1_y * n3_c2_y
     t32 = qd2 * t22
     g_1 = t1 * s1_x - t2 * t8
-    g_2 = t1 * s2_x + 2.939076 * c2
+    g_2 = t1 * s2_x + 2.939076 * cos2
     t33 = t2 * t7
     t34 = t2 * t6
     t35 = t2 * t4
-    n1_c2_x = 0.0101 * s2 + c2 * n3_c2_y
-    n1_c2_y = s2 * n3_c2_y + c2 * t24
-    n1_c1_x = c2 * (qd2 * t21 - t29) - s2 * (t25 + t26)
-    n1_c1_y = s2 * t27 + c2 * (t25 + t30)
-    n1_c1_z = s2 * t28 - c2 * (t31 + w5_x * t21)
-    c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y + s1_x * s1_x + t8 * t8 + t9 * t9
-    c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y + t9 * t11 - (s1_x * t10 + t8 * sd1_y)
+    n1_c2_x = 0.0101 * sin2 + cos2 * n3_c2_y
+    n1_c2_y = sin2 * n3_c2_y + cos2 * t24
+    n1_c1_x = cos2 * (qd2 * t21 - t29) - sin2 * (t25 + t26)
+    n1_c1_y = sin2 * t27 + cos2 * (t25 + t30)
+    n1_c1_z = sin2 * t28 - cos2 * (t31 + w5_x * t21)
+    c2_1_1 = sin2 * n1_c2_x + cos2 * n1_c2_y + s1_x * s1_x + t8 * t8 + t9 * t9
+    c1_1_1 = sin2 * n1_c1_x + cos2 * n1_c1_y + t9 * t11 - (s1_x * t10 + t8 * sd1_y)
     c1_2_1 = n1_c1_z + 0.25320821471666355 * sd1_y - s2_x * t10
     c1_3_1 = n1_c1_x + s2_x * t11 - t7 * sd1_y
     c1_4_1 = n1_c1_x + t5 * t11 - t6 * sd1_y
@@ -136,8 +136,8 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     n2_c1_x = t32 - w1_y * t23 + 0.0101 * w1_y - w1_x * n3_c2_y
     n2_c1_y = w5_x * t23 - qd2 * t20 + t31 - w1_x * t24
     n2_c1_z = t26 - t30 + w1_x * t22 - t26
-    c2_1_2 = s2_x * s1_x - 0.25320821471666355 * t8 - (s2 * t20 + c2 * t22)
-    c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y + s1_x * v1_y - t8 * sd2_y - t9 * sd2_z
+    c2_1_2 = s2_x * s1_x - 0.25320821471666355 * t8 - (sin2 * t20 + cos2 * t22)
+    c1_1_2 = sin2 * n2_c1_x + cos2 * n2_c1_y + s1_x * v1_y - t8 * sd2_y - t9 * sd2_z
     t36 = s2_x * s2_x
     c2_2_2 = n2_c2_z + t36 + 0.0641144
     c1_2_2 = n2_c1_z + s2_x * v1_y + 0.25320821471666355 * sd2_y
@@ -152,7 +152,7 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     n3_c1_y = t27 + t29 + qd2 * t24
     n3_c1_z = t28 - (t32 + w1_y * n2_c2_z)
     c2_1_3 = n1_c2_x + t7 * t8 + s2_x * t9
-    t37 = c2 * n3_c1_y
+    t37 = cos2 * n3_c1_y
     c1_1_3 = t37 + s1_x * sd3_x - t8 * sd3_y + t9 * t13
     t38 = t20 + 0.25320821471666355 * t7
     c1_2_3 = n3_c1_z + s2_x * sd3_x + 0.25320821471666355 * sd3_y
@@ -276,22 +276,22 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     qdd5 = qdd[..., 4]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    s5 = xp.sin(q5)
-    c5 = xp.cos(q5)
-    x4_y = c3 * c4 - s3 * s4
-    x4_z = s3 * c4 + c3 * s4
-    x5_y = c5 * x4_y - s5 * x4_z
-    x5_z = c5 * x4_z + s5 * x4_y
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    sin5 = xp.sin(q5)
+    cos5 = xp.cos(q5)
+    x4_y = cos3 * cos4 - sin3 * sin4
+    x4_z = sin3 * cos4 + cos3 * sin4
+    x5_y = cos5 * x4_y - sin5 * x4_z
+    x5_z = cos5 * x4_z + sin5 * x4_y
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
+    wd1_x = qdd1 * sin2
+    wd1_y = qdd1 * cos2
     wd2_x = wd1_x + qd2 * w1_y
     wd2_y = wd1_y - qd2 * w1_x
     w3_x = qd3 + w1_x
@@ -310,11 +310,11 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     t2 = 0.020114671262538696 * x5_y - 0.15618450627382988 * x5_z
     t3 = t1 + 0.3313004678535785 * x4_y + 0.023664319132398463 * x4_z
     t4 = t2 + 0.023664319132398463 * x4_y - 0.3313004678535785 * x4_z
-    s2_x = t3 - 0.43778990394937156 * c3
-    t5 = t4 + 0.43778990394937156 * s3
-    s1_x = c2 * t5
-    t6 = s2 * t5
-    t7 = 0.25320821471666355 * c2 + s2 * s2_x
+    s2_x = t3 - 0.43778990394937156 * cos3
+    t5 = t4 + 0.43778990394937156 * sin3
+    s1_x = cos2 * t5
+    t6 = sin2 * t5
+    t7 = 0.25320821471666355 * cos2 + sin2 * s2_x
     v4_y = qd5 * t2
     v4_z = qd5 * t1
     v3_y = v4_y + qd4 * t4
@@ -325,7 +325,7 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     v1_y = v2_y - 0.25320821471666355 * qd2
     v0_y = v1_y + qd1 * t6
     v0_z = v2_z + qd1 * t7
-    sd1_y = s2 * v0_z
+    sd1_y = sin2 * v0_z
     t8 = w1_y * s2_x
     sd2_z = 0.25320821471666355 * w1_x - t8
     sd3_x = qd2 * t5 - t8
@@ -334,9 +334,9 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     sd4_y = v3_z + w3_x * t3
     sd5_x = qd2 * t2 - w1_y * t1
     sd5_y = v4_z + w4_x * t1
-    t9 = 11.607348534441448 * c2 + qd1 * sd1_y - qdd1 * t6 + qd2 * sd2_y
-    t10 = qdd2 * s2_x + qdd1 * s1_x + 11.607348534441448 * s2 - qd1 * (c2 * v0_z) + qd2 * v1_y
-    t11 = qd2 * sd2_z - (qd1 * (c2 * (sd2_y + qd1 * s1_x) + s2 * v0_y) + qdd1 * t7)
+    t9 = 11.607348534441448 * cos2 + qd1 * sd1_y - qdd1 * t6 + qd2 * sd2_y
+    t10 = qdd2 * s2_x + qdd1 * s1_x + 11.607348534441448 * sin2 - qd1 * (cos2 * v0_z) + qd2 * v1_y
+    t11 = qd2 * sd2_z - (qd1 * (cos2 * (sd2_y + qd1 * s1_x) + sin2 * v0_y) + qdd1 * t7)
     t12 = t10 + qd3 * sd3_x + qd4 * sd4_x + qd5 * sd5_x
     t13 = 0.25320821471666355 * qdd2 + t9 + qd3 * sd3_y - qdd3 * t5 + qd4 * sd4_y - qdd4 * t4
     t14 = t13 + qd5 * sd5_y - qdd5 * t2
@@ -360,7 +360,7 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     t30 = w1_y * (qd2 * t22 - w1_y * t23) - w5_x * (t25 + t26) + qd2 * (qd2 * t23 - w1_y * t24)
     t31 = 0.0101 * wd5_x + wd5_y * n3_c2_y - wd5_z * t21 + t30
     t32 = wd5_x * n3_c2_y + wd5_y * (0.01065 - t22) - wd5_z * t23
-    t33 = s2 * t31 + c2 * (t32 + t28 + qd2 * (w5_x * t24 - qd2 * t21))
+    t33 = sin2 * t31 + cos2 * (t32 + t28 + qd2 * (w5_x * t24 - qd2 * t21))
     t34 = wd5_z * n2_c2_z - (wd5_x * t21 + wd5_y * t23) + t29 + qd2 * (t26 - t27)
 
     # outputs
@@ -395,22 +395,22 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     qdd5 = qdd[..., 4]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s4 = xp.sin(q4)
-    c4 = xp.cos(q4)
-    s5 = xp.sin(q5)
-    c5 = xp.cos(q5)
-    x4_y = c3 * c4 - s3 * s4
-    x4_z = s3 * c4 + c3 * s4
-    x5_y = c5 * x4_y - s5 * x4_z
-    x5_z = c5 * x4_z + s5 * x4_y
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin4 = xp.sin(q4)
+    cos4 = xp.cos(q4)
+    sin5 = xp.sin(q5)
+    cos5 = xp.cos(q5)
+    x4_y = cos3 * cos4 - sin3 * sin4
+    x4_z = sin3 * cos4 + cos3 * sin4
+    x5_y = cos5 * x4_y - sin5 * x4_z
+    x5_z = cos5 * x4_z + sin5 * x4_y
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
+    wd1_x = qdd1 * sin2
+    wd1_y = qdd1 * cos2
     t1 = w1_y * w1_y
     t2 = w1_x * w1_x + t1
     t3 = qd2 * w1_x
@@ -435,17 +435,17 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     wd5_x = qdd5 + wd4_x
     wd5_y = wd4_y + qd2 * qd5
     wd5_z = wd4_z - qd5 * w1_y
-    t11 = 11.607348534441448 * s2
-    t12 = 11.607348534441448 * c2
+    t11 = 11.607348534441448 * sin2
+    t12 = 11.607348534441448 * cos2
     t13 = 0.15618450627382988 * x5_y + 0.020114671262538696 * x5_z
     t14 = 0.020114671262538696 * x5_y - 0.15618450627382988 * x5_z
     t15 = t13 + 0.3313004678535785 * x4_y + 0.023664319132398463 * x4_z
     t16 = t14 + 0.023664319132398463 * x4_y - 0.3313004678535785 * x4_z
-    s2_x = t15 - 0.43778990394937156 * c3
-    t17 = t16 + 0.43778990394937156 * s3
-    s1_x = c2 * t17
-    t18 = s2 * t17
-    t19 = 0.25320821471666355 * c2 + s2 * s2_x
+    s2_x = t15 - 0.43778990394937156 * cos3
+    t17 = t16 + 0.43778990394937156 * sin3
+    s1_x = cos2 * t17
+    t18 = sin2 * t17
+    t19 = 0.25320821471666355 * cos2 + sin2 * s2_x
     v4_y = qd5 * t14
     v4_z = qd5 * t13
     v3_y = v4_y + qd4 * t16
@@ -456,7 +456,7 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     v1_y = v2_y - 0.25320821471666355 * qd2
     v0_y = v1_y + qd1 * t18
     v0_z = v2_z + qd1 * t19
-    sd1_y = s2 * v0_z
+    sd1_y = sin2 * v0_z
     t20 = w1_y * s2_x
     sd2_z = 0.25320821471666355 * w1_x - t20
     sd3_x = qd2 * t17 - t20
@@ -468,13 +468,13 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     sd5_x = qd2 * t14 - w1_y * t13
     sd5_y = v4_z + w4_x * t13
     t23 = v4_y + w4_x * t14
-    t24 = c2 * t11 - s2 * t12
-    t25 = qdd1 * s1_x + t11 - qd1 * (c2 * v0_z)
+    t24 = cos2 * t11 - sin2 * t12
+    t25 = qdd1 * s1_x + t11 - qd1 * (cos2 * v0_z)
     t26 = t12 + qd1 * sd1_y - qdd1 * t18
     t27 = w1_y * v2_z - w1_x * sd2_z - t25
     t28 = 0.25320821471666355 * wd1_x - wd1_y * s2_x + 2.0 * (w1_x * sd2_y - w1_y * v1_y)
     t29 = 0.25320821471666355 * qdd2 + t26 + qd2 * sd2_y
-    t30 = qd2 * sd2_z - (qd1 * (c2 * (sd2_y + qd1 * s1_x) + s2 * v0_y) + qdd1 * t19)
+    t30 = qd2 * sd2_z - (qd1 * (cos2 * (sd2_y + qd1 * s1_x) + sin2 * v0_y) + qdd1 * t19)
     t31 = qdd2 * t17 - wd2_y * s2_x - (w1_y * t21 + qd2 * sd3_y + w1_y * v2_y + qd2 * v2_z)
     t32 = t30 + wd2_x * s2_x + qd2 * sd3_x + w1_x * t21
     t33 = w1_x * sd3_y - w1_y * sd3_x - (t29 + wd2_x * t17)
@@ -514,64 +514,65 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t65 = t55 - t60
     t66 = wd5_x * n3_c2_y + wd5_y * t53 - wd5_z * t51 + w5_x * t57 + w1_y * t61 + qd2 * t64
     t67 = wd5_z * n2_c2_z - (wd5_x * t49 + wd5_y * t51) + w5_x * t58 - w1_y * t62 + qd2 * t65
-    t68 = s2 * (c2 * t67 + t19 * t43 - t18 * t44) - c2 * (s2 * t67 + t19 * t42 + s1_x * t44)
-    t69 = 0.0101 * wd1_y - wd1_x * n3_c2_y + t2 * t49 - 2.0 * (w1_y * t56 + w1_x * t59)
-    t70 = s2_x * t43
-    t71 = 0.0101 * wd5_x + wd5_y * n3_c2_y - wd5_z * t49 + w1_y * t59 - w5_x * t56 + qd2 * t63
-    t72 = wd1_y * n3_c2_y - wd1_x * t53 + t2 * t51 + 2.0 * (w1_y * t57 - w1_x * t61)
-    t73 = wd1_x * t51 - wd1_y * t49 - t2 * n2_c2_z + 2.0 * (w1_y * t58 + w1_x * t62)
-    t74 = t26 + w1_y * sd2_z + w1_x * v2_z - t43
-    t75 = t27 + t42
-    t76 = s2 * (t69 + 0.25320821471666355 * t44 - t66) + c2 * (t72 + t71 - s2_x * t44)
-    t77 = 0.0101 * t4
-    t78 = t4 * n3_c2_y
-    t79 = t4 * t49
-    t80 = 2.0 * (qd2 * t59 - w1_y * t63)
-    t81 = 2.0 * (qd2 * t61 - w1_y * t64)
-    t82 = 2.0 * (qd2 * t62 + w1_y * t65)
-    t83 = t5 * n3_c2_y - t77 - t6 * t49 + t80
-    t84 = t83 + t70 - t17 * t44
-    t85 = t32 - t44
-    t86 = t33 + t43
-    t87 = s2 * t84 + c2 * (t5 * t53 - t78 - t6 * t51 + t81 - (t67 + s2_x * t42))
-    t88 = t79 - t5 * t51 + t6 * n2_c2_z - t82 + t66 + t17 * t42
-    t89 = t80 + t7 * n3_c2_y - t77 - t8 * t49
-    t90 = t89 + t15 * t43 - t16 * t44
-    t91 = t37 - t44
-    t92 = t38 + t43
-    t93 = s2 * t90 + c2 * (t81 + t7 * t53 - t78 - t8 * t51 - (t67 + t15 * t42))
-    t94 = t79 - t7 * t51 + t8 * n2_c2_z - t82 + t66 + t16 * t42
-    t95 = t80 + t9 * n3_c2_y - t77 - t10 * t49 + t13 * t43 - t14 * t44
-    t96 = t40 + wd4_x * t13 + qd2 * sd5_x + w4_x * t23 - t44
-    t97 = w4_x * sd5_y - w1_y * sd5_x - (t39 + wd4_x * t14) + t43
-    t98 = s2 * t95 + c2 * (t81 + t9 * t53 - t78 - t10 * t51 - (t67 + t13 * t42))
-    t99 = t79 - t9 * t51 + t10 * n2_c2_z - t82 + t66 + t14 * t42
+    t68 = cos2 * (sin2 * t67 + t19 * t42 + s1_x * t44)
+    t69 = s1_x * (cos2 * t44) + t18 * (sin2 * t44) - t19 * (t24 + sin2 * t43 - cos2 * t42)
+    t70 = 0.0101 * wd1_y - wd1_x * n3_c2_y + t2 * t49 - 2.0 * (w1_y * t56 + w1_x * t59)
+    t71 = s2_x * t43
+    t72 = 0.0101 * wd5_x + wd5_y * n3_c2_y - wd5_z * t49 + w1_y * t59 - w5_x * t56 + qd2 * t63
+    t73 = wd1_y * n3_c2_y - wd1_x * t53 + t2 * t51 + 2.0 * (w1_y * t57 - w1_x * t61)
+    t74 = wd1_x * t51 - wd1_y * t49 - t2 * n2_c2_z + 2.0 * (w1_y * t58 + w1_x * t62)
+    t75 = t26 + w1_y * sd2_z + w1_x * v2_z - t43
+    t76 = t27 + t42
+    t77 = sin2 * (t70 + 0.25320821471666355 * t44 - t66) + cos2 * (t73 + t72 - s2_x * t44)
+    t78 = 0.0101 * t4
+    t79 = t4 * n3_c2_y
+    t80 = t4 * t49
+    t81 = 2.0 * (qd2 * t59 - w1_y * t63)
+    t82 = 2.0 * (qd2 * t61 - w1_y * t64)
+    t83 = 2.0 * (qd2 * t62 + w1_y * t65)
+    t84 = t5 * n3_c2_y - t78 - t6 * t49 + t81
+    t85 = t84 + t71 - t17 * t44
+    t86 = t32 - t44
+    t87 = t33 + t43
+    t88 = sin2 * t85 + cos2 * (t5 * t53 - t79 - t6 * t51 + t82 - (t67 + s2_x * t42))
+    t89 = t80 - t5 * t51 + t6 * n2_c2_z - t83 + t66 + t17 * t42
+    t90 = t81 + t7 * n3_c2_y - t78 - t8 * t49
+    t91 = t90 + t15 * t43 - t16 * t44
+    t92 = t37 - t44
+    t93 = t38 + t43
+    t94 = sin2 * t91 + cos2 * (t82 + t7 * t53 - t79 - t8 * t51 - (t67 + t15 * t42))
+    t95 = t80 - t7 * t51 + t8 * n2_c2_z - t83 + t66 + t16 * t42
+    t96 = t81 + t9 * n3_c2_y - t78 - t10 * t49 + t13 * t43 - t14 * t44
+    t97 = t40 + wd4_x * t13 + qd2 * sd5_x + w4_x * t23 - t44
+    t98 = w4_x * sd5_y - w1_y * sd5_x - (t39 + wd4_x * t14) + t43
+    t99 = sin2 * t96 + cos2 * (t82 + t9 * t53 - t79 - t10 * t51 - (t67 + t13 * t42))
+    t100 = t80 - t9 * t51 + t10 * n2_c2_z - t83 + t66 + t14 * t42
 
     # outputs
     return (
-        t68 + s1_x * (c2 * t44) + t18 * (s2 * t44) - t19 * (t24 + s2 * t43 - c2 * t42),  # c0(1, 3, 1)
-        t76 + s1_x * t74 - t18 * t75 - t19 * t28,  # c0(1, 3, 2)
-        t87 + s1_x * t31 - t18 * t85 - t19 * t86,  # c0(1, 3, 3)
-        t93 + s1_x * t36 - t18 * t91 - t19 * t92,  # c0(1, 3, 4)
-        t98 + s1_x * t41 - t18 * t96 - t19 * t97,  # c0(1, 3, 5)
+        sin2 * (cos2 * t67 + t19 * t43 - t18 * t44) - t68 + t69,  # c0(1, 3, 1)
+        t77 + s1_x * t75 - t18 * t76 - t19 * t28,  # c0(1, 3, 2)
+        t88 + s1_x * t31 - t18 * t86 - t19 * t87,  # c0(1, 3, 3)
+        t94 + s1_x * t36 - t18 * t92 - t19 * t93,  # c0(1, 3, 4)
+        t99 + s1_x * t41 - t18 * t97 - t19 * t98,  # c0(1, 3, 5)
         0.0,  # c0(2, 3, 1)
-        t73 + t70 - 0.25320821471666355 * t42 + s2_x * t74 + 0.25320821471666355 * t75,  # c0(2, 3, 2)
-        t88 + s2_x * t31 + 0.25320821471666355 * t85,  # c0(2, 3, 3)
-        t94 + s2_x * t36 + 0.25320821471666355 * t91,  # c0(2, 3, 4)
-        t99 + s2_x * t41 + 0.25320821471666355 * t96,  # c0(2, 3, 5)
+        t74 + t71 - 0.25320821471666355 * t42 + s2_x * t75 + 0.25320821471666355 * t76,  # c0(2, 3, 2)
+        t89 + s2_x * t31 + 0.25320821471666355 * t86,  # c0(2, 3, 3)
+        t95 + s2_x * t36 + 0.25320821471666355 * t92,  # c0(2, 3, 4)
+        t100 + s2_x * t41 + 0.25320821471666355 * t97,  # c0(2, 3, 5)
         -s2_x * t24,  # c0(3, 3, 1)
-        t69 - (t17 * t27 + s2_x * t28),  # c0(3, 3, 2)
-        t84 - (t17 * t85 + s2_x * t86),  # c0(3, 3, 3)
-        t90 - (t17 * t91 + s2_x * t92),  # c0(3, 3, 4)
-        t95 - (t17 * t96 + s2_x * t97),  # c0(3, 3, 5)
+        t70 - (t17 * t27 + s2_x * t28),  # c0(3, 3, 2)
+        t85 - (t17 * t86 + s2_x * t87),  # c0(3, 3, 3)
+        t91 - (t17 * t92 + s2_x * t93),  # c0(3, 3, 4)
+        t96 - (t17 * t97 + s2_x * t98),  # c0(3, 3, 5)
         -t15 * t24,  # c0(4, 3, 1)
-        t69 - (t16 * t27 + t15 * t28),  # c0(4, 3, 2)
-        t83 - (t16 * t32 + t15 * t33),  # c0(4, 3, 3)
-        t90 - (t16 * t91 + t15 * t92),  # c0(4, 3, 4)
-        t95 - (t16 * t96 + t15 * t97),  # c0(4, 3, 5)
+        t70 - (t16 * t27 + t15 * t28),  # c0(4, 3, 2)
+        t84 - (t16 * t32 + t15 * t33),  # c0(4, 3, 3)
+        t91 - (t16 * t92 + t15 * t93),  # c0(4, 3, 4)
+        t96 - (t16 * t97 + t15 * t98),  # c0(4, 3, 5)
         -t13 * t24,  # c0(5, 3, 1)
-        t69 - (t14 * t27 + t13 * t28),  # c0(5, 3, 2)
-        t83 - (t14 * t32 + t13 * t33),  # c0(5, 3, 3)
-        t89 - (t14 * t37 + t13 * t38),  # c0(5, 3, 4)
-        t95 - (t14 * t96 + t13 * t97),  # c0(5, 3, 5)
+        t70 - (t14 * t27 + t13 * t28),  # c0(5, 3, 2)
+        t84 - (t14 * t32 + t13 * t33),  # c0(5, 3, 3)
+        t90 - (t14 * t37 + t13 * t38),  # c0(5, 3, 4)
+        t96 - (t14 * t97 + t13 * t98),  # c0(5, 3, 5)
     )

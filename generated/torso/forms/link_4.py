@@ -38,20 +38,20 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     qdd6 = qdd[..., 5]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s6 = xp.sin(q6)
-    c6 = xp.cos(q6)
-    x6_y = c3 * c6 - s3 * s6
-    x6_z = s3 * c6 + c3 * s6
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin6 = xp.sin(q6)
+    cos6 = xp.cos(q6)
+    x6_y = cos3 * cos6 - sin3 * sin6
+    x6_z = sin3 * cos6 + cos3 * sin6
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
     w3_x = qd3 + w1_x
     w6_x = qd6 + w3_x
-    t1 = 0.37 * c3
-    s6_y = 0.37 * s3
+    t1 = 0.37 * cos3
+    s6_y = 0.37 * sin3
     t2 = t1 - (0.125 * x6_y + 0.008 * x6_z)
     t3 = 0.008 * x6_y - 0.125 * x6_z + s6_y
     v6_y = qd6 * s6_y
@@ -95,22 +95,22 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     t35 = t27 - t30
     t36 = w6_x * t11 - 0.0996776 * qd2 + 0.4536 * v6_y
     t37 = 0.0996776 * w1_y + w6_x * n3_c2_y - 0.4536 * t4
-    t38 = 20.601 * s2
-    t39 = 20.601 * c2
+    t38 = 20.601 * sin2
+    t39 = 20.601 * cos2
     t40 = t3 * t39
-    t41 = 4.449816 * c2 + t2 * t38
-    g_1 = c2 * (t3 * t38) - s2 * t40
+    t41 = 4.449816 * cos2 + t2 * t38
+    g_1 = cos2 * (t3 * t38) - sin2 * t40
     g_6 = s6_y * t39 - t40
-    n1_c2_x = s2 * n3_c2_x + c2 * n3_c2_y
-    n1_c2_y = s2 * n3_c2_y + c2 * t18
-    t42 = s2 * t11 + c2 * t14
-    n1_c1_x = s2 * t35 + c2 * (qd2 * t13 - t31)
-    n1_c1_y = s2 * t36 + c2 * (t28 + t32 + t27 - t25)
-    n1_c1_z = s2 * t37 + c2 * (t4 * f3_c2_z - (t33 + w6_x * t13))
-    f1_c1_z = s2 * t23 - c2 * t20
-    c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y
-    c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y
-    c1_6_1 = n1_c1_x - (s6_y * (s2 * t24) + t1 * f1_c1_z)
+    n1_c2_x = sin2 * n3_c2_x + cos2 * n3_c2_y
+    n1_c2_y = sin2 * n3_c2_y + cos2 * t18
+    t42 = sin2 * t11 + cos2 * t14
+    n1_c1_x = sin2 * t35 + cos2 * (qd2 * t13 - t31)
+    n1_c1_y = sin2 * t36 + cos2 * (t28 + t32 + t27 - t25)
+    n1_c1_z = sin2 * t37 + cos2 * (t4 * f3_c2_z - (t33 + w6_x * t13))
+    f1_c1_z = sin2 * t23 - cos2 * t20
+    c2_1_1 = sin2 * n1_c2_x + cos2 * n1_c2_y
+    c1_1_1 = sin2 * n1_c1_x + cos2 * n1_c1_y
+    c1_6_1 = n1_c1_x - (s6_y * (sin2 * t24) + t1 * f1_c1_z)
     tau1_1 = g_1 + qdd1 * c2_1_1 + qd1 * c1_1_1
     tau2_1 = qd1 * n1_c1_z - t41
     tau3_1 = qd1 * n1_c1_x - t40
@@ -120,7 +120,7 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     n2_c1_y = w6_x * t16 - qd2 * t11 - v6_y * t6 + t33 - w1_x * t18
     n2_c1_z = t29 - t32 + t26 + t27 + w1_x * t14 - t29
     f2_c1_y = t20 - t19
-    c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y
+    c1_1_2 = sin2 * n2_c1_x + cos2 * n2_c1_y
     c1_6_2 = n2_c1_x + s6_y * f2_c1_y - t1 * f2_c1_z
     tau1_2 = tau1_1 - qdd2 * t42 + qd2 * c1_1_2
     tau2_2 = tau2_1 - qdd1 * t42 + qdd2 * n2_c2_z + qd2 * n2_c1_z
@@ -133,24 +133,24 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     n3_c1_z = t37 - t44
     f3_c1_y = t22 - t24
     f3_c1_z = t21 + t23
-    c1_1_3 = s2 * n3_c1_x + c2 * n3_c1_y
+    c1_1_3 = sin2 * n3_c1_x + cos2 * n3_c1_y
     c1_6_3 = n3_c1_x + s6_y * f3_c1_y - t1 * f3_c1_z
     tau1_3 = tau1_2 + qdd3 * n1_c2_x + qd3 * c1_1_3
     tau2_3 = tau2_2 - qdd3 * t11 + qd3 * n3_c1_z
     tau3_3 = tau3_2 + qdd1 * n1_c2_x - qdd2 * t11 + qdd3 * n3_c2_x + qd3 * n3_c1_x
     tau6_3 = tau6_2 + qd3 * c1_6_3
     n6_c2_x = n3_c2_x - (t1 * f3_c2_z + s6_y * t6)
-    n6_c2_y = n3_c2_y - 0.167832 * c3
-    t45 = t11 + 0.167832 * s3
-    f6_c2_y = 0.777 * s3 - t6
-    f6_c2_z = f3_c2_z - 0.777 * c3
+    n6_c2_y = n3_c2_y - 0.167832 * cos3
+    t45 = t11 + 0.167832 * sin3
+    f6_c2_y = 0.777 * sin3 - t6
+    f6_c2_z = f3_c2_z - 0.777 * cos3
     n6_c1_x = t35 + t30 + sd6_z * f3_c2_z - sd6_y * t6
     n6_c1_y = t36 + t43 + 0.4536 * sd6_z - t5 * t6
     n6_c1_z = t37 + t5 * f3_c2_z - 0.4536 * sd6_y - t44
     f6_c1_y = t22 + 2.1 * sd6_y - t24
     f6_c1_z = t23 + t21 + 2.1 * sd6_z
-    c2_1_6 = s2 * n6_c2_x + c2 * n6_c2_y
-    c1_1_6 = s2 * n6_c1_x + c2 * n6_c1_y
+    c2_1_6 = sin2 * n6_c2_x + cos2 * n6_c2_y
+    c1_1_6 = sin2 * n6_c1_x + cos2 * n6_c1_y
     c2_6_6 = n6_c2_x + s6_y * f6_c2_y - t1 * f6_c2_z
     c1_6_6 = n6_c1_x + s6_y * f6_c1_y - t1 * f6_c1_z
 
@@ -220,18 +220,18 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     qdd6 = qdd[..., 5]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s6 = xp.sin(q6)
-    c6 = xp.cos(q6)
-    x6_y = c3 * c6 - s3 * s6
-    x6_z = s3 * c6 + c3 * s6
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin6 = xp.sin(q6)
+    cos6 = xp.cos(q6)
+    x6_y = cos3 * cos6 - sin3 * sin6
+    x6_z = sin3 * cos6 + cos3 * sin6
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
+    wd1_x = qdd1 * sin2
+    wd1_y = qdd1 * cos2
     wd2_x = wd1_x + qd2 * w1_y
     wd2_y = wd1_y - qd2 * w1_x
     w3_x = qd3 + w1_x
@@ -242,16 +242,16 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     wd6_x = qdd6 + wd3_x
     wd6_y = wd3_y + qd2 * qd6
     wd6_z = wd3_z - qd6 * w1_y
-    t1 = 0.37 * c3
-    s6_y = 0.37 * s3
+    t1 = 0.37 * cos3
+    s6_y = 0.37 * sin3
     t2 = t1 - (0.125 * x6_y + 0.008 * x6_z)
     t3 = 0.008 * x6_y - 0.125 * x6_z + s6_y
     v6_y = qd6 * s6_y
     t4 = qd6 * t1
     sd6_y = w3_x * t1
     sd6_z = w3_x * s6_y
-    t5 = 9.81 * s2 - qd6 * (w1_y * t1 + qd2 * s6_y)
-    t6 = qdd6 * s6_y + 9.81 * c2 + qd6 * sd6_y
+    t5 = 9.81 * sin2 - qd6 * (w1_y * t1 + qd2 * s6_y)
+    t6 = qdd6 * s6_y + 9.81 * cos2 + qd6 * sd6_y
     t7 = qd6 * sd6_z - qdd6 * t1
     f3_c2_z = 2.1 * t2
     t8 = 2.1 * t3
@@ -290,7 +290,7 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
 
     # outputs
     return (
-        s2 * t32 + c2 * (t33 + t28 + qd2 * (w6_x * t18 - qd2 * t13 - v6_y * t8)),  # tau(1, 4)
+        sin2 * t32 + cos2 * (t33 + t28 + qd2 * (w6_x * t18 - qd2 * t13 - v6_y * t8)),  # tau(1, 4)
         t34 + t30 + qd2 * (t25 - t26 + t22 + t23),  # tau(2, 4)
         t32,  # tau(3, 4)
         t32 + s6_y * (2.1 * t6 - (0.4536 * wd6_z + wd6_x * t8) + t35) - t37,  # tau(6, 4)
@@ -316,20 +316,20 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     qdd6 = qdd[..., 5]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s6 = xp.sin(q6)
-    c6 = xp.cos(q6)
-    x6_y = c3 * c6 - s3 * s6
-    x6_z = s3 * c6 + c3 * s6
-    t1 = 9.81 * s2
-    t2 = 9.81 * c2
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin6 = xp.sin(q6)
+    cos6 = xp.cos(q6)
+    x6_y = cos3 * cos6 - sin3 * sin6
+    x6_z = sin3 * cos6 + cos3 * sin6
+    t1 = 9.81 * sin2
+    t2 = 9.81 * cos2
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
+    wd1_x = qdd1 * sin2
+    wd1_y = qdd1 * cos2
     t3 = w1_y * w1_y
     t4 = w1_x * w1_x + t3
     t5 = qd2 * w1_x
@@ -348,8 +348,8 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     wd6_x = qdd6 + wd3_x
     wd6_y = wd3_y + qd2 * qd6
     wd6_z = wd3_z - qd6 * w1_y
-    t11 = 0.37 * c3
-    s6_y = 0.37 * s3
+    t11 = 0.37 * cos3
+    s6_y = 0.37 * sin3
     t12 = t11 - (0.125 * x6_y + 0.008 * x6_z)
     t13 = 0.008 * x6_y - 0.125 * x6_z + s6_y
     v6_y = qd6 * s6_y
@@ -357,7 +357,7 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t15 = w1_y * t11 + qd2 * s6_y
     sd6_y = w3_x * t11
     sd6_z = w3_x * s6_y
-    t16 = c2 * t1 - s2 * t2
+    t16 = cos2 * t1 - sin2 * t2
     t17 = w1_y * sd6_z - qd2 * sd6_y - (wd3_y * t11 + wd3_z * s6_y)
     t18 = wd3_x * t11 - (qd2 * t15 + w3_x * sd6_z)
     t19 = wd3_x * s6_y - t2 + w3_x * sd6_y + w1_y * t15
@@ -414,7 +414,7 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t66 = t2 * f3_c2_z
     t67 = t1 * t23 + wd1_y * n3_c2_x - wd1_x * n3_c2_y + t4 * t28
     t68 = t67 + 2.0 * (w1_y * t47 - w1_x * t44)
-    t69 = 4.449816 * s2 - t66 + wd1_x * t31 - wd1_y * t28 - t4 * n2_c2_z
+    t69 = 4.449816 * sin2 - t66 + wd1_x * t31 - wd1_y * t28 - t4 * n2_c2_z
     t70 = t2 * t23 + wd1_y * n3_c2_y - wd1_x * t35 + t4 * t31 + 2.0 * (w1_y * t48 - w1_x * t49)
     t71 = t11 * (wd1_y * f3_c2_z - 0.4536 * wd1_x + 2.0 * (w1_y * t37 + w1_x * t36))
     t72 = t6 * n3_c2_x
@@ -430,15 +430,15 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t82 = t7 * n3_c2_y - t72 - t8 * t28 - t66 + t77
     t83 = t77 + t19 * f3_c2_z - t18 * t23 + t9 * n3_c2_y - t72 - t10 * t28
     t84 = t83 + s6_y * t64 + t11 * t63
-    t85 = c2 * (t78 + t17 * t23 + 0.4536 * t19 + t9 * t35 - t73 - t10 * t31 - (t61 + t11 * t62))
+    t85 = cos2 * (t78 + t17 * t23 + 0.4536 * t19 + t9 * t35 - t73 - t10 * t31 - (t61 + t11 * t62))
     t86 = s6_y * (2.1 * t18 + t75 - 0.4536 * t10 - t80 - t64)
 
     # outputs
     return (
-        s2 * (t65 + c2 * t61) + c2 * (0.4536 * t16 - s2 * t61),  # c0(1, 4, 1)
-        s2 * (t68 - t59) + c2 * (t57 + w6_x * t47 + w1_y * t44 + qd2 * t46 + t70),  # c0(1, 4, 2)
-        s2 * t82 + c2 * (t7 * t35 - t73 - t8 * t31 - 4.449816 * c2 + t78 - t61),  # c0(1, 4, 3)
-        s2 * t84 + t85,  # c0(1, 4, 6)
+        sin2 * (t65 + cos2 * t61) + cos2 * (0.4536 * t16 - sin2 * t61),  # c0(1, 4, 1)
+        sin2 * (t68 - t59) + cos2 * (t57 + w6_x * t47 + w1_y * t44 + qd2 * t46 + t70),  # c0(1, 4, 2)
+        sin2 * t82 + cos2 * (t7 * t35 - t73 - t8 * t31 - 4.449816 * cos2 + t78 - t61),  # c0(1, 4, 3)
+        sin2 * t84 + t85,  # c0(1, 4, 6)
         0.0,  # c0(2, 4, 1)
         t69 + 2.0 * (w1_y * t51 - w1_x * t52),  # c0(2, 4, 2)
         t59 + t74 - t7 * t31 + t8 * n2_c2_z + t79,  # c0(2, 4, 3)
@@ -448,7 +448,7 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
         t82,  # c0(3, 4, 3)
         t84,  # c0(3, 4, 6)
         t65 - t11 * (2.1 * t16),  # c0(6, 4, 1)
-        t68 + s6_y * (0.4536 * t4 - wd1_y * t23 - 20.601 * s2 - 2.0 * t54) - t71,  # c0(6, 4, 2)
-        t82 + s6_y * (t75 - 0.4536 * t8 - t80) - t11 * (0.4536 * t7 - t76 - 20.601 * c2 - t81),  # c0(6, 4, 3)
+        t68 + s6_y * (0.4536 * t4 - wd1_y * t23 - 20.601 * sin2 - 2.0 * t54) - t71,  # c0(6, 4, 2)
+        t82 + s6_y * (t75 - 0.4536 * t8 - t80) - t11 * (0.4536 * t7 - t76 - 20.601 * cos2 - t81),  # c0(6, 4, 3)
         t84 + t86 - t11 * (t63 + 2.1 * t19 + 0.4536 * t9 - t76 - t81),  # c0(6, 4, 6)
     )

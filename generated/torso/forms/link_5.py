@@ -41,34 +41,34 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     qdd7 = qdd[..., 6]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s6 = xp.sin(q6)
-    c6 = xp.cos(q6)
-    s7 = xp.sin(q7)
-    c7 = xp.cos(q7)
-    x6_y = c3 * c6 - s3 * s6
-    x6_z = s3 * c6 + c3 * s6
-    x7_y = c7 * x6_y - s7 * x6_z
-    x7_z = c7 * x6_z + s7 * x6_y
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin6 = xp.sin(q6)
+    cos6 = xp.cos(q6)
+    sin7 = xp.sin(q7)
+    cos7 = xp.cos(q7)
+    x6_y = cos3 * cos6 - sin3 * sin6
+    x6_z = sin3 * cos6 + cos3 * sin6
+    x7_y = cos7 * x6_y - sin7 * x6_z
+    x7_z = cos7 * x6_z + sin7 * x6_y
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
     w3_x = qd3 + w1_x
     w6_x = qd6 + w3_x
     w7_x = qd7 + w6_x
-    t1 = 11.607348534441448 * s2
-    t2 = 11.607348534441448 * c2
+    t1 = 11.607348534441448 * sin2
+    t2 = 11.607348534441448 * cos2
     t3 = 0.15618450627382988 * x7_y + 0.020114671262538696 * x7_z
     t4 = 0.020114671262538696 * x7_y - 0.15618450627382988 * x7_z
     t5 = t3 + 0.3313004678535785 * x6_y + 0.023664319132398463 * x6_z
     t6 = t4 + 0.023664319132398463 * x6_y - 0.3313004678535785 * x6_z
-    s2_x = t5 - 0.43778990394937156 * c3
-    t7 = t6 + 0.43778990394937156 * s3
-    s1_x = c2 * t7
-    t8 = s2 * t7
-    s1_z = 0.25320821471666355 * c2 - s2 * s2_x
+    s2_x = t5 - 0.43778990394937156 * cos3
+    t7 = t6 + 0.43778990394937156 * sin3
+    s1_x = cos2 * t7
+    t8 = sin2 * t7
+    s1_z = 0.25320821471666355 * cos2 - sin2 * s2_x
     v6_y = qd7 * t4
     v6_z = qd7 * t3
     v3_y = v6_y + qd6 * t6
@@ -79,9 +79,9 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     v1_y = v2_y + 0.25320821471666355 * qd2
     v0_y = v1_y + qd1 * t8
     v0_z = v2_z - qd1 * s1_z
-    t9 = c2 * v0_z
-    sd1_y = s2 * v0_z
-    t10 = c2 * (sd2_y + qd1 * s1_x) + s2 * v0_y
+    t9 = cos2 * v0_z
+    sd1_y = sin2 * v0_z
+    t10 = cos2 * (sd2_y + qd1 * s1_x) + sin2 * v0_y
     t11 = w1_y * s2_x
     t12 = 0.25320821471666355 * w1_x + t11
     sd3_x = qd2 * t7 - t11
@@ -113,17 +113,17 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     t32 = w1_y * t20
     t33 = qd2 * t23
     g_1 = t1 * s1_x - t2 * t8
-    g_2 = t1 * s2_x - 2.939076 * c2
+    g_2 = t1 * s2_x - 2.939076 * cos2
     t34 = t2 * t7
     t35 = t2 * t6
     t36 = t2 * t4
-    n1_c2_x = 0.0101 * s2 - c2 * t20
-    n1_c2_y = c2 * t25 - s2 * t20
-    n1_c1_x = s2 * (t26 - t27) + c2 * (qd2 * t22 - t30)
-    n1_c1_y = s2 * t28 + c2 * (t31 - t26)
-    n1_c1_z = s2 * t29 + c2 * (t32 - w7_x * t22)
-    c2_1_1 = s2 * n1_c2_x + c2 * n1_c2_y + s1_x * s1_x + t8 * t8 + s1_z * s1_z
-    c1_1_1 = s2 * n1_c1_x + c2 * n1_c1_y - (s1_x * t9 + t8 * sd1_y + s1_z * t10)
+    n1_c2_x = 0.0101 * sin2 - cos2 * t20
+    n1_c2_y = cos2 * t25 - sin2 * t20
+    n1_c1_x = sin2 * (t26 - t27) + cos2 * (qd2 * t22 - t30)
+    n1_c1_y = sin2 * t28 + cos2 * (t31 - t26)
+    n1_c1_z = sin2 * t29 + cos2 * (t32 - w7_x * t22)
+    c2_1_1 = sin2 * n1_c2_x + cos2 * n1_c2_y + s1_x * s1_x + t8 * t8 + s1_z * s1_z
+    c1_1_1 = sin2 * n1_c1_x + cos2 * n1_c1_y - (s1_x * t9 + t8 * sd1_y + s1_z * t10)
     c1_2_1 = n1_c1_z - (s2_x * t9 + 0.25320821471666355 * sd1_y)
     c1_3_1 = n1_c1_x + s2_x * t10 - t7 * sd1_y
     c1_6_1 = n1_c1_x + t5 * t10 - t6 * sd1_y
@@ -136,8 +136,8 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     n2_c1_x = t33 - w1_y * t24 + 0.0101 * w1_y + w1_x * t20
     n2_c1_y = w7_x * t24 - qd2 * t21 - (t32 + w1_x * t25)
     n2_c1_z = t27 - t31 + w1_x * t23 - t27
-    c2_1_2 = s2_x * s1_x + 0.25320821471666355 * t8 - (s2 * t21 + c2 * t23)
-    c1_1_2 = s2 * n2_c1_x + c2 * n2_c1_y + s1_x * v1_y - t8 * sd2_y - s1_z * t12
+    c2_1_2 = s2_x * s1_x + 0.25320821471666355 * t8 - (sin2 * t21 + cos2 * t23)
+    c1_1_2 = sin2 * n2_c1_x + cos2 * n2_c1_y + s1_x * v1_y - t8 * sd2_y - s1_z * t12
     t37 = s2_x * s2_x
     c2_2_2 = n2_c2_z + t37 + 0.0641144
     c1_2_2 = n2_c1_z + s2_x * v1_y - 0.25320821471666355 * sd2_y
@@ -152,7 +152,7 @@ def decomposition(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> t
     n3_c1_y = t28 + t30 + qd2 * t25
     n3_c1_z = t29 - (t33 + w1_y * n2_c2_z)
     c2_1_3 = n1_c2_x + t7 * t8 - s2_x * s1_z
-    t38 = c2 * n3_c1_y
+    t38 = cos2 * n3_c1_y
     c1_1_3 = t38 + s1_x * sd3_x - t8 * sd3_y - s1_z * t13
     c2_2_3 = 0.25320821471666355 * t7 - t21
     c1_2_3 = n3_c1_z + s2_x * sd3_x - 0.25320821471666355 * sd3_y
@@ -276,22 +276,22 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     qdd7 = qdd[..., 6]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s6 = xp.sin(q6)
-    c6 = xp.cos(q6)
-    s7 = xp.sin(q7)
-    c7 = xp.cos(q7)
-    x6_y = c3 * c6 - s3 * s6
-    x6_z = s3 * c6 + c3 * s6
-    x7_y = c7 * x6_y - s7 * x6_z
-    x7_z = c7 * x6_z + s7 * x6_y
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin6 = xp.sin(q6)
+    cos6 = xp.cos(q6)
+    sin7 = xp.sin(q7)
+    cos7 = xp.cos(q7)
+    x6_y = cos3 * cos6 - sin3 * sin6
+    x6_z = sin3 * cos6 + cos3 * sin6
+    x7_y = cos7 * x6_y - sin7 * x6_z
+    x7_z = cos7 * x6_z + sin7 * x6_y
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
+    wd1_x = qdd1 * sin2
+    wd1_y = qdd1 * cos2
     wd2_x = wd1_x + qd2 * w1_y
     wd2_y = wd1_y - qd2 * w1_x
     w3_x = qd3 + w1_x
@@ -310,11 +310,11 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     t2 = 0.020114671262538696 * x7_y - 0.15618450627382988 * x7_z
     t3 = t1 + 0.3313004678535785 * x6_y + 0.023664319132398463 * x6_z
     t4 = t2 + 0.023664319132398463 * x6_y - 0.3313004678535785 * x6_z
-    s2_x = t3 - 0.43778990394937156 * c3
-    t5 = t4 + 0.43778990394937156 * s3
-    s1_x = c2 * t5
-    t6 = s2 * t5
-    s1_z = 0.25320821471666355 * c2 - s2 * s2_x
+    s2_x = t3 - 0.43778990394937156 * cos3
+    t5 = t4 + 0.43778990394937156 * sin3
+    s1_x = cos2 * t5
+    t6 = sin2 * t5
+    s1_z = 0.25320821471666355 * cos2 - sin2 * s2_x
     v6_y = qd7 * t2
     v6_z = qd7 * t1
     v3_y = v6_y + qd6 * t4
@@ -325,7 +325,7 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     v1_y = v2_y + 0.25320821471666355 * qd2
     v0_y = v1_y + qd1 * t6
     v0_z = v2_z - qd1 * s1_z
-    sd1_y = s2 * v0_z
+    sd1_y = sin2 * v0_z
     t7 = w1_y * s2_x
     sd3_x = qd2 * t5 - t7
     sd3_y = v2_z + w1_x * s2_x
@@ -333,9 +333,9 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     sd6_y = v3_z + w3_x * t3
     sd7_x = qd2 * t2 - w1_y * t1
     sd7_y = v6_z + w6_x * t1
-    t8 = 11.607348534441448 * c2 + qd1 * sd1_y - qdd1 * t6 + qd2 * sd2_y
-    t9 = qdd1 * s1_z - qd1 * (c2 * (sd2_y + qd1 * s1_x) + s2 * v0_y)
-    t10 = qdd2 * s2_x + qdd1 * s1_x + 11.607348534441448 * s2 - qd1 * (c2 * v0_z) + qd2 * v1_y
+    t8 = 11.607348534441448 * cos2 + qd1 * sd1_y - qdd1 * t6 + qd2 * sd2_y
+    t9 = qdd1 * s1_z - qd1 * (cos2 * (sd2_y + qd1 * s1_x) + sin2 * v0_y)
+    t10 = qdd2 * s2_x + qdd1 * s1_x + 11.607348534441448 * sin2 - qd1 * (cos2 * v0_z) + qd2 * v1_y
     t11 = t9 - qd2 * (0.25320821471666355 * w1_x + t7) - qd3 * (v2_y + w1_x * t5) - qdd3 * s2_x
     t12 = t10 + qd3 * sd3_x + qd6 * sd6_x + qd7 * sd7_x
     t13 = t8 - 0.25320821471666355 * qdd2 + qd3 * sd3_y - qdd3 * t5 + qd6 * sd6_y - qdd6 * t4
@@ -359,7 +359,7 @@ def torque(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[An
     t30 = w7_x * (t25 - t26) + w1_y * (qd2 * t22 - w1_y * t23) + qd2 * (qd2 * t23 - w1_y * t24)
     t31 = 0.0101 * wd7_x - wd7_y * t20 - wd7_z * t21 + t30
     t32 = wd7_y * (0.01065 - t22) - wd7_x * t20 - wd7_z * t23
-    t33 = s2 * t31 + c2 * (t32 + t28 + qd2 * (w7_x * t24 - qd2 * t21))
+    t33 = sin2 * t31 + cos2 * (t32 + t28 + qd2 * (w7_x * t24 - qd2 * t21))
     t34 = wd7_z * n2_c2_z - (wd7_x * t21 + wd7_y * t23) + t29 + qd2 * (t26 - t27)
 
     # outputs
@@ -394,22 +394,22 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     qdd7 = qdd[..., 6]
 
     # intermediate values
-    s2 = xp.sin(q2)
-    c2 = xp.cos(q2)
-    s3 = xp.sin(q3)
-    c3 = xp.cos(q3)
-    s6 = xp.sin(q6)
-    c6 = xp.cos(q6)
-    s7 = xp.sin(q7)
-    c7 = xp.cos(q7)
-    x6_y = c3 * c6 - s3 * s6
-    x6_z = s3 * c6 + c3 * s6
-    x7_y = c7 * x6_y - s7 * x6_z
-    x7_z = c7 * x6_z + s7 * x6_y
-    w1_x = qd1 * s2
-    w1_y = qd1 * c2
-    wd1_x = qdd1 * s2
-    wd1_y = qdd1 * c2
+    sin2 = xp.sin(q2)
+    cos2 = xp.cos(q2)
+    sin3 = xp.sin(q3)
+    cos3 = xp.cos(q3)
+    sin6 = xp.sin(q6)
+    cos6 = xp.cos(q6)
+    sin7 = xp.sin(q7)
+    cos7 = xp.cos(q7)
+    x6_y = cos3 * cos6 - sin3 * sin6
+    x6_z = sin3 * cos6 + cos3 * sin6
+    x7_y = cos7 * x6_y - sin7 * x6_z
+    x7_z = cos7 * x6_z + sin7 * x6_y
+    w1_x = qd1 * sin2
+    w1_y = qd1 * cos2
+    wd1_x = qdd1 * sin2
+    wd1_y = qdd1 * cos2
     t1 = w1_y * w1_y
     t2 = w1_x * w1_x + t1
     t3 = qd2 * w1_x
@@ -434,17 +434,17 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     wd7_x = qdd7 + wd6_x
     wd7_y = wd6_y + qd2 * qd7
     wd7_z = wd6_z - qd7 * w1_y
-    t11 = 11.607348534441448 * s2
-    t12 = 11.607348534441448 * c2
+    t11 = 11.607348534441448 * sin2
+    t12 = 11.607348534441448 * cos2
     t13 = 0.15618450627382988 * x7_y + 0.020114671262538696 * x7_z
     t14 = 0.020114671262538696 * x7_y - 0.15618450627382988 * x7_z
     t15 = t13 + 0.3313004678535785 * x6_y + 0.023664319132398463 * x6_z
     t16 = t14 + 0.023664319132398463 * x6_y - 0.3313004678535785 * x6_z
-    s2_x = t15 - 0.43778990394937156 * c3
-    t17 = t16 + 0.43778990394937156 * s3
-    s1_x = c2 * t17
-    t18 = s2 * t17
-    s1_z = 0.25320821471666355 * c2 - s2 * s2_x
+    s2_x = t15 - 0.43778990394937156 * cos3
+    t17 = t16 + 0.43778990394937156 * sin3
+    s1_x = cos2 * t17
+    t18 = sin2 * t17
+    s1_z = 0.25320821471666355 * cos2 - sin2 * s2_x
     v6_y = qd7 * t14
     v6_z = qd7 * t13
     v3_y = v6_y + qd6 * t16
@@ -455,7 +455,7 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     v1_y = v2_y + 0.25320821471666355 * qd2
     v0_y = v1_y + qd1 * t18
     v0_z = v2_z - qd1 * s1_z
-    sd1_y = s2 * v0_z
+    sd1_y = sin2 * v0_z
     t19 = w1_y * s2_x
     t20 = 0.25320821471666355 * w1_x + t19
     sd3_x = qd2 * t17 - t19
@@ -467,13 +467,13 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     sd7_x = qd2 * t14 - w1_y * t13
     sd7_y = v6_z + w6_x * t13
     t23 = v6_y + w6_x * t14
-    t24 = c2 * t11 - s2 * t12
-    t25 = qdd1 * s1_x + t11 - qd1 * (c2 * v0_z)
+    t24 = cos2 * t11 - sin2 * t12
+    t25 = qdd1 * s1_x + t11 - qd1 * (cos2 * v0_z)
     t26 = t12 + qd1 * sd1_y - qdd1 * t18
     t27 = w1_x * t20 + w1_y * v2_z - t25
     t28 = 2.0 * (w1_x * sd2_y - w1_y * v1_y) - (0.25320821471666355 * wd1_x + wd1_y * s2_x)
     t29 = t26 + qd2 * sd2_y - 0.25320821471666355 * qdd2
-    t30 = qdd1 * s1_z - qd1 * (c2 * (sd2_y + qd1 * s1_x) + s2 * v0_y) - qd2 * t20
+    t30 = qdd1 * s1_z - qd1 * (cos2 * (sd2_y + qd1 * s1_x) + sin2 * v0_y) - qd2 * t20
     t31 = qdd2 * t17 - wd2_y * s2_x - (w1_y * t21 + qd2 * sd3_y + w1_y * v2_y + qd2 * v2_z)
     t32 = t30 + wd2_x * s2_x + qd2 * sd3_x + w1_x * t21
     t33 = w1_x * sd3_y - w1_y * sd3_x - (t29 + wd2_x * t17)
@@ -513,64 +513,65 @@ def position_gradient(xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) 
     t66 = t56 - t61
     t67 = wd7_y * t54 - wd7_x * t49 - wd7_z * t52 + w7_x * t58 + w1_y * t62 + qd2 * t65
     t68 = wd7_z * n2_c2_z - (wd7_x * t50 + wd7_y * t52) + w7_x * t59 + w1_y * t63 + qd2 * t66
-    t69 = s2 * (c2 * t68 - (t18 * t44 + s1_z * t43)) + c2 * (s1_z * t42 - s1_x * t44 - s2 * t68)
-    t70 = 0.0101 * wd1_y + wd1_x * t49 + t2 * t50 + 2.0 * (w1_y * t57 - w1_x * t60)
-    t71 = s2_x * t43
-    t72 = 0.0101 * wd7_x - wd7_y * t49 - wd7_z * t50 + w7_x * t57 + w1_y * t60 + qd2 * t64
-    t73 = t2 * t52 - (wd1_y * t49 + wd1_x * t54) + 2.0 * (w1_y * t58 - w1_x * t62)
-    t74 = wd1_x * t52 - wd1_y * t50 - t2 * n2_c2_z + 2.0 * (w1_y * t59 - w1_x * t63)
-    t75 = t26 + w1_x * v2_z - w1_y * t20 - t43
-    t76 = t27 + t42
-    t77 = s2 * (t70 - (t67 + 0.25320821471666355 * t44)) + c2 * (t73 + t72 - s2_x * t44)
-    t78 = 0.0101 * t4
-    t79 = t4 * t49
-    t80 = t4 * t50
-    t81 = 2.0 * (qd2 * t60 - w1_y * t64)
-    t82 = 2.0 * (qd2 * t62 - w1_y * t65)
-    t83 = 2.0 * (qd2 * t63 - w1_y * t66)
-    t84 = t81 - (t78 + t5 * t49 + t6 * t50)
-    t85 = t84 + t71 - t17 * t44
-    t86 = t32 - t44
-    t87 = t33 + t43
-    t88 = s2 * t85 + c2 * (t79 + t5 * t54 - t6 * t52 + t82 - (t68 + s2_x * t42))
-    t89 = t80 - t5 * t52 + t6 * n2_c2_z + t83 + t67 + t17 * t42
-    t90 = t81 - (t78 + t7 * t49 + t8 * t50)
-    t91 = t90 + t15 * t43 - t16 * t44
-    t92 = t37 - t44
-    t93 = t38 + t43
-    t94 = s2 * t91 + c2 * (t82 + t79 + t7 * t54 - t8 * t52 - (t68 + t15 * t42))
-    t95 = t83 + t80 - t7 * t52 + t8 * n2_c2_z + t67 + t16 * t42
-    t96 = t81 - (t78 + t9 * t49 + t10 * t50) + t13 * t43 - t14 * t44
-    t97 = t40 + wd6_x * t13 + qd2 * sd7_x + w6_x * t23 - t44
-    t98 = w6_x * sd7_y - w1_y * sd7_x - (t39 + wd6_x * t14) + t43
-    t99 = s2 * t96 + c2 * (t82 + t79 + t9 * t54 - t10 * t52 - (t68 + t13 * t42))
-    t100 = t83 + t80 - t9 * t52 + t10 * n2_c2_z + t67 + t14 * t42
+    t69 = sin2 * (cos2 * t68 - (t18 * t44 + s1_z * t43))
+    t70 = s1_x * (cos2 * t44) + t18 * (sin2 * t44) + s1_z * (t24 + sin2 * t43 - cos2 * t42)
+    t71 = 0.0101 * wd1_y + wd1_x * t49 + t2 * t50 + 2.0 * (w1_y * t57 - w1_x * t60)
+    t72 = s2_x * t43
+    t73 = 0.0101 * wd7_x - wd7_y * t49 - wd7_z * t50 + w7_x * t57 + w1_y * t60 + qd2 * t64
+    t74 = t2 * t52 - (wd1_y * t49 + wd1_x * t54) + 2.0 * (w1_y * t58 - w1_x * t62)
+    t75 = wd1_x * t52 - wd1_y * t50 - t2 * n2_c2_z + 2.0 * (w1_y * t59 - w1_x * t63)
+    t76 = t26 + w1_x * v2_z - w1_y * t20 - t43
+    t77 = t27 + t42
+    t78 = sin2 * (t71 - (t67 + 0.25320821471666355 * t44)) + cos2 * (t74 + t73 - s2_x * t44)
+    t79 = 0.0101 * t4
+    t80 = t4 * t49
+    t81 = t4 * t50
+    t82 = 2.0 * (qd2 * t60 - w1_y * t64)
+    t83 = 2.0 * (qd2 * t62 - w1_y * t65)
+    t84 = 2.0 * (qd2 * t63 - w1_y * t66)
+    t85 = t82 - (t79 + t5 * t49 + t6 * t50)
+    t86 = t85 + t72 - t17 * t44
+    t87 = t32 - t44
+    t88 = t33 + t43
+    t89 = sin2 * t86 + cos2 * (t80 + t5 * t54 - t6 * t52 + t83 - (t68 + s2_x * t42))
+    t90 = t81 - t5 * t52 + t6 * n2_c2_z + t84 + t67 + t17 * t42
+    t91 = t82 - (t79 + t7 * t49 + t8 * t50)
+    t92 = t91 + t15 * t43 - t16 * t44
+    t93 = t37 - t44
+    t94 = t38 + t43
+    t95 = sin2 * t92 + cos2 * (t83 + t80 + t7 * t54 - t8 * t52 - (t68 + t15 * t42))
+    t96 = t84 + t81 - t7 * t52 + t8 * n2_c2_z + t67 + t16 * t42
+    t97 = t82 - (t79 + t9 * t49 + t10 * t50) + t13 * t43 - t14 * t44
+    t98 = t40 + wd6_x * t13 + qd2 * sd7_x + w6_x * t23 - t44
+    t99 = w6_x * sd7_y - w1_y * sd7_x - (t39 + wd6_x * t14) + t43
+    t100 = sin2 * t97 + cos2 * (t83 + t80 + t9 * t54 - t10 * t52 - (t68 + t13 * t42))
+    t101 = t84 + t81 - t9 * t52 + t10 * n2_c2_z + t67 + t14 * t42
 
     # outputs
     return (
-        t69 + s1_x * (c2 * t44) + t18 * (s2 * t44) + s1_z * (t24 + s2 * t43 - c2 * t42),  # c0(1, 5, 1)
-        t77 + s1_x * t75 - t18 * t76 + s1_z * t28,  # c0(1, 5, 2)
-        t88 + s1_x * t31 - t18 * t86 + s1_z * t87,  # c0(1, 5, 3)
-        t94 + s1_x * t36 - t18 * t92 + s1_z * t93,  # c0(1, 5, 6)
-        t99 + s1_x * t41 - t18 * t97 + s1_z * t98,  # c0(1, 5, 7)
+        t69 + cos2 * (s1_z * t42 - s1_x * t44 - sin2 * t68) + t70,  # c0(1, 5, 1)
+        t78 + s1_x * t76 - t18 * t77 + s1_z * t28,  # c0(1, 5, 2)
+        t89 + s1_x * t31 - t18 * t87 + s1_z * t88,  # c0(1, 5, 3)
+        t95 + s1_x * t36 - t18 * t93 + s1_z * t94,  # c0(1, 5, 6)
+        t100 + s1_x * t41 - t18 * t98 + s1_z * t99,  # c0(1, 5, 7)
         0.0,  # c0(2, 5, 1)
-        t74 + t71 + 0.25320821471666355 * t42 + s2_x * t75 - 0.25320821471666355 * t76,  # c0(2, 5, 2)
-        t89 + s2_x * t31 - 0.25320821471666355 * t86,  # c0(2, 5, 3)
-        t95 + s2_x * t36 - 0.25320821471666355 * t92,  # c0(2, 5, 6)
-        t100 + s2_x * t41 - 0.25320821471666355 * t97,  # c0(2, 5, 7)
+        t75 + t72 + 0.25320821471666355 * t42 + s2_x * t76 - 0.25320821471666355 * t77,  # c0(2, 5, 2)
+        t90 + s2_x * t31 - 0.25320821471666355 * t87,  # c0(2, 5, 3)
+        t96 + s2_x * t36 - 0.25320821471666355 * t93,  # c0(2, 5, 6)
+        t101 + s2_x * t41 - 0.25320821471666355 * t98,  # c0(2, 5, 7)
         -s2_x * t24,  # c0(3, 5, 1)
-        t70 - (t17 * t27 + s2_x * t28),  # c0(3, 5, 2)
-        t85 - (t17 * t86 + s2_x * t87),  # c0(3, 5, 3)
-        t91 - (t17 * t92 + s2_x * t93),  # c0(3, 5, 6)
-        t96 - (t17 * t97 + s2_x * t98),  # c0(3, 5, 7)
+        t71 - (t17 * t27 + s2_x * t28),  # c0(3, 5, 2)
+        t86 - (t17 * t87 + s2_x * t88),  # c0(3, 5, 3)
+        t92 - (t17 * t93 + s2_x * t94),  # c0(3, 5, 6)
+        t97 - (t17 * t98 + s2_x * t99),  # c0(3, 5, 7)
         -t15 * t24,  # c0(6, 5, 1)
-        t70 - (t16 * t27 + t15 * t28),  # c0(6, 5, 2)
-        t84 - (t16 * t32 + t15 * t33),  # c0(6, 5, 3)
-        t91 - (t16 * t92 + t15 * t93),  # c0(6, 5, 6)
-        t96 - (t16 * t97 + t15 * t98),  # c0(6, 5, 7)
+        t71 - (t16 * t27 + t15 * t28),  # c0(6, 5, 2)
+        t85 - (t16 * t32 + t15 * t33),  # c0(6, 5, 3)
+        t92 - (t16 * t93 + t15 * t94),  # c0(6, 5, 6)
+        t97 - (t16 * t98 + t15 * t99),  # c0(6, 5, 7)
         -t13 * t24,  # c0(7, 5, 1)
-        t70 - (t14 * t27 + t13 * t28),  # c0(7, 5, 2)
-        t84 - (t14 * t32 + t13 * t33),  # c0(7, 5, 3)
-        t90 - (t14 * t37 + t13 * t38),  # c0(7, 5, 6)
-        t96 - (t14 * t97 + t13 * t98),  # c0(7, 5, 7)
+        t71 - (t14 * t27 + t13 * t28),  # c0(7, 5, 2)
+        t85 - (t14 * t32 + t13 * t33),  # c0(7, 5, 3)
+        t91 - (t14 * t37 + t13 * t38),  # c0(7, 5, 6)
+        t97 - (t14 * t98 + t13 * t99),  # c0(7, 5, 7)
     )

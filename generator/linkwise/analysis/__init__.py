@@ -1,4 +1,4 @@
-"""From a recorded movement to who loads whom: torque analysis of motion logs."""
+"""Torque analysis of motion logs: who loads whom in a recorded movement."""
 
 from linkwise_runtime.quantities import Contact
 

@@ -1,4 +1,4 @@
-"""All that can be chosen of an analysis, as `linkwise analyze` has its flags and a study its keys."""
+"""Choices of an analysis, named as the flags of `linkwise analyze` and as the keys of a study."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,9 +34,10 @@ from linkwise.analysis.written_choices import (
 
 @dataclass(frozen=True)
 class AnalysisChoices:
-    """Fields are called as the flags of `linkwise analyze`, and mean what those do; files are paths.
+    """Choices of an analysis; fields have the names and the meaning of the flags of `linkwise analyze`.
 
-    What these become raises LinkwiseError that names the flag where a choice cannot be.
+    Files are given as paths. Properties and methods raise LinkwiseError, which names the flag, for an invalid
+    choice.
     """
 
     units: Units | None = None
@@ -70,34 +71,34 @@ class AnalysisChoices:
 
     @property
     def reading(self) -> Reading:
-        """How the log is read."""
+        """Choices of how the log is read."""
         mapping = pairs("--map", self.map)
         how = self.ignore_extra, self.resample, self.loop_tolerance, self.topic
         return Reading(self.units, self.time, mapping, *how, self.qpos)
 
     @property
     def processing(self) -> Processing:
-        """How velocities and accelerations come about."""
+        """Choices of how velocities and accelerations are computed."""
         lowpass = chosen_lowpass(self.cutoff, self.filter_order, self.padding)
         how = self.derivative, self.window, self.degree
         return chosen_processing(*how, lowpass, self.edges, self.convention)
 
     def wanted(self, table: Format = "parquet", figures: Sequence[str] = (), page: bool = True) -> Wanted:
-        """What is to be written."""
+        """Return the choice of outputs to write."""
         phases = tuple(map(Phase.of, self.phase))
         return Wanted(table, tuple(figures), page, self.power_terms, self.induced, phases)
 
     def payloads(self, robot: LoadedRobot) -> tuple[Payload, ...]:
-        """Point masses that a robot carries."""
+        """Return the point masses that a robot carries."""
         return carried(self.payload, robot)
 
     def borne(self, robot: LoadedRobot) -> Loads:
-        """Loads on a robot from outside."""
+        """Return the external loads on a robot."""
         given: list[Load | str] = [*constant_loads(self.load, robot), *self.loads]
         return Loads.of(given, None if self.contact_loads and not self.loads else self.loads_cutoff)
 
     def contacts(self, robot: LoadedRobot) -> Contacts:
-        """Where the robot stands."""
+        """Return the contacts on which the robot stands."""
         measured = [Path(path) for path in self.contact_loads]
         above = self.contact_threshold, self.loads_cutoff
         return chosen_contacts(self.contact, self.contact_while, measured, *above, self.unactuated, robot)

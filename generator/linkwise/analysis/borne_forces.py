@@ -1,7 +1,7 @@
-"""What ties and contacts bear: of each link, of what joints have of their own, and of each load.
+"""Forces of ties and contacts, split by link, by passive torques of the joints, and by load.
 
-Contacts bear their part first, by the equations of the joints that nothing drives; ties bear the rest, with
-what contacts give to the joints that follow.
+Contacts take their part first, by the equations of the joints that nothing drives; ties carry the rest,
+including what the contacts put on the dependent joints.
 """
 
 from collections.abc import Sequence
@@ -19,12 +19,12 @@ from linkwise.analysis.result_quantities import FORCE_OF, PASSIVE
 from linkwise.package.load import Array
 
 Motion = tuple[Array, Array, Array]
-"""q, q̇, q̈ (S, n) each."""
+"""q, q̇ and q̈, each (S, n)."""
 
 
 @dataclass(frozen=True)
 class BorneForces:
-    """Fills the columns of forces, and what is known of contacts."""
+    """Fills the columns of forces, and those of contacts."""
 
     robot: LoadedRobot
     loads: tuple[PlacedLoad, ...]
@@ -39,7 +39,10 @@ class BorneForces:
         motion: Motion,
         partial: Array,
     ) -> None:
-        """Fill `out` (columns, S); partial: tau_ij (S, n, N), of which contacts bear some."""
+        """Fill the force columns of `out` (columns, S).
+
+        partial: tau_ij (S, n, N), of which contacts carry a part
+        """
         if not self.robot.constraint_rows:
             return
         by_link = self._by_link(standing, motion, partial)
@@ -62,7 +65,7 @@ class BorneForces:
             self._fill_fed(out, columns, standing, motion[1], by_link)
 
     def _by_link(self, standing: Standing | None, motion: Motion, partial: Array) -> Array:
-        """Of each link, (S, C, N)."""
+        """Return the constraint forces due to each link, (S, C, N)."""
         model: Any = self.robot.model
         tied = None if self.robot.constrained is None else model.forces(*motion)
         if standing is None:
@@ -71,7 +74,10 @@ class BorneForces:
         return self._joined(motion[0], tied, standing, standing.reactions(partial))
 
     def _beside(self, standing: Standing | None, time: Array, motion: Motion) -> Array:
-        """Of what joints have of their own, in the order of PASSIVE, then of loads, (S, C, X)."""
+        """Return the constraint forces due to passive torques and loads, (S, C, X).
+
+        X counts the joints' passive torques, in the order of PASSIVE, then the loads.
+        """
         q, tied = motion[0], self.robot.constrained
         model: Any = self.robot.model
         given = self._torques(model if tied is None else tied.open, time, motion)
@@ -84,7 +90,10 @@ class BorneForces:
         return self._joined(q, of_ties, standing, standing.reactions(given))
 
     def _joined(self, q: Array, of_ties: Array | None, standing: Standing, reactions: Array) -> Array:
-        """Rows of ties, which bear what contacts give to followers too, and of contacts: (S, C, X)."""
+        """Return the forces in the rows of ties, then of contacts, (S, C, X).
+
+        Ties carry what contacts put on the dependent joints too.
+        """
         tied = self.robot.constrained
         if tied is None or of_ties is None:
             return reactions
@@ -92,7 +101,7 @@ class BorneForces:
         return np.concatenate([of_ties - given, reactions], axis=1)
 
     def _torques(self, model: Any, time: Array, motion: Motion) -> Array:
-        """What a model says of joints' own and of loads, (S, n, X)."""
+        """Return the passive torques of the joints, then the torques of the loads, by a model, (S, n, X)."""
         q = motion[0]
         own = [np.asarray(a) + 0.0 * q for a in model.passive_torque(*motion)]
         return np.stack([*own, *(borne.torque(model, time, q) for borne in self.loads)], axis=-1)
@@ -100,7 +109,7 @@ class BorneForces:
     def _fill_fed(
         self, out: Array, columns: Sequence[Column], standing: Standing, qd: Array, by_link: Array
     ) -> None:
-        """Fill what contacts feed into links as they slip."""
+        """Fill the power that contacts feed into links as they slip."""
         ground = self.robot.contacts
         assert ground is not None
         own = by_link[:, len(self.robot.constraint_rows) - len(ground.rows) :]
@@ -112,7 +121,7 @@ class BorneForces:
     def _fill_ground(
         self, out: Array, columns: Sequence[Column], standing: Standing, time: Array, motion: Motion
     ) -> None:
-        """Fill the shares of contacts, how what they hold moves, and what was measured."""
+        """Fill shares, slip velocities and measured forces of contacts, and joint torques by these forces."""
         times, ground = self.times, self.robot.contacts
         assert times is not None
         assert ground is not None

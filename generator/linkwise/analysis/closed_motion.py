@@ -1,8 +1,8 @@
-"""Positions of a log in which ties close: joints that follow are where the independent ones leave them.
+"""Closing of a log's positions: dependent joints are moved to where the ties of the robot close.
 
-Columns of the log for joints that follow say where to look for them, within a tolerance. Where some are
-missing, these joints are led from the closed position of the package to the first sample, and from sample to
-sample: ties that can close in several ways stay in the one that leads from there.
+Columns of the log for dependent joints serve as the initial guess, which must be right within a tolerance.
+Where some are missing, these joints are led from the closed position of the package to the first sample, and
+from sample to sample: ties that can close in several ways stay in the one that is reached from there.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,20 +22,23 @@ from linkwise.progress import Progress
 BLOCK = 4096
 """Samples closed at once."""
 APART = 16
-"""Samples from one that the last leads to, to the next; those between are guessed on a line."""
+"""Samples from one led position to the next; those between them are first guessed on a straight line."""
 NEAR = 0.1
-"""In rad and m: farther from its guess, a joint may have come to another way to close."""
+"""Distance from its guess, in rad or m, beyond which a joint may have jumped to another way to close."""
 
 
 @dataclass(frozen=True)
 class ClosedLog:
-    """How far the log's own positions were off where it has all joints, and of which constraint."""
+    """Largest violation of a constraint by the log's own positions, and the name of that constraint.
+
+    The violation is None where the log does not have all joints.
+    """
 
     largest: float | None
     row: str = ""
 
     def record(self) -> dict[str, Any]:
-        """As plain data; m, rad or a coupling's unit."""
+        """Return this as plain data; the violation is in m, rad or a coupling's unit."""
         return {"largest_violation": self.largest, "of": self.row}
 
 
@@ -47,7 +50,9 @@ def closed_samples(
     progress: Progress,
     buffer: Path | None = None,
 ) -> tuple[Samples, ClosedLog]:
-    """Samples of all joints, of those of the joints `there` in the log, and how far they were off.
+    """Return samples of all joints, and the largest violation by the log's own positions.
+
+    samples: those of the joints with the numbers `there`, which the log has
 
     Raises LinkwiseError, with the time, where ties cannot be closed or the log is off by more than the
     tolerance, in m and rad.
@@ -107,7 +112,10 @@ def _closed(model: ConstrainedModel, time: Array, q: Array) -> Array:
 def _without_leaps(
     model: ConstrainedModel, time: Array, q: Array, there: Sequence[int], last: Array | None
 ) -> Array:
-    """Closed positions, led on from the closed `last` sample, or from where the package has them closed."""
+    """Return closed positions (S, n), led on from the closed `last` sample.
+
+    Without one, they are led from the closed position of the package.
+    """
     guess = _continued(model, time, q, there, last, APART)
     found = _closed(model, time, guess)
     if np.abs(found - guess).max(initial=0.0) > NEAR:
@@ -123,7 +131,7 @@ def _continued(
     last: Array | None,
     apart: int,
 ) -> Array:
-    """Guesses (S, n) of the joints that are not in the log."""
+    """Return positions (S, n) in which the joints that are not in the log are guesses."""
     q, marks = q.copy(), np.unique([*range(0, len(q), apart), len(q) - 1])
     at = _start(model, q[0], there, float(time[0])) if last is None else last
     led = np.empty((len(marks), q.shape[1]))
@@ -135,7 +143,7 @@ def _continued(
 
 
 def _start(model: ConstrainedModel, first: Array, there: Sequence[int], time: float) -> Array:
-    """A closed position for the first sample: beside what the log has of joints that follow, if any."""
+    """Return a closed position (n,) for the first sample, near the log's dependent joints, if it has any."""
     own = list(model.following.independent)
     led = _led(model, None, first, time)
     if set(there) <= set(own):
@@ -149,7 +157,10 @@ def _start(model: ConstrainedModel, first: Array, there: Sequence[int], time: fl
 
 
 def _led(model: ConstrainedModel, start: Array | None, wanted: Array, time: float) -> Array:
-    """A closed position, led from a closed one, or the model's own, to where the independent joints are."""
+    """Return a closed position (n,) with the independent joints of `wanted`.
+
+    It is led there from the closed position `start`, or from the package's own where that is None.
+    """
     try:
         return np.asarray(model.constraints.closed(wanted[list(model.following.independent)], start=start))
     except ValueError as error:
@@ -160,5 +171,5 @@ def _led(model: ConstrainedModel, start: Array | None, wanted: Array, time: floa
 
 
 def reason_of(error: ValueError) -> Any:
-    """What a package says without the mend that is for callers of its own."""
+    """Return a package's message without the advice that is for its direct callers."""
     return getattr(error, "reason", error)

@@ -1,4 +1,4 @@
-"""Which column of a log is the time, which is which joint, and in which unit its angles are."""
+"""Matching of a log's columns: the time, each joint's column, and the unit of angles."""
 
 import math
 import re
@@ -13,24 +13,24 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 
 MOST_FOUND, LONGEST_FOUND = 6, 300
-"""Names of columns that are offered in all, and letters of what is offered for one."""
+"""Most column names offered in one message, and most characters for one wanted name."""
 PAST_LIMITS = 1.0
-"""An angle so far past its joint's limits, in rad, is more likely one in degrees, as is one past a turn."""
+"""An angle that exceeds its joint's limits by this, in rad, or a turn at all, is more likely in degrees."""
 SAYS_DEGREES = re.compile(r"(?<![^\W_])deg(?:rees?)?(?![^\W_])", re.IGNORECASE)
 FAR = 100.0
-"""m; a length beyond it is more likely one in mm."""
+"""Length in m beyond which a column is more likely in mm."""
 TIMES = ("time", "t")
-"""Names of the time's column, in any case."""
+"""Names of the time column, in upper or lower case."""
 STATE, SPEED = (f"/{state}" for state in STATES)
 OLD_SPEED = "_u"
-"""How states of OpenSim 3 end that are speeds."""
+"""Ending of the states of OpenSim 3 that are speeds."""
 JOINTS = "/jointset/"
-"""How OpenSim's paths of coordinates begin, /jointset/JOINT/COORDINATE, with /value behind among states."""
+"""Beginning of OpenSim's coordinate paths, /jointset/JOINT/COORDINATE; among states, /value is added."""
 
 
 @dataclass(frozen=True)
 class Selection:
-    """Column numbers: the time's, each joint's in the robot's order; and the names left out."""
+    """Column numbers of the time and of each joint, in the robot's order, and the names left out."""
 
     time: int
     joints: tuple[int, ...]
@@ -38,7 +38,7 @@ class Selection:
 
     @property
     def columns(self) -> tuple[int, ...]:
-        """The columns to read: time first, then the joints."""
+        """Numbers of the columns to read: time first, then the joints."""
         return (self.time, *self.joints)
 
 
@@ -52,11 +52,11 @@ def select(
 ) -> Selection:
     """Match columns to joints by `reading.mapping`, else by name, also as OpenSim's states name them.
 
-    beside: columns that are of no joint, and asked for elsewhere
-    brought: columns that the log's format has of itself, and coupled: joints that follow others by the
-    robot's file, whose columns may be left out unasked
-
-    columns: the names of a log's, each once
+    columns: the names of a log's columns, each once
+    beside: columns of no joint that are read elsewhere
+    brought: columns that the log's format adds by itself
+    coupled: joints that follow others by the robot's file; their columns and those of `brought` may be left
+    out without `reading.ignore_extra`
 
     Raises LinkwiseError for a joint without a column, a column used twice, and a column without a joint
     where that was not allowed.
@@ -97,16 +97,19 @@ def select(
 def with_columns(
     columns: Sequence[str], joints: Sequence[str], optional: Collection[str], reading: Reading
 ) -> tuple[int, ...]:
-    """Which joints are to be read: those `optional` only where the log has a column for them.
+    """Return the numbers of the joints to read: `optional` ones only if the log has a column for them.
 
-    Raises LinkwiseError for a mapping of what is not there.
+    Raises LinkwiseError for a mapping whose joint or column does not exist.
     """
     source = _mapped(columns, joints, reading)
     return tuple(k for k, joint in enumerate(joints) if joint not in optional or source[joint] in columns)
 
 
 def radians_per_unit(log: Log, reading: Reading) -> float:
-    """Factor that brings the log's angles to radians; LinkwiseError where file and user disagree."""
+    """Return the factor that brings the log's angles to radians.
+
+    Raises LinkwiseError where file and user disagree.
+    """
     told = None if reading.units is None else reading.units == "deg"
     if told is not None and log.degrees is not None and told != log.degrees:
         raise LinkwiseError(
@@ -118,7 +121,10 @@ def radians_per_unit(log: Log, reading: Reading) -> float:
 
 @dataclass(frozen=True)
 class Peak:
-    """An angle's column, its largest magnitude there, and the largest that its joint may have in rad."""
+    """A joint's column and its largest magnitude in the log.
+
+    `reach` is the largest magnitude that the joint's limits allow, in rad or m.
+    """
 
     column: str
     magnitude: float
@@ -126,11 +132,11 @@ class Peak:
 
 
 def unit_warnings(log: Log, reading: Reading, peaks: Sequence[Peak]) -> tuple[str, ...]:
-    """Warnings about a told unit of angles that is unlikely by their size.
+    """Return warnings about a stated unit of angles that is unlikely, given their size.
 
-    Raises LinkwiseError where the unit is not told: in a file whose header ought to, where a column's name
-    says degrees, and where angles in radians would make more than a turn or pass their joint's limits. No
-    simulator has degrees.
+    Raises LinkwiseError where the unit is not stated: in a file whose header should state it, where the name
+    of a column says degrees, and where angles in radians would exceed a turn or their joint's limits.
+    Positions of simulators are never in degrees.
     """
     if not peaks or reading.qpos is not None:
         return ()
@@ -149,7 +155,10 @@ def unit_warnings(log: Log, reading: Reading, peaks: Sequence[Peak]) -> tuple[st
 
 
 def _doubts(peaks: Sequence[Peak], largest: Peak, told: bool) -> Iterator[str]:
-    """Why angles are hardly in radians; their names and limits count only where nobody told that they are."""
+    """Yield reasons why the angles are hardly in radians.
+
+    Column names and joint limits count only where nobody stated that they are.
+    """
     if largest.magnitude > math.tau:
         turns = f"{largest.magnitude / math.tau:.1f} turns"
         yield f"column {largest.column!r} reaches {largest.magnitude:.4g} rad, {turns}"
@@ -162,7 +171,7 @@ def _doubts(peaks: Sequence[Peak], largest: Peak, told: bool) -> Iterator[str]:
 
 
 def far_warnings(peaks: Sequence[Peak]) -> tuple[str, ...]:
-    """Warnings about lengths, in the log, that are unlikely by their size."""
+    """Return warnings about lengths in the log whose size is unlikely."""
     return tuple(
         f"column {peak.column!r} reaches {peak.magnitude:.4g} m: if that is mm, divide it by 1000"
         for peak in peaks
@@ -171,7 +180,7 @@ def far_warnings(peaks: Sequence[Peak]) -> tuple[str, ...]:
 
 
 def time_column(columns: Sequence[str], reading: Reading) -> int:
-    """Number of the column of the time; raises LinkwiseError where none is."""
+    """Return the number of the time column; raises LinkwiseError where there is none."""
     if reading.time is not None:
         if reading.time not in columns:
             raise LinkwiseError(
@@ -187,7 +196,10 @@ def time_column(columns: Sequence[str], reading: Reading) -> int:
 
 
 def with_nearest(wanted: Sequence[str], found: Sequence[str]) -> str:
-    """What is wanted, each beside what was found, the nearest first: 'knee_r' (found 'knee', 'hip')."""
+    """Return the wanted names as text, each with the names found, the nearest first.
+
+    Such a text is 'knee_r' (found 'knee', 'hip').
+    """
     if not found:
         return f"{listed(map(repr, wanted))} (found none)"
     shown = max(1, MOST_FOUND // len(wanted))
@@ -196,7 +208,7 @@ def with_nearest(wanted: Sequence[str], found: Sequence[str]) -> str:
 
 
 def _mapped(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> dict[str, str]:
-    """Name of each joint's column, in the robot's order."""
+    """Return the name of each joint's column by the joint's name, in the robot's order."""
     source = {joint: _named(joint, columns) for joint in joints}
     taken: dict[str, str] = {}
     for column, given in reading.pairs:
@@ -220,7 +232,10 @@ def _mapped(columns: Sequence[str], joints: Sequence[str], reading: Reading) -> 
 
 
 def _named(joint: str, columns: Sequence[str]) -> str:
-    """The column of a joint's name; where there is none, the only path of OpenSim's to that coordinate."""
+    """Return the column with a joint's name, else the only path of OpenSim to that coordinate.
+
+    Where there is neither, return the joint's name.
+    """
     paths = [
         column
         for column in columns

@@ -1,7 +1,6 @@
-"""A model whose joints are tied, asked as if it had but the independent ones: torques of those that follow
-are zero.
+"""A model of tied joints, expressed in the independent ones: torques of the dependent joints are zero.
 
-    tau^_aj = sum_i G_ia tau_ij = sum_b c2^_ajb ydd_b + sum_b c1^_ajb yd_b + g^_aj
+tau^_aj = sum_i G_ia tau_ij = sum_b c2^_ajb ydd_b + sum_b c1^_ajb yd_b + g^_aj
 """
 
 from collections.abc import Callable, Sequence
@@ -19,19 +18,22 @@ from linkwise.package.load import Array
 
 @dataclass(frozen=True)
 class Following:
-    """Which joints move by themselves, and which of them move each joint."""
+    """The independent joints, and for each joint the independent joints that move it."""
 
     independent: tuple[int, ...]
     movers: tuple[frozenset[int], ...]
-    """Of each joint; of an independent one itself."""
+    """Independent joints that move each joint; an independent joint moves itself."""
 
 
 @dataclass(frozen=True)
 class ConstrainedModel:
-    """The calls of a model that an analysis makes; motion (S, n) is of all joints, in which ties close."""
+    """A model with tied joints, with the calls that an analysis makes.
+
+    Motion (S, n) is that of all joints, in which ties close.
+    """
 
     open: Dynamics
-    """Of the tree without ties."""
+    """Model of the tree without ties."""
     constraints: Any
     """The package's `Constraints`."""
     following: Following
@@ -39,30 +41,33 @@ class ConstrainedModel:
 
     @classmethod
     def of(cls, model: Dynamics, tree: RigidTree) -> "ConstrainedModel":
-        """The model with the ties of its own description."""
+        """Return the model with the ties of its own description."""
         constraints = model.constraints
         independent = tuple(list(model.joint_names).index(name) for name in constraints.independent)
         following = Following(independent, movers(tree, len(model.joint_names), independent))
         return cls(model, constraints, following, _layout(model.layout, following))
 
     def __getattr__(self, name: str) -> Any:
-        """What ties do not change: names, and what is asked of the open tree."""
+        """Return what ties do not change: names, and attributes of the open tree."""
         return getattr(self.open, name)
 
     @property
     def kinematics(self) -> "ConstrainedKinematics":
-        """Poses of the open tree; loads are borne by the independent joints."""
+        """Kinematics of the open tree, in which the independent joints carry the loads."""
         return ConstrainedKinematics(self.open.kinematics, self._projected)
 
     def consistent(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
-        """A motion in which ties close, of that of the independent joints; q of the others is a guess."""
+        """Return q, qd, qdd (S, n) in which ties close, from the motion of the independent joints.
+
+        q of the dependent joints is an initial guess.
+        """
         own = list(self.following.independent)
         q = _array(self.constraints.closed(q))
         qd = _array(self.constraints.velocity(q, qd[..., own]))
         return q, qd, _array(self.constraints.acceleration(q, qd, qdd[..., own]))
 
     def packed(self, q: Array, qd: Array, qdd: Array) -> Side:
-        """All coefficients and tau^_aj."""
+        """Return all coefficients and tau^_aj, packed in the order of `layout`."""
         cubes = (_array(a) for a in self.constraints.coefficients(q, qd))
         torque = _array(self.constraints.partial_torque(q, qd, qdd))
         acceleration, velocity, gravity = cubes
@@ -82,13 +87,13 @@ class ConstrainedModel:
         )
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """tau^_a of all links, (S, n)."""
+        """Return tau^_a summed over all links, (S, n)."""
         return self._spread(_array(self.constraints.inverse_dynamics(q, qd, qdd)))
 
     def propagation(self, q: Array, qd: Array, qdd: Array, convention: str = "closing") -> Side:
-        """What moves with q̈_k and q̇_k, (S, n, N, n), and g_ij, (S, n, N).
+        """Return the parts of tau^_aj by q̈_k and by q̇_k, (S, n, N, n) each, and g^_aj, (S, n, N).
 
-        In the gradient convention, of rigid links, velocities have twice what they have in the closing one.
+        In the gradient convention, of rigid links, the parts by velocity are twice those of the closing one.
         """
         acceleration, velocity, gravity = map(_array, self.constraints.propagation(q, qd, qdd))
         share = 2.0 if convention == "gradient" else 1.0
@@ -96,34 +101,37 @@ class ConstrainedModel:
         return Side(next(cubes), next(cubes), self._spread(gravity, 1), torque=None)
 
     def passive_torque(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, ...]:
-        """What the independent joints take for springs, losses and armatures of all joints, (S, n) each."""
+        """Return the passive torques of all joints, projected on the independent ones, (S, n) each.
+
+        They are those of springs, losses and armatures.
+        """
         return tuple(self._projected(q, _array(a)) for a in self.open.passive_torque(q, qd, qdd))
 
     def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Y^ of tau^_aj = Y^_aj pi_j, (S, n, N, 10), zero for joints that follow."""
+        """Return the regressor Y^ of tau^_aj = Y^_aj pi_j, (S, n, N, 10), zero for dependent joints."""
         own = _array(self.open.regressor(q, qd, qdd))
         flat = own.reshape(*own.shape[:2], -1)
         projected = _array(self.constraints.projected(q, flat, by_link=True))
         return self._spread(projected.reshape(*projected.shape[:2], *own.shape[2:]), 1)
 
     def velocity_map(self, q: Array) -> Array:
-        """G with columns in the places of the independent joints, (S, n, n)."""
+        """Return G with its columns in the places of the independent joints, (S, n, n)."""
         return self._spread(_array(self.constraints.velocity_map(q)))
 
     def forces(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """What constraints bear of each link, (S, C, N)."""
+        """Return the constraint forces due to each link, (S, C, N)."""
         return _array(self.constraints.forces(q, qd, qdd))
 
     def forces_of(self, q: Array, torque: Array) -> Array:
-        """What constraints bear of torques (S, n, X) on all joints, (S, C, X)."""
+        """Return the constraint forces due to torques (S, n, X) on all joints, (S, C, X)."""
         return _array(self.constraints.forces_of(q, torque, by_link=True))
 
     def _projected(self, q: Array, torque: Array) -> Array:
-        """G^T torque in the places of the independent joints, (S, n)."""
+        """Return G^T torque in the places of the independent joints, (S, n)."""
         return self._spread(_array(self.constraints.projected(q, torque)))
 
     def _spread(self, values: Array, axis: int = -1) -> Array:
-        """Values of independent joints on an axis of all joints, zero for those that follow."""
+        """Return values of independent joints on an axis of all joints, zero for the dependent ones."""
         shape = list(values.shape)
         shape[axis] = len(self.open.joint_names)
         out = np.zeros(shape)
@@ -141,15 +149,15 @@ class ConstrainedKinematics:
         return getattr(self._own, name)
 
     def load_torque(self, q: Array, *load: Any, **options: Any) -> Array:
-        """What a load asks of the independent joints, (S, n)."""
+        """Return the torques of the independent joints that carry a load, (S, n)."""
         return self._projected(q, _array(self._own.load_torque(q, *load, **options)))
 
 
 def movers(tree: RigidTree, n: int, independent: Sequence[int]) -> tuple[frozenset[int], ...]:
-    """Of each joint, the independent ones that may move it.
+    """Return, for each joint, the independent joints that may move it.
 
-    Joints that follow by one row of the constraints, or by rows that have such a joint in common, follow
-    together.
+    Dependent joints in one row of the constraints, or in rows that share a dependent joint, form a group that
+    all independent joints of its rows may move.
     """
     paths: list[frozenset[int]] = []
     for body in tree.bodies:
@@ -157,7 +165,7 @@ def movers(tree: RigidTree, n: int, independent: Sequence[int]) -> tuple[frozens
         paths.append(before | {body.coordinate})
 
     def path(frame: int) -> frozenset[int]:
-        body = tree.frames[frame].body
+        body = tree.frames[frame].joint
         return frozenset() if body is None else paths[body]
 
     rows = [path(tie.first) ^ path(tie.second) for tie in tree.ties]
@@ -172,9 +180,9 @@ def movers(tree: RigidTree, n: int, independent: Sequence[int]) -> tuple[frozens
 
 
 def _layout(own: Any, following: Following) -> Side:
-    """Which values are not zero for all motion.
+    """Return the rows of the values that are not zero for all motion.
 
-    c2^ comes of c2; c1^ of c1, and of c2 where k follows, so that its share of G changes.
+    c2^ comes from c2; c1^ comes from c1, and from c2 where k is dependent, since its part of G changes.
     """
     movers, independent = following.movers, set(following.independent)
 
@@ -193,7 +201,7 @@ def _layout(own: Any, following: Following) -> Side:
 
 
 def _mirrored(rows: Rows) -> Rows:
-    """c2 with what is stored for i <= k only, both ways."""
+    """Return the rows of c2, of which only i <= k are stored, both ways."""
     return np.unique(np.concatenate([rows, rows[:, ::-1]]), axis=0)
 
 

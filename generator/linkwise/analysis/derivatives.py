@@ -36,9 +36,9 @@ SECOND = np.array(
 def derivatives(
     positions: Array, rate: float, start: int, stop: int, processing: Processing
 ) -> tuple[Array, Array, Array]:
-    """q, q̇, q̈ of samples start..stop, each (stop - start, n), per s and s².
+    """Return q, q̇, q̈ of the samples start..stop, each (stop - start, n), per s and s².
 
-    positions: all of them, (samples, n), at `rate` Hz; at least `processing.span` of them
+    positions: of all samples, (samples, n), at `rate` Hz; at least `processing.span` of them
     """
     reach = processing.span - 1
     low, high = max(0, start - reach), min(len(positions), stop + reach)
@@ -56,7 +56,7 @@ def _five_point(q: Array, rate: float) -> tuple[Array, Array]:
 
 
 def _weighted(q: Array, weights: NDArray[np.int_]) -> Array:
-    """Σ_k w_pk (q_k - q_p): the weights sum to 0, and this way equal samples give exactly 0."""
+    """Return Σ_k w_pk (q_k - q_p): the weights sum to 0, and this way equal samples give exactly 0."""
     out = np.empty_like(q)
     last = len(q) - 5
     for p, (first, count) in enumerate([(0, 1), (0, 1), (0, last + 1), (last, 1), (last, 1)]):
@@ -70,7 +70,7 @@ def _weighted(q: Array, weights: NDArray[np.int_]) -> Array:
 
 
 def _savitzky_golay(q: Array, rate: float, processing: Processing) -> tuple[Array, Array, Array]:
-    """q, q̇, q̈ of the polynomial fitted to each window; at the ends, of the last full window's."""
+    """Return q, q̇, q̈ of the polynomial fitted to each window; at the ends, to the last full window."""
     savgol = extra("scipy.signal").savgol_filter
     fitted = [
         savgol(q, processing.window, processing.degree, deriv=m, delta=1 / rate, axis=0) for m in range(3)

@@ -16,7 +16,7 @@ AT_ONCE = 1 << 18
 
 
 def collected(blocks: Iterator[Array], width: int, directory: Path | None) -> Array:
-    """All rows of blocks (any, width) as one writable array, in memory or in a file in `directory`."""
+    """Return all rows of blocks (any, width) as one writable array, in memory or in a file in `directory`."""
     if directory is None:
         return np.concatenate([np.empty((0, width)), *blocks])
     with _nameless(directory) as file:
@@ -32,7 +32,7 @@ def collected(blocks: Iterator[Array], width: int, directory: Path | None) -> Ar
 class EverySample:
     """A sink that keeps all samples as one array (columns, samples), in memory or in a file in `directory`.
 
-    To be closed by `with`; `values` is read before, and outlives it.
+    To be closed by `with`; `values` is read before, and stays valid afterwards.
     """
 
     def __init__(self, columns: int, samples: int, directory: Path | None = None) -> None:
@@ -50,7 +50,7 @@ class EverySample:
             self._file.close()
 
     def __call__(self, block: Array) -> None:
-        """Take a block (columns, any)."""
+        """Store a block (columns, any)."""
         first, self._seen = self._seen, self._seen + block.shape[1]
         if self._held is not None:
             self._held[:, first : self._seen] = block
@@ -62,7 +62,7 @@ class EverySample:
 
     @property
     def values(self) -> Array:
-        """All samples, (columns, samples), to be read."""
+        """All samples (columns, samples), for reading."""
         if self._held is not None:
             return self._held
         assert self._file is not None
@@ -72,15 +72,15 @@ class EverySample:
 
 
 def _nameless(directory: Path) -> Any:
-    """A file without a name from the start: the system removes it with its last user, however that ends.
+    """Return an open file that has no name: the system removes it with its last user, however that ends.
 
-    Where an open file keeps a name, that must not be among results.
+    On systems where an open file keeps a name, it is not made among the results.
     """
     return tempfile.TemporaryFile(dir=None if system_here().keeps_open_files else directory)
 
 
 def let_go(rows: Array) -> None:
-    """Have memory not hold what the file behind these rows does; nothing for rows in memory."""
+    """Release the memory that holds the file behind these rows; do nothing for rows in memory."""
     base: object = rows
     while isinstance(base, np.ndarray):
         base = base.base
@@ -90,7 +90,7 @@ def let_go(rows: Array) -> None:
 
 
 def first_column(rows: Array) -> Array:
-    """A copy of the first column of rows that may be in a file."""
+    """Return a copy of the first column of rows that may be in a file."""
     column = np.empty(len(rows))
     for at in range(0, len(rows), AT_ONCE):
         column[at : at + AT_ONCE] = rows[at : at + AT_ONCE, 0]

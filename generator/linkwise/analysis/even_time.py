@@ -1,4 +1,4 @@
-"""Even time: whether a log has it, up to the digits its times are written in, and how to bring it about."""
+"""Even sampling: a check of a log's times, up to the digits they are written in, and resampling."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,27 +11,29 @@ from linkwise.package.load import Array
 from linkwise.progress import Progress, silent
 
 TOLERANCE = 1e-3
-"""How far a time step may be from the mean one, as a share of it."""
+"""Largest deviation of a time step from the mean step, as a fraction of it."""
 
 GAP, GAP_BEFORE_RESAMPLING = 1.5, 10.0
-"""Times the usual step; a longer one is a hole in the log. Splines bridge somewhat longer ones."""
+"""Longest steps, in usual steps: a longer one is a gap in the log; splines bridge somewhat longer ones."""
 
 OVERLAP = 64
-"""Knots seen past a window. A knot's influence on a cubic spline at least halves from one to the
+"""Knots used past a window. A knot's influence on a cubic spline at least halves from one to the
 next, so what is cut away is below 2⁻⁶⁴ of the signal."""
 
 EXTREME = 1e100
-"""In s, of times, and in Hz, of rates: no clock shows it, and what is computed from it overflows."""
+"""Limit of times in s and of rates in Hz: no clock shows it, and what is computed from it overflows."""
 
 MOST = 100
-"""How many times the log's own rate is still a plausible wish, and not a slip of the finger."""
+"""Largest ratio of a wanted rate to the log's own that is plausible, and not a slip of the finger."""
 
 
 def usual_step(time: Array, first_row: int, gap: float = GAP) -> float:
-    """Median step in s of `time` (S,), two or more, whose first row in the log has the number `first_row`.
+    """Return the median step in s of `time` (S,), two samples or more.
+
+    first_row: number in the log of the first sample's row
 
     Raises LinkwiseError that names the rows for time that does not increase, and for steps longer than `gap`
-    usual ones.
+    usual ones; also for times beyond EXTREME.
     """
     if (largest := max(-time.min(), time.max())) > EXTREME:
         raise LinkwiseError(f"time column: it comes to {largest:.3g} s; give seconds")
@@ -51,11 +53,13 @@ def usual_step(time: Array, first_row: int, gap: float = GAP) -> float:
 def even_rate(
     time: Array, first_row: int, strict: bool, mend: str = "bring the log to an even rate with --resample"
 ) -> float:
-    """Sampling rate in Hz of `time` (S,) in s, whose first row in the log has the number `first_row`.
+    """Return the sampling rate in Hz of `time` (S,) in s.
+
+    first_row: number in the log of the first sample's row
+    mend: advice for messages, which a rate follows
 
     Raises LinkwiseError that names the rows for time that does not increase and for gaps that splines do not
-    bridge; where `strict`, for uneven time and any gap too, which are else left to `resampled`; `mend` then
-    says before a rate what to do.
+    bridge; where `strict`, for uneven time and any gap too, which are otherwise left to `resampled`.
     """
     if len(time) < 2:
         raise LinkwiseError(f"{len(time)} samples; a movement needs 5 or more")
@@ -85,7 +89,10 @@ def even_rate(
 
 
 def _splined(spline: Any, window: Array, at: Array) -> Array:
-    """Values at the times `at` (T,) of splines through a window (S, 1 + n)."""
+    """Return values (T, n) at the times `at` (T,) of splines through a window (S, 1 + n).
+
+    Raises LinkwiseError for values that overflow.
+    """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         try:
             values: Array = spline(window[:, 0], window[:, 1:], axis=0)(at)
@@ -111,10 +118,10 @@ def _refuse_backwards(time: Array, steps: Array, first_row: int) -> None:
 
 
 def _rounded_step(time: Array) -> float | None:
-    """Step of the even grid that the times are, rounded to the last digit they are given in, if they are.
+    """Return the step in s of an even grid that gives these times when rounded to their last digit, or None.
 
     60 Hz in milliseconds has steps of 16 and 17 ms, and that is even time. Digits coarser than a third
-    of a step explain too much to count.
+    of a step would explain too much to count.
     """
     at = np.arange(len(time))
     step, start = np.polyfit(at, time - time[0], 1)

@@ -1,11 +1,11 @@
 """The zero-phase low-pass over a log of any length, in place.
 
-`scipy.signal.sosfiltfilt` wants the whole log at once. Here its two passes, forwards and backwards,
+`scipy.signal.sosfiltfilt` needs the whole log at once. Here its two passes, forwards and backwards,
 go over blocks and carry the filter's state from one to the next: memory stays flat, and the result
 is sosfiltfilt's, sample for sample, for every block length.
 
 The log is continued past its ends until the filter has forgotten how it started. SciPy's own padding, three
-times the taps, is shorter: at 6 Hz and 100 Hz it leaves a straight ramp of 1.3 m/s an acceleration of 4 m/s²
+times the taps, is shorter: at 6 Hz and 100 Hz it gives a straight ramp of 1.3 m/s an acceleration of 4 m/s²
 at its ends.
 """
 
@@ -20,12 +20,13 @@ from linkwise.extras import extra
 from linkwise.package.load import Array
 
 FORGOTTEN = 1e-6
-"""What is left of a filter's start behind the padding, in parts of it."""
+"""Fraction of a filter's initial transient that is left behind the padding."""
 
 
 def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536, flag: str = "--cutoff") -> None:
-    """Filter q (samples, n) in place; `rate` in Hz, `rows` the length of a block, `flag` that of
-    the cutoff, for messages.
+    """Filter q (samples, n) in place.
+
+    rate: in Hz; rows: the length of a block; flag: the flag that gives the cutoff, for messages
 
     Raises LinkwiseError for a cutoff too low to compute, or not below half the rate, and a log too short.
     """
@@ -62,9 +63,10 @@ def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536, flag: s
 
 
 def padding_length(sos: Array, samples: int) -> int:
-    """Samples of padding: until what the filter started with is gone, all but one of the log at most.
+    """Return the number of samples of padding, after which the filter's initial transient is gone.
 
-    Raises LinkwiseError where not even three times the taps not at the origin, as SciPy takes, are there.
+    It is at most that of the log less one. Raises LinkwiseError where the log is not even longer than SciPy's
+    padding, three times the taps that are not at the origin.
     """
     taps = 2 * len(sos) + 1 - min((sos[:, 2] == 0).sum(), (sos[:, 5] == 0).sum())
     least = int(3 * taps)
@@ -86,7 +88,7 @@ def _passed(sos: Array, x: Array, state: Array) -> tuple[Array, Array]:
 
 
 def _extension(edge: Array, padding: str) -> Array:
-    """What is taken to stand before edge[0], (len(edge) - 1, n).
+    """Return the samples that continue a log before edge[0], (len(edge) - 1, n).
 
     "odd" turns the samples about the end, "even" mirrors them, else the end's value is held.
     """

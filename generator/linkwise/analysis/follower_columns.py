@@ -1,4 +1,4 @@
-"""Columns of joints that follow others by the robot's file, or are held: left out, and looked at."""
+"""Columns of joints that follow others by the robot's file, or are held: left out, but checked."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -6,30 +6,33 @@ from typing import Literal
 
 import numpy as np
 from linkwise_runtime.chosen_names import end_of_path
+from linkwise_runtime.rule.joint_tree import TreeCurve
 from numpy.polynomial import polynomial
 
 from linkwise.analysis.column_matching import SPEED
-from linkwise.package.entries import CurveEntry
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 CLOSE = {"rad": 0.01, "m": 0.001}
-"""How far a column may be from what its joint does: logs are rounded, and joints have play."""
+"""Largest difference between a column and the motion of its joint: logs are rounded, joints have play."""
 
 
 @dataclass(frozen=True)
 class FollowingJoint:
-    """A joint of the file that is none of the robot's: a curve of one that is, or, without a leader, held."""
+    """A joint of the file that is no joint of the robot, but follows one by a curve.
+
+    A joint without a leader is held.
+    """
 
     name: str
     unit: Literal["rad", "m"]
     is_always_in_radians: bool
     leader: str | None
-    curve: CurveEntry
+    curve: TreeCurve
 
     @classmethod
     def of(cls, manifest: Manifest) -> tuple["FollowingJoint", ...]:
-        """All that a package knows of."""
+        """Return all joints that a package knows to follow or to be held."""
         return tuple(
             cls(
                 one.name,
@@ -42,7 +45,7 @@ class FollowingJoint:
         )
 
     def at(self, leader: Array) -> Array:
-        """Where it is, in its unit, at positions (S,) of its leader."""
+        """Return the joint's position (S,), in its unit, at positions (S,) of its leader."""
         starts = np.array(self.curve.starts)
         piece = np.searchsorted(starts[1:], leader, side="right")
         found = np.zeros_like(leader)
@@ -53,9 +56,10 @@ class FollowingJoint:
 
 
 class FollowerColumns:
-    """Columns of such joints among those of a log that no joint has, and how far they are from them.
+    """Columns of following and held joints among a log's free ones, and their distance from these joints.
 
-    joints: those that are read, in their order; radians: factor of the log's angles
+    columns: all names of the log's columns; free: those that no joint has
+    joints: those that are read, in their order; radians: factor that brings the log's angles to radians
     """
 
     def __init__(
@@ -77,13 +81,16 @@ class FollowerColumns:
         self.numbers = tuple(columns.index(name) for name in self._names)
 
     def look(self, q: Array, own: Array) -> None:
-        """Take note of a block: q (S, joints) in rad or m, own (S, columns) as in the log; NaN is none."""
+        """Note the distances in a block; NaN counts as no value.
+
+        q: positions of the joints (S, joints) in rad or m; own: the columns (S, columns) as in the log
+        """
         for at, (follower, leader) in enumerate(zip(self._followers, self._leaders, strict=True)):
             apart = np.abs(own[:, at] * self._factors[at] - follower.at(q[:, leader]))
             self._largest[at] = float(np.fmax.reduce(apart, initial=self._largest[at]))
 
     def warnings(self) -> Iterator[str]:
-        """Of each column that its joint is far from."""
+        """Yield a warning for each column that is far from its joint."""
         for name, one, largest in zip(self._names, self._followers, self._largest, strict=True):
             if largest > CLOSE[one.unit]:
                 held = f"where the robot holds {one.name!r}"

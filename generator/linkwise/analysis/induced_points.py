@@ -1,4 +1,4 @@
-"""Whose acceleration is told by its sources: the joints, a point of a frame, the centre of mass."""
+"""Points whose acceleration is split by source: the joints, a point of a frame, the centre of mass."""
 
 import math
 from collections import Counter
@@ -14,25 +14,25 @@ from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 
 JOINTS, CENTRE = "joints", "centre-of-mass"
-"""Words for what is not a frame; a frame of such a name goes before."""
+"""Names of the points that are no frames; a frame of such a name takes precedence."""
 AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
 class InducedPoint:
-    """What accelerates: J q̈ + J̇ q̇, with a row for each of its components."""
+    """A point, whose acceleration is J q̈ + J̇ q̇, with a row for each of its components."""
 
     name: str
-    """As it was given, and as columns bear it."""
+    """Name as the user gave it, and as columns show it."""
     rows: tuple[str, ...]
     units: tuple[str, ...]
     frame: str | None = None
-    """None for the joints and the centre of mass."""
+    """Name of the frame; None for the joints and the centre of mass."""
     place: tuple[float, ...] = (0.0, 0.0, 0.0)
-    """In the frame, in m."""
+    """Position in the frame, in m."""
 
     def maps(self, robot: LoadedRobot, q: Array, qd: Array) -> tuple[Array, Array]:
-        """J and J̇ at q and qd (S, n): (S, rows, n) each."""
+        """Return J and J̇ at q and qd (S, n): (S, rows, n) each."""
         kinematics: Any = robot.model.kinematics if self.name != JOINTS or self.frame is not None else None
         if kinematics is None:
             unit = np.broadcast_to(np.eye(q.shape[1]), (*q.shape, q.shape[1]))
@@ -44,10 +44,10 @@ class InducedPoint:
 
 
 def induced_points(texts: Sequence[str], robot: LoadedRobot) -> tuple[InducedPoint, ...]:
-    """Points of FRAME, FRAME,X,Y,Z, joints and centre-of-mass.
+    """Return the points that are written as FRAME, FRAME,X,Y,Z, joints or centre-of-mass.
 
-    Raises LinkwiseError for a frame that is not there, a point that is not three numbers, and one that
-    stands twice.
+    Raises LinkwiseError for a frame that does not exist, a point that is not three numbers, and a point that
+    is given twice.
     """
     twice = [text for text, count in Counter(texts).items() if count > 1]
     if twice:
@@ -87,7 +87,7 @@ def _place(text: str, numbers: Sequence[str]) -> tuple[float, float, float]:
 
 
 def _centre(robot: LoadedRobot, kinematics: Any, q: Array, qd: Array) -> tuple[Array, Array]:
-    """Of the links and of payloads, each by its mass."""
+    """Return J and J̇ of the centre of mass of links and payloads, each by its mass, (S, 3, n)."""
     manifest = robot.package.manifest
     links = {link.name for link in manifest.links}
     own = sum(body.mass for body in manifest.tree.bodies if body.link in links) if manifest.tree else 0.0

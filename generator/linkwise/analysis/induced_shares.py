@@ -4,11 +4,12 @@ Where joints are tied, A q̇ = 0, each source x solves
 
     [M −Aᵀ; A 0] [q̈_x; λ_x] = [F_x; b_x]      b = −Ȧ q̇ for the constraints' own source, else 0
 
-as `induced_accelerations` of the package does. So velocities are those of all joints, and a link's share of
-them is c1_ijs q̇_s of the open tree: what c1^ of the independent joints has besides, c2 Ġ, answers to the
-constraints that turn, and counts in their own source by the joint whose velocity turns them.
+as `induced_accelerations` of the package does. Velocities are therefore those of all joints, and a link's
+share of the velocity forces is c1_ijs q̇_s of the open tree. What c1^ of the independent joints has in
+addition, c2 Ġ, is due to the constraints, which turn: it counts in their own source, by the joint whose
+velocity turns them.
 
-Where the robot stands on contacts, `StandingResponse` says how it answers, and contacts are sources too.
+Where the robot stands on contacts, `StandingResponse` gives its response, and contacts are sources too.
 
 A point accelerates by J q̈_x, and by J̇ q̇ itself.
 """
@@ -35,19 +36,19 @@ from linkwise.escape import column_part
 from linkwise.package.load import Array
 
 AT_ONCE = 1 << 21
-"""Numbers of the sources' forces computed at once."""
+"""Force values of the sources that are computed at once."""
 
 
 @dataclass(frozen=True)
 class InducedShares:
-    """Plans and fills the columns of induced accelerations, which stand behind all others."""
+    """Plans and fills the columns of induced accelerations, which follow all others."""
 
     robot: LoadedRobot
     points: tuple[InducedPoint, ...]
     sources: InducedSources
     columns: tuple[Column, ...]
     first: int
-    """Row of the result at which they begin."""
+    """Row of the result at which these columns begin."""
 
     @classmethod
     def of(
@@ -57,7 +58,10 @@ class InducedShares:
         others: Sequence[Column],
         loads: Sequence[str],
     ) -> "InducedShares":
-        """others: all columns of torques and motion; loads: their names."""
+        """Plan the columns of the points.
+
+        others: all columns of torques and motion; loads: names of the loads
+        """
         sources = InducedSources.of(robot, others if points else ())
         columns = tuple(
             column
@@ -70,7 +74,10 @@ class InducedShares:
     def fill(
         self, out: Array, packed: Any, standing: Standing | None, q: Array, qd: Array, qdd: Array
     ) -> Closure:
-        """Fill columns of `out` (columns, S), whose torques are there; packed: of the robot's model."""
+        """Fill the induced accelerations in `out` (columns, S); return the largest errors of their sums.
+
+        The torques of `out` must be filled already. packed: values of the robot's model
+        """
         worst = Closure()
         numbers = max(1, len(self.sources.every) * q.shape[1])
         step = max(1, AT_ONCE // numbers)
@@ -105,7 +112,7 @@ class InducedShares:
         return worst
 
     def _moved(self, free: Response, forces: Array, rows: Array | None, qdd: Array) -> Array:
-        """q̈_x (S, n, X) of forces, then of ties, then of contacts with rows A (S, C, n)."""
+        """Return q̈_x (S, n, X) of forces, then of ties, then of contacts with rows A (S, C, n)."""
         ground = self.robot.contacts
         response = free if rows is None else StandingResponse(free, rows)
         moved = [response.accelerations(forces)]
@@ -122,7 +129,10 @@ class InducedShares:
 
 
 def _timed(text: str, time: Array) -> str:
-    """What a block of samples is refused for, with the time in place of the sample's number, and a mend."""
+    """Return the text of an error with the time in place of the sample's number, and with advice.
+
+    A text without a sample's number is returned as it is.
+    """
     found = re.search(r" at sample (\d+)", text)
     if found is None:
         return text
@@ -133,7 +143,10 @@ def _timed(text: str, time: Array) -> str:
 def _columns(
     sources: InducedSources, loads: Sequence[str], point: InducedPoint, number: int, row: int
 ) -> list[Column]:
-    """Of one component of a point: its acceleration, the shares of the sources, and J̇ q̇ by its causes."""
+    """Return the columns of one component of a point.
+
+    They are its acceleration, the shares of the sources, and J̇ q̇ by its causes.
+    """
     unit, robot = point.units[row], sources.robot
 
     def column(quantity: Quantity, link: int | None, cause: int | None, names: Sequence[str]) -> Column:

@@ -1,10 +1,10 @@
-"""What drives a robot's coordinates, source by source, as columns of generalised forces F_x.
+"""Sources that drive a robot's coordinates, each as a column of generalised forces F_x.
 
     M q̈ = Σ_i u_i − Σ_js c1_ijs q̇_s − Σ_j g_ij − spring, damping, friction − Σ_e τ_ie + Aᵀ λ
 
-with u_i = τ_i what the joint gives, and armature in M. M, c1, g and what joints have of their own are those
-of the open tree. Where joints are tied, τ_i and τ_ie are what the independent joints give and bear: there,
-they move the robot as any other forces with that Gᵀ F do.
+with u_i = τ_i, the torque of the joint, and with the armatures in M. M, c1, g and passive torques are those
+of the open tree. Where joints are tied, τ_i and τ_ie are torques of the independent joints: on these alone,
+they move the robot as do any other forces with the same Gᵀ F.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,18 +21,18 @@ from linkwise.analysis.term_rows import mirrored
 from linkwise.package.load import Array
 
 LOSSES: tuple[Quantity, ...] = ("acc_spring", "acc_damping", "acc_friction")
-"""In the order of `passive_torque`."""
+"""Shares of passive torques, in the order of `passive_torque`."""
 
 
 @dataclass(frozen=True)
 class ForceSource:
-    """A source: its link and its cause, and which torques it is made of."""
+    """A source: its link, its cause, and the torques that it consists of."""
 
     quantity: Quantity
     link: int | None
     cause: int | None
     torques: tuple[tuple[int, int], ...]
-    """Coordinate, and where its torque stands: a row of the result, a packed value, a joint."""
+    """Pairs of a coordinate and the place of its torque: a row of the result, a packed value, a joint."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,10 @@ class InducedSources:
 
     @classmethod
     def of(cls, robot: LoadedRobot, columns: Sequence[Column]) -> "InducedSources":
-        """columns: of torques, in the result's order."""
+        """Collect the sources of a robot.
+
+        columns: those of torques, in the result's order
+        """
         found: dict[tuple[Quantity, int | None, int | None], list[tuple[int, int]]] = {}
         for quantity, link, cause, i, at in _parts(robot, columns):
             found.setdefault((quantity, link, cause), []).append((i, at))
@@ -53,7 +56,10 @@ class InducedSources:
     def mass_and_forces(
         self, out: Array, packed: Side, q: Array, qd: Array, qdd: Array
     ) -> tuple[Array, Array]:
-        """M (S, n, n), and F_x (S, n, X); out: the torques (columns, S), packed: of the robot's model."""
+        """Return M (S, n, n) and F_x (S, n, X).
+
+        out: the torques (columns, S); packed: values of the robot's model
+        """
         model = opened(self.robot)
         if self.robot.constrained is not None:
             packed = model.packed(q, qd, qdd)
@@ -70,7 +76,7 @@ class InducedSources:
         return self._mass(packed.acceleration, q.shape[1]), forces
 
     def _mass(self, packed: Array, n: int) -> Array:
-        """M of links, payloads and what turns behind gears."""
+        """Return M (S, n, n) of links, payloads and the armatures behind gears."""
         mass = np.zeros((len(packed), n, n))
         for i, _, k, source in mirrored(opened(self.robot).layout):
             mass[:, i, k] += packed[:, source]
@@ -80,7 +86,7 @@ class InducedSources:
 
 
 def opened(robot: LoadedRobot) -> Any:
-    """The model of links and payloads without ties."""
+    """Return the model of links and payloads without ties."""
     model: Any = robot.model
     return model if robot.constrained is None else model.open
 
@@ -88,7 +94,7 @@ def opened(robot: LoadedRobot) -> Any:
 def _parts(
     robot: LoadedRobot, columns: Sequence[Column]
 ) -> Iterator[tuple[Quantity, int | None, int | None, int, int]]:
-    """Quantity, link and cause of a source; a coordinate, and where its torque stands."""
+    """Yield the quantity, link and cause of a source, with a coordinate and the place of its torque."""
     layout = opened(robot).layout
     for row, c in enumerate(columns):
         if c.quantity == "tau" and c.joint is not None:

@@ -1,4 +1,4 @@
-"""One analysis of a log: read, filtered and found long enough, and then carried out."""
+"""One analysis of a log, which is read, filtered and checked for its length before it is carried out."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -38,11 +38,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Analysis(AnalysisResult):
-    """What `analyze` returns: an `AnalysisResult` that draws and records itself."""
+    """Result of `analyze`: an `AnalysisResult` that draws and records itself."""
 
     def figure(self, name: str = "paper") -> "Figure":
-        """A matplotlib figure: "paper" or "causes", with ":JOINT" for another joint than the first; "shares";
-        "power"; "induced", or "induced:POINT" likewise; "contacts".
+        """Return a matplotlib figure.
+
+        name: "paper" or "causes", with ":JOINT" for another joint than the first; "shares"; "power";
+        "induced", or "induced:POINT" for another point than the first; "contacts"
 
         "paper" has five panels, laid out like the paper's Fig. 5-9. Raises LinkwiseError for another name.
         """
@@ -50,45 +52,46 @@ class Analysis(AnalysisResult):
         return draw(self, name)
 
     def to_xarray(self) -> Any:
-        """An xarray Dataset of all quantities, with names along the axes: time, joint, link, cause, order.
+        """Return an xarray Dataset of all quantities with named axes: time, joint, link, cause, order.
 
-        to_xarray().propagation.sel(joint="knee_angle_r", link="foot") is (time, cause, order): what each
-        joint's acceleration and velocity ask of the knee through the foot. Quantities are called as the
-        properties here, or as `robot.labelled` of a package calls them. The attribute `units` has the unit;
-        where joints of angles and of lengths differ, `units_from` names the coordinate that has. It is saved
-        by to_netcdf or to_zarr, and as wide as all joints times all links: zeros stand where no column is.
+        to_xarray().propagation.sel(joint="knee_angle_r", link="foot") is (time, cause, order): the torque on
+        the knee through the foot by each joint's acceleration and velocity. Quantities are named as the
+        properties here, or as in `robot.labelled` of a package. The attribute `units` has the unit; where it
+        differs between joints of angles and of lengths, `units_from` names the coordinate that has it. The
+        Dataset is saved by to_netcdf or to_zarr, and is as wide as all joints times all links: zeros stand
+        where there is no column.
 
         Raises LinkwiseError without xarray.
         """
         return named_result(self)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: of each joint its torque, its work and the largest cause."""
+        """Return the HTML that a notebook shows: each joint's torque, its work and its largest cause."""
         return result_table(self)
 
     def record(self) -> dict[str, Any]:
-        """Everything but the samples, as plain data: choices, closure, columns and their totals."""
+        """Return everything but the samples as plain data: choices, closure, columns and their totals."""
         return record(self)
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """Which files to write, and what in them: the table's format, figures by name, whether the page."""
+    """Files to write, and their contents: the table's format, figures by name, whether to write the page."""
 
     table: Format = "parquet"
     figures: tuple[str, ...] = ()
     page: bool = True
     power_terms: bool = False
-    """Power by cause and order, too: as many columns again as torques have."""
+    """True to add power by cause and order: as many columns again as torques have."""
     induced: tuple[str, ...] = ()
-    """Whose acceleration is told by its sources: FRAME or FRAME,X,Y,Z, joints, centre-of-mass."""
+    """Points whose acceleration is split by source: FRAME or FRAME,X,Y,Z, joints, centre-of-mass."""
     phases: tuple[Phase, ...] = ()
-    """Phases of the movement that the figure of causes holds against each other."""
+    """Phases of the movement that the figure of causes compares."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """A log read, filtered and found long enough; `run` does the rest."""
+    """A log that was read, filtered and found long enough; `run` does the rest."""
 
     source: str
     reading: Reading
@@ -96,7 +99,7 @@ class Job:
     samples: Samples
     decomposer: Decomposer
     closed: ClosedLog | None = None
-    """How far positions of the log were off, where joints are tied."""
+    """Largest violation of a constraint by positions of the log, where joints are tied."""
     phases: tuple[PlacedPhase, ...] = ()
 
     def run(self, sink: Sink, progress: Progress) -> Streamed:
@@ -105,7 +108,7 @@ class Job:
             return stream(self.samples, self.decomposer, self.processing, sink, progress)
 
     def note(self) -> dict[str, Any]:
-        """What a table says of itself: log, robot and all choices."""
+        """Return the description that a table carries: log, robot and all choices."""
         robot = self.decomposer.robot
         return {
             "log": self.source,
@@ -119,12 +122,15 @@ class Job:
 
     @property
     def count(self) -> int:
-        """Samples that will be analysed."""
+        """Number of samples that will be analysed."""
         start, stop = span_of(self.samples, self.processing)
         return stop - start
 
     def analysis(self, done: Streamed, values: Array) -> Analysis:
-        """All samples (columns, S), with what is known of them."""
+        """Return the analysis, with what is known of the samples.
+
+        values: all samples, (columns, S)
+        """
         return Analysis(
             self.decomposer.robot,
             self.reading,
@@ -150,12 +156,12 @@ class Job:
         )
 
     def _near_poles(self) -> Iterator[str]:
-        """Warnings of turns that the log brings near a pole."""
+        """Yield warnings about turns that the log brings near a pole."""
         robot = self.decomposer.robot
         return pole_warnings(robot.bodies, robot.joints, self.samples)
 
     def _never_on(self, done: Streamed) -> Iterator[str]:
-        """Warnings of contacts that are off throughout."""
+        """Yield warnings about contacts that are off throughout."""
         ground, times = self.decomposer.robot.contacts, self.decomposer.times
         for column, peak in zip(self.decomposer.columns, done.totals.peak, strict=True):
             c = column.cause
@@ -163,15 +169,18 @@ class Job:
                 yield f"contact {ground.names[c]!r} is never on: {times.largest(c)}"
 
     def _twice_borne(self) -> Iterator[str]:
-        """Warnings of contacts on bodies that bear loads too, which may be what was measured there."""
+        """Yield warnings about contacts on bodies that carry loads too.
+
+        Such a load may be what was measured at the contact.
+        """
         robot = self.decomposer.robot
         tree, ground = robot.package.manifest.tree, robot.contacts
         if tree is None or ground is None:
             return
-        body = {frame.name: frame.body for frame in tree.frames}
+        body = {frame.name: frame.joint for frame in tree.frames}
         for name, contact in zip(ground.names, ground.contacts, strict=True):
             for load in self.decomposer.loads:
-                if load.seat.frame.body == body[str(contact.frame)]:
+                if load.seat.frame.joint == body[str(contact.frame)]:
                     yield (
                         f"load {load.name!r} and contact {name!r} act on one body; what was measured at the"
                         " contact is given with --contact-loads"
@@ -189,7 +198,10 @@ def prepared(
     wanted: Wanted,
     buffer: Path | None = None,
 ) -> Job:
-    """Read and filter a log; `buffer`, a directory, keeps the samples in a disk buffer, not in memory."""
+    """Read and filter a log, and return the job that analyses it.
+
+    buffer: a directory that keeps the samples in a disk buffer, not in memory
+    """
     points = induced_points(wanted.induced, robot)
     opened = open_log(log, reading, robot.joints, robot.file_joints, robot.qpos)
     switches = (*switch_columns(contacts, opened), *phase_columns(wanted.phases, opened))
@@ -214,7 +226,9 @@ def _samples(
     progress: Progress,
     buffer: Path | None,
 ) -> tuple[Samples, ClosedLog | None]:
-    """Samples of all joints; where joints are tied, those that follow closed, and how far the log was off.
+    """Return samples of all joints and, where joints are tied, how well the log closes.
+
+    Dependent joints are moved to where the ties close.
 
     switches: columns of the log that say when contacts are on
     """

@@ -1,4 +1,4 @@
-"""What loads joints, cause by cause: the same causes in every picture and in the notebook."""
+"""Causes of joint torques, the same in every figure and in the notebook."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,22 +16,22 @@ MOTIONS: dict[str, tuple[Quantity, ...]] = {
     "motion": ("tau_qdd", "tau_qd"),
 }
 FEW = 7
-"""Joints up to which a joint's acceleration and its velocity are two causes, unless chosen otherwise."""
+"""Most joints for which a joint's acceleration and velocity are two causes, unless chosen otherwise."""
 
 
 @dataclass(frozen=True)
 class Cause:
-    """One cause of joints' torques, and which columns are of it."""
+    """One cause of joint torques, and the quantities of its columns."""
 
     kind: Literal["gravity", "load", "own", "acceleration", "velocity", "motion"]
     label: str
     quantities: tuple[Quantity, ...]
     number: int | None = None
-    """Of the load, or of the joint that moves."""
+    """Number of the load, or of the joint that moves."""
 
     @property
     def is_motion(self) -> bool:
-        """Whether it is a joint's motion, or a part of that."""
+        """True if the cause is a joint's motion, or a part of that."""
         return self.kind in MOTIONS
 
 
@@ -41,10 +41,10 @@ def causes_of(
     shown: Callable[[str], str] = str,
     together: bool = True,
 ) -> tuple[Cause, ...]:
-    """Gravity or potential energy, loads, what joints have of their own, and each joint's motion, in order.
+    """Return the causes in order: gravity or potential energy, loads, passive torques, each joint's motion.
 
-    joints: what they are called, (n,), and shown: how a name is written. together: a motion is one cause,
-    else its acceleration and its velocity are two.
+    joints: names of the joints, (n,); shown: function that formats a name. together: a motion is one cause,
+    otherwise its acceleration and its velocity are two.
     """
     there = {column.quantity for column in result.columns}
     found = [Cause("gravity", result.robot.potential, ("tau_gravity",))]
@@ -57,15 +57,18 @@ def causes_of(
 
 
 def are_motions_whole(result: AnalysisResult) -> bool:
-    """Whether a joint's motion is one cause in shares and at first on the page, as it is of many joints."""
+    """Return whether a joint's motion is one cause in shares and at first on the page.
+
+    It is one where the joints are many.
+    """
     return len(result.robot.driven) > FEW
 
 
 def sizes(result: AnalysisResult, causes: Sequence[Cause]) -> Array:
-    """Mean size of each cause's net torque on every joint with torques, (causes, joints), over all samples.
+    """Return the mean magnitude of each cause's net torque on every joint with torques, (causes, joints).
 
-    All links together: of links that pull against each other, and of an acceleration and a velocity that do,
-    the difference counts.
+    The mean is over all samples. Links are summed first: where links pull against each other, or an
+    acceleration and a velocity do, the difference counts.
     """
     place: dict[int | None, int] = {i: at for at, i in enumerate(result.robot.driven)}
     total = np.zeros((len(causes), len(place)))
@@ -75,12 +78,12 @@ def sizes(result: AnalysisResult, causes: Sequence[Cause]) -> Array:
 
 
 def curves(result: AnalysisResult, causes: Sequence[Cause], i: int) -> Array:
-    """What each cause asks of joint i, (causes, S), in its unit."""
+    """Return the torque of each cause on joint i, (causes, S), in the joint's unit."""
     return _summed(result, causes, {i: 0})[:, 0]
 
 
 def _summed(result: AnalysisResult, causes: Sequence[Cause], place: Mapping[int | None, int]) -> Array:
-    """What each cause asks of each joint that has a place, (causes, joints, S)."""
+    """Return the torque of each cause on each joint that has a place, (causes, joints, S)."""
     rows = {(name, one.number): row for row, one in enumerate(causes) for name in one.quantities}
     out = np.zeros((len(causes), len(place), result.values.shape[1]))
     for column, number in zip(result.columns, result.values, strict=True):

@@ -15,9 +15,9 @@ from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.contacts.ground_contacts import GroundContacts
 from linkwise.analysis.follower_columns import FollowingJoint
 from linkwise.analysis.settings import Payload
-from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
 from linkwise.escape import without_ending
+from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import Package, open_package
 from linkwise.package.manifest import FILE, BodyEntry, PassiveEntry
 from linkwise.package.potential_word import potential_word
@@ -25,51 +25,53 @@ from linkwise.package.potential_word import potential_word
 
 @dataclass(frozen=True)
 class LoadedRobot:
-    """A loaded robot: names in the order of every array, and which back end computes."""
+    """A loaded robot: names in the order of every array, and the back end that computes."""
 
     name: str
     joints: tuple[str, ...]
     units: tuple[str, ...]
-    """One for each joint, "rad" or "m"."""
+    """Unit of each joint, "rad" or "m", in the order of `joints`."""
     links: tuple[str, ...]
     backend: str
     model: Dynamics
     bodies: tuple[BodyEntry, ...] | None
     """Rigid bodies, parents before children; None where the energies were written by hand."""
     up: tuple[float, float, float]
-    """Against gravity, in the base frame; z for a robot without gravity."""
+    """Direction against gravity, in the base frame; z for a robot without gravity."""
     manifest_sha256: str
     package: Package
     recursion: NewtonEuler | None = None
-    """Partial torques by an independent way; None where the energies were written by hand."""
+    """Independent computation of partial torques; None where the energies were written by hand."""
     passive: tuple[PassiveEntry, ...] = ()
-    """What joints have of their own, those that have anything."""
+    """Passive elements of the joints that have any: springs, damping, friction, armatures."""
     payloads: tuple[Payload, ...] = ()
-    """What stands behind the robot's own links in `links`."""
+    """Payloads, which follow the robot's own links in `links`."""
     constrained: ConstrainedModel | None = None
-    """The robot's own links where joints are tied; `model` then asks for independent joints alone."""
+    """Model of the robot's own links where joints are tied; `model` gives torques of independent joints."""
 
     contacts: GroundContacts | None = None
-    """Where the robot stands on the ground."""
+    """Contacts on which the robot stands on the ground."""
 
     @property
     def potential(self) -> str:
-        """What the shares g_ij are called."""
+        """Name of the shares g_ij."""
         return potential_word(self.package.manifest.tree is not None)
 
     @property
     def followers(self) -> tuple[FollowingJoint, ...]:
-        """Joints of the file that follow joints, or are held, and are none themselves."""
+        """Joints of the file that follow a joint here or are held, and are no joints here."""
         return FollowingJoint.of(self.package.manifest)
 
     @property
     def file_joints(self) -> tuple[FileJoint, ...]:
-        """Joints of the file that move, where some are several joints here."""
+        """Moving joints of the file, where some are several joints here or Pinocchio's order differs."""
         found = self.package.manifest.file_joints
         return tuple(FileJoint(one.name, one.kind, one.joints) for one in found)
 
     def qpos(self, order: Order, names: Sequence[str] | None) -> Qpos:
-        """How a simulator's positions become the joints; names: those of the file's joints in its order.
+        """Return the map from a simulator's positions to the joints.
+
+        names: names of the file's joints in the order of these positions
 
         Raises ValueError for names of other joints, and where the robot has no file.
         """
@@ -82,7 +84,7 @@ class LoadedRobot:
 
     @property
     def units_in_logs(self) -> tuple[str, ...]:
-        """For each joint "rad" where a log in degrees has it so, else "m" or "always rad"."""
+        """Unit of each joint in logs: "rad" where a log in degrees has degrees, else "m" or "always rad"."""
         always = self.package.manifest.in_radians
         return tuple(
             "always rad" if name in always else unit
@@ -100,33 +102,33 @@ class LoadedRobot:
 
     @property
     def driven(self) -> tuple[int, ...]:
-        """Joints that have torques: all, or the independent ones."""
+        """Numbers of the joints that have torques: all, or the independent ones."""
         every = tuple(range(len(self.joints)))
         return every if self.constrained is None else self.constrained.following.independent
 
     @property
     def driven_joints(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the joints that have torques."""
         return tuple(self.joints[i] for i in self.driven)
 
     @property
     def plot_joints(self) -> tuple[str, ...]:
-        """All joints' names as pictures and the page show them: without the "_joint" that all may end in."""
+        """Names of all joints for figures and the page: without the "_joint" that all may end in."""
         return without_ending(self.joints)
 
     @property
     def plot_links(self) -> tuple[str, ...]:
-        """Links' names likewise, without "_link"."""
+        """Names of all links for figures and the page: without the "_link" that all may end in."""
         return without_ending(self.links)
 
     @property
     def moving_itself(self) -> tuple[int, ...]:
-        """Those of them that something drives, where contacts say that nothing drives some."""
+        """Numbers of the joints that have torques, without unactuated ones; with them if no other is left."""
         still = () if self.contacts is None else self.contacts.unactuated
         return tuple(i for i in self.driven if i not in still) or self.driven
 
     def borne_by(self, joints: Iterable[int]) -> tuple[int, ...]:
-        """Joints with torques that bear what these joints are loaded with."""
+        """Return the numbers of the joints with torques that carry what these joints are loaded with."""
         found = set(joints)
         if self.constrained is not None:
             found = {y for k in joints for y in self.constrained.following.movers[k]}
@@ -136,7 +138,7 @@ class LoadedRobot:
 
     @property
     def constraint_rows(self) -> tuple[str, ...]:
-        """What each row of ties, couplings and contacts bears, in the order of a result's forces."""
+        """Names of the rows of ties, couplings and contacts, in the order of a result's forces."""
         tied = () if self.constrained is None else self.constrained.constraints.rows
         return (*tied, *(() if self.contacts is None else self.contacts.rows))
 

@@ -1,4 +1,4 @@
-"""What a model lists and computes by the parts of its torques."""
+"""Lists and values of a model by part of its torques: acceleration, velocity, gravity, and the whole."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -11,7 +11,7 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """What `Layout` lists and packed values hold, by the same names."""
+    """Parts that `Layout` lists and that packed values hold, by the same names."""
 
     acceleration: Any
     velocity: Any

@@ -1,4 +1,4 @@
-"""What a result's columns are entries of: quantities with axes, named as `robot.labelled` names them."""
+"""Quantities that a result's columns are entries of, with axes, named as in `robot.labelled`."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,7 @@ from linkwise.analysis.result_quantities import MEANING
 from linkwise.analysis.result_quantities import Quantity as Kind
 
 FORCE = "torque:constraint"
-"""Unit of what a row of the constraints bears."""
+"""Unit of the force in a row of the constraints."""
 
 
 def _one(column: Kind, name: str, axes: str, unit: str) -> dict[Kind, Quantity]:
@@ -18,7 +18,7 @@ def _one(column: Kind, name: str, axes: str, unit: str) -> dict[Kind, Quantity]:
 def _by_source(
     columns: tuple[Kind, ...], name: str, axes: str, unit: str, meaning: str
 ) -> dict[Kind, Quantity]:
-    """Springs, damping and so on side by side."""
+    """Return one quantity with springs, damping and so on side by side."""
     sources = [(column, column.rpartition("_")[2]) for column in columns]
     return {c: Quantity(name, tuple(axes.split()), unit, meaning, ("source", kind)) for c, kind in sources}
 
@@ -85,7 +85,7 @@ COLUMNS: Mapping[Kind, Quantity] = {
     **_induced("acc_contact", "induced_contacts", "contact"),
     **_induced("acc_kinematic", "induced_kinematic", "cause"),
 }
-"""By the quantity of the columns; the axes of points are told by the result."""
+"""Named quantities by the quantity of the columns; the result has the axes of points."""
 
 WORKS: Mapping[str, Quantity] = {
     name: Quantity(name, axes, "J", meaning)
@@ -96,4 +96,4 @@ WORKS: Mapping[str, Quantity] = {
         ("contact_work", ("link", "contact"), "what the contact fed into the link, and took back"),
     )
 }
-"""Over the whole movement, by the result's own names."""
+"""Work over the whole movement, by the result's own names."""

@@ -16,11 +16,11 @@ from linkwise.extras import extra
 from linkwise.package.load import Array
 
 BASE = {"N·m": "rad", "N": "m"}
-"""In which a row of the constraints is open, by what it bears; no unit for a coupling."""
+"""Unit of the violation of a constraint's row, by the unit of its force; no unit for a coupling."""
 
 
 def named_result(result: AnalysisResult) -> Any:
-    """See `Analysis.to_xarray`."""
+    """Return the Dataset of `Analysis.to_xarray`."""
     extra("xarray")
     axes = _axes(result)
     there = {column.quantity for column in result.columns}
@@ -44,7 +44,7 @@ def named_result(result: AnalysisResult) -> Any:
 
 
 def _works(result: AnalysisResult) -> Iterator[Part]:
-    """What was given and what was taken back, over the whole movement."""
+    """Yield the work that was given and the work that was taken back, over the whole movement."""
     of = {"work": result.work, "joint_work": result.joint_work}
     of |= {"load_work": result.load_work} if result.loads else {}
     of |= {"contact_work": result.contact_work} if result.robot.contacts is not None else {}
@@ -72,12 +72,12 @@ def _accelerations(result: AnalysisResult) -> Sequence[Column]:
 
 
 def _component(column: Column) -> str:
-    """The row of a point that an acceleration is of, as its column names it."""
+    """Return the name of the component that a column of an acceleration has."""
     return unquote(column.name.split("/")[2])
 
 
 def _values(result: AnalysisResult, kind: str, axes: Sequence[NamedAxis]) -> Array:
-    """A quantity's columns as one array, zeros where none is, NaN for rows that a point does not have."""
+    """Return a quantity's columns as one array, zeros without a column, NaN for rows that a point lacks."""
     out = np.zeros((len(result.time), *(len(axis.names) for axis in axes)))
     dimensions = [axis.dimension for axis in axes]
     if "point" in dimensions:
@@ -92,7 +92,7 @@ def _values(result: AnalysisResult, kind: str, axes: Sequence[NamedAxis]) -> Arr
 
 
 def _place(column: Column, axis: NamedAxis) -> Any:
-    """Where along an axis a column stands."""
+    """Return the position of a column along an axis."""
     match axis.dimension:
         case "joint" | "link" | "point":
             return getattr(column, axis.dimension)

@@ -47,11 +47,11 @@ class PaperMotion:
 
     @property
     def count(self) -> int:
-        """Samples at the rate of `write_motions`."""
+        """Number of samples at the rate of `write_motions`."""
         return len(self.samples()[0])
 
     def samples(self, rate: float = RATE) -> tuple[Array, Array]:
-        """Time (S,) in s and angles (S, joints) in rad, at `rate` Hz."""
+        """Return time (S,) in s and angles (S, joints) in rad, at `rate` Hz."""
         time = np.arange(round(self.duration * rate) + 1) / rate
         q = np.tile(np.array(self.start), (len(time), 1))
         for move in self.moves:
@@ -64,7 +64,7 @@ class PaperMotion:
 
 
 def minimum_jerk(s: Array) -> Array:
-    """10 s³ - 15 s⁴ + 6 s⁵, held before 0 and after 1: from rest to rest with the least jerk."""
+    """Return 10 s³ - 15 s⁴ + 6 s⁵, held before 0 and after 1: from rest to rest with the least jerk."""
     s = np.clip(s, 0.0, 1.0)
     return s**3 * (10 - 15 * s + 6 * s**2)
 
@@ -82,7 +82,7 @@ RECORDED = PaperMotion(
     noise=5e-4,
     step=2 * np.pi / 4096,
 )
-"""As in Fig. 5, link 3 moves until about 4 s, then link 2; read by an encoder of 4096 steps a turn."""
+"""Motion as in Fig. 5: link 3 moves until about 4 s, then link 2; read by an encoder of 4096 steps a turn."""
 
 # Link 2's move begins two samples after 3 s: the five-point formula looks two samples ahead, and so
 # sees rest up to and including 3 s.
@@ -97,7 +97,7 @@ SIMULATED = PaperMotion(
     ),
     6.0,
 )
-"""As in Fig. 10, only link 3 moves until 3 s, links 2 and 3 after."""
+"""Motion as in Fig. 10: only link 3 moves until 3 s, links 2 and 3 after."""
 
 MOTIONS = {motion.name: motion for motion in (RECORDED, SIMULATED)}
 
@@ -105,7 +105,10 @@ MOTIONS = {motion.name: motion for motion in (RECORDED, SIMULATED)}
 def write_motions(
     directory: Path, motions: Sequence[PaperMotion], joints: Sequence[str] = JOINTS
 ) -> tuple[Path, ...]:
-    """Write each motion to `directory`/NAME.csv, exactly: all of them, or none and LinkwiseError."""
+    """Write each motion to `directory`/NAME.csv with all digits, and return the paths.
+
+    Writes all files, or none and raises LinkwiseError.
+    """
     refuse_inside_package(directory)
     return write_files(directory, {f"{motion.name}.csv": _csv(motion, joints) for motion in motions})
 

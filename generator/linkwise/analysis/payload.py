@@ -6,16 +6,17 @@ from typing import cast
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.rule.joint_tree import TreeFrame
 
 from linkwise.analysis.body_names import body_frame, told_apart
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.payload_model import PayloadModel
 from linkwise.analysis.settings import Payload
-from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
+from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import Package
-from linkwise.package.manifest import BodyEntry, FrameEntry, LinkEntry, RigidTree
+from linkwise.package.manifest import BodyEntry, LinkEntry, RigidTree
 
 UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 NOTHING = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -23,7 +24,7 @@ NOTHING = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 @dataclass(frozen=True)
 class _Placed:
-    """A payload, the link j that it hangs on, that link's body, and where on it, in the link frame's axes."""
+    """A payload, the link j that carries it, that link's body, and its place in that link's frame, in m."""
 
     payload: Payload
     link: int
@@ -32,10 +33,10 @@ class _Placed:
 
 
 def carrying(robot: LoadedRobot, payloads: Sequence[Payload]) -> LoadedRobot:
-    """The robot with payloads, each behind its links as a link of its own.
+    """Return the robot with payloads, each behind its links as a link of its own.
 
-    Raises LinkwiseError for a body that is not there, stands on the ground or has no mass of its own, for
-    two of one name, and for a robot of energies.
+    Raises LinkwiseError for a body that does not exist, stands on the ground or has no mass of its own, for
+    two payloads of one name, and for a robot of energies.
     """
     if not payloads:
         return robot
@@ -59,8 +60,8 @@ def carrying(robot: LoadedRobot, payloads: Sequence[Payload]) -> LoadedRobot:
 
 
 def _placed(robot: LoadedRobot, tree: RigidTree, payload: Payload) -> _Placed:
-    frame: FrameEntry = body_frame("payload on", payload.body, robot)
-    body = frame.body
+    frame: TreeFrame = body_frame("payload on", payload.body, robot)
+    body = frame.joint
     if body is None:
         raise LinkwiseError(f"payload on {payload.body!r}: that stands on the ground; joints do not carry it")
     link = tree.bodies[body].link
@@ -74,7 +75,7 @@ def _placed(robot: LoadedRobot, tree: RigidTree, payload: Payload) -> _Placed:
 
 
 def _models(package: Package, tree: RigidTree, placed: Sequence[_Placed]) -> list[tuple[int, Dynamics]]:
-    """For each payload its link, and the package with nothing but that payload on that link."""
+    """Return for each payload its link, and the package with nothing but that payload on that link."""
     backend = next((name for name in ("numpy", "torch") if name in package.backends), None)
     if backend is None:
         raise LinkwiseError(
@@ -95,7 +96,7 @@ def _models(package: Package, tree: RigidTree, placed: Sequence[_Placed]) -> lis
 
 
 def _extended(tree: RigidTree, placed: Sequence[_Placed]) -> RigidTree:
-    """The tree with each payload a body on a joint that never moves, as its ratio is 0."""
+    """Return the tree with each payload as a body on a joint that never moves, as its ratio is 0."""
     masses = tuple(
         BodyEntry(
             link=at.payload.title,
@@ -113,8 +114,7 @@ def _extended(tree: RigidTree, placed: Sequence[_Placed]) -> RigidTree:
         for at in placed
     )
     frames = tuple(
-        FrameEntry(mass.link, at, UPRIGHT, (0.0, 0.0, 0.0))
-        for at, mass in enumerate(masses, len(tree.bodies))
+        TreeFrame(mass.link, at, UPRIGHT, (0.0, 0.0, 0.0)) for at, mass in enumerate(masses, len(tree.bodies))
     )
     return replace(tree, bodies=(*tree.bodies, *masses), frames=(*tree.frames, *frames))
 

@@ -1,4 +1,4 @@
-"""A robot's model and the models of its payloads, which answer as one, payloads behind the links."""
+"""A model joined of a robot's model and the models of its payloads, which follow the links."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from linkwise.package.load import Array
 
 @dataclass(frozen=True)
 class _Part:
-    """A payload's model, its link there, its number among all links, and where its values stand."""
+    """A payload's model, its link there, its number among all links, and the places of its packed values."""
 
     model: Dynamics
     link: int
@@ -23,7 +23,7 @@ class _Part:
 
 @dataclass(frozen=True)
 class PayloadModel:
-    """The calls of a model that an analysis makes, of the links and the payloads together."""
+    """A model of the links and the payloads together, with the calls that an analysis makes."""
 
     own: Dynamics
     parts: tuple[_Part, ...]
@@ -31,7 +31,10 @@ class PayloadModel:
 
     @classmethod
     def of(cls, own: Dynamics, payloads: Sequence[tuple[int, Dynamics]]) -> "PayloadModel":
-        """payloads: of each, the link that it hangs on, and the package with that alone."""
+        """Join a robot's model and those of its payloads.
+
+        payloads: for each, the link that carries it, and the package with that payload alone
+        """
         parts = []
         for number, (link, model) in enumerate(payloads, len(own.link_names)):
             columns = Side(*(np.flatnonzero(getattr(model.layout, name)[:, 1] == link) for name in NAMES))
@@ -47,18 +50,18 @@ class PayloadModel:
         return cls(own, tuple(parts), Side(*layouts))
 
     def __getattr__(self, name: str) -> Any:
-        """What payloads do not change: names, kinematics, what joints have of their own."""
+        """Return what payloads do not change: names, kinematics, passive torques of the joints."""
         return getattr(self.own, name)
 
     @property
     def open(self) -> "PayloadModel":
-        """The same without ties, where joints are tied."""
+        """This model without ties, where joints are tied."""
         own: Any = self.own
         payloads: Any = [(part.link, part.model) for part in self.parts]
         return PayloadModel.of(own.open, [(link, model.open) for link, model in payloads])
 
     def packed(self, q: Array, qd: Array, qdd: Array) -> Side:
-        """All coefficients and τ_ij on the paths."""
+        """Return all coefficients and τ_ij on the paths, packed in the order of `layout`."""
         values = [self.own.packed(q, qd, qdd), *(part.model.packed(q, qd, qdd) for part in self.parts)]
         joined = []
         for name in NAMES:
@@ -69,13 +72,13 @@ class PayloadModel:
         return Side(*joined)
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """τ_i of links and payloads."""
+        """Return τ_i of links and payloads, (S, n)."""
         models = [self.own, *(part.model for part in self.parts)]
         torque: Array = np.sum([model.inverse_dynamics(q, qd, qdd) for model in models], axis=0)
         return torque
 
     def propagation(self, q: Array, qd: Array, qdd: Array, convention: Any = "closing") -> Side:
-        """τp_ij(q̈_k) and τp_ij(q̇_k) (S, n, N, n), and g_ij (S, n, N)."""
+        """Return τp_ij(q̈_k) and τp_ij(q̇_k), (S, n, N, n) each, and g_ij, (S, n, N)."""
         joined = list(self.own.propagation(q, qd, qdd, convention=convention))
         for part in self.parts:
             found = part.model.propagation(q, qd, qdd, convention=convention)
@@ -87,7 +90,7 @@ class PayloadModel:
         return Side(acceleration, velocity, gravity, torque=None)
 
     def forces(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """What constraints bear of links and payloads, (S, C, N), where there are any."""
+        """Return the constraint forces due to links and payloads, (S, C, N), where there are constraints."""
         own: Any = self.own
         parts: Any = [part.model for part in self.parts]
         there = [

@@ -1,4 +1,4 @@
-"""Phases of a movement, stance and swing say: while a load or contact bears, a column is high, or by time."""
+"""Phases of a movement, such as stance and swing: while a load or contact acts, by a column, or by time."""
 
 import math
 from collections.abc import Sequence
@@ -23,18 +23,21 @@ FORM = "write it as NAME=LOAD, NAME=COLUMN>VALUE or NAME=FROM..TO in s, and NAME
 
 @dataclass(frozen=True)
 class Phase:
-    """A phase as a user gives it: what says when it is, and what the rest of the movement is called."""
+    """A phase as a user gives it: the condition for it, and the name of the rest of the movement."""
 
     name: str
     rest: str
     what: str
-    """A load, a contact or a column of the log; "" where times are given."""
+    """Load, contact or column of the log that sets the phase; empty where times are given."""
     above: float | None
     spans: tuple[tuple[float, float], ...] = ()
 
     @classmethod
     def of(cls, text: str) -> "Phase":
-        """Read NAME[/REST]=WHAT[>VALUE], or =FROM..TO[,FROM..TO]; raises LinkwiseError for other text."""
+        """Read NAME[/REST]=WHAT[>VALUE], or =FROM..TO[,FROM..TO].
+
+        Raises LinkwiseError for other text.
+        """
         names, sign, what = text.partition("=")
         name, slash, rest = names.partition("/")
         if not (sign and name and what) or (slash and not rest):
@@ -57,7 +60,7 @@ class Phase:
 
 
 def _spans(text: str) -> tuple[tuple[float, float], ...]:
-    """Times of FROM..TO, in s; none where the text is something else."""
+    """Return the times of FROM..TO[,FROM..TO], in s; none where the text is something else."""
     try:
         ends = [tuple(float(end) for end in span.split("..")) for span in text.split(",")]
     except ValueError:
@@ -67,7 +70,7 @@ def _spans(text: str) -> tuple[tuple[float, float], ...]:
 
 @dataclass(frozen=True, eq=False)
 class PlacedPhase:
-    """A phase of one movement: it is while any of these says so."""
+    """A phase of one movement: it is on while any of these conditions holds."""
 
     name: str
     rest: str
@@ -76,11 +79,11 @@ class PlacedPhase:
     contact: int | None = None
     load: PlacedLoad | None = None
     above: float = THRESHOLD
-    """N, of a load."""
+    """Force of a load in N above which the phase is on."""
 
     @property
     def told(self) -> str:
-        """When it is, in words."""
+        """Conditions of the phase, in words."""
         said = [f"from {start:g} to {end:g} s" for start, end in self.spans]
         if self.switch is not None:
             said.append(f"{self.switch.given.column} above {self.switch.given.above:g}")
@@ -91,7 +94,10 @@ class PlacedPhase:
         return printable(f"{self.name}: {' or '.join(said)}")
 
     def on(self, robot: LoadedRobot, time: Array, q: Array, contacts: Array) -> NDArray[np.bool_]:
-        """At instants (S,) with the robot at q (S, n) and shares of its contacts (contacts, S)."""
+        """Return whether the phase is on at instants (S,).
+
+        q: positions of the robot (S, n); contacts: shares of its contacts, (contacts, S)
+        """
         found = np.zeros(len(time), dtype=np.bool_)
         for start, end in self.spans:
             found |= (time >= start) & (time <= end)
@@ -106,7 +112,7 @@ class PlacedPhase:
 
 
 def phase_columns(phases: Sequence[Phase], log: Log) -> tuple[str, ...]:
-    """Columns of the motion's log that phases may need."""
+    """Return the columns of the motion's log that phases may need."""
     return tuple(dict.fromkeys(phase.what for phase in phases if phase.what in log.columns))
 
 
@@ -118,9 +124,9 @@ def placed_phases(
     reading: Reading,
     progress: Progress,
 ) -> tuple[PlacedPhase, ...]:
-    """Find what says when each phase is: a load, else a contact, else a column of the log.
+    """Find what sets each phase: times, else a load, else a contact, else a column of the log.
 
-    Raises LinkwiseError for what is none of them.
+    Raises LinkwiseError for a name that is none of them.
     """
     by_name = {load.name: load for load in loads}
     contacts = () if robot.contacts is None else robot.contacts.names

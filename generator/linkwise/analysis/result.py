@@ -23,7 +23,7 @@ from linkwise.escape import listed, printable
 from linkwise.package.load import Array
 
 PART_BYTES, LEAST = 4 << 20, 256
-"""Size of a part of a result, about, and its fewest samples."""
+"""Approximate size in bytes of a part of a result, and its fewest samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Totals:
 
 @dataclass(frozen=True, eq=False)
 class AnalysisResult:
-    """Who loads whom: S samples of every torque term, SI units; index order joint, link, cause.
+    """Result of an analysis: S samples of every torque term, SI units; index order joint, link, cause.
 
     `values` (columns, S) holds what `columns` names, of every sample, in memory or in a file behind it;
     terms that are identically 0 have no column. n joints, N links.
@@ -48,35 +48,38 @@ class AnalysisResult:
     source: str
     """Name of the log."""
     rate: float
-    """Samples a second."""
+    """Sampling rate in Hz."""
     columns: tuple[Column, ...]
     values: Array
     totals: Totals
     work: Work
-    """What each joint gave to each link and took back, (n, N) in J, over all samples."""
+    """Work that each joint gave to each link and took back, (n, N) in J, over all samples."""
     joint_work: Work
-    """The same for all links together, (n,) in J: the integral of τ_i q̇_i where it is positive, negative."""
+    """Work that each joint gave in all and took back, (n,) in J: ∫ τ_i q̇_i dt where positive, negative."""
     load_work: Work
-    """What each joint gave against each load and took back, (n, loads) in J."""
+    """Work that each joint gave against each load and took back, (n, loads) in J."""
     contact_work: Work
-    """What each contact fed into each link as what it holds slipped, and took back, (N, contacts) in J."""
+    """Work that each contact fed into each link as its frame slipped, and took back, (N, contacts) in J."""
     loads: tuple[PlacedLoad, ...]
     induced: tuple[str, ...]
-    """Whose acceleration is told by its sources, in the columns that begin with acc."""
+    """Points whose acceleration is split by source, in the columns that begin with acc."""
     closure: Closure
     ignored: tuple[str, ...]
-    """Columns of the log that no joint has."""
+    """Columns of the log that belong to no joint."""
     warnings: tuple[str, ...]
     total: int
     closed: ClosedLog | None = None
-    """How far positions of the log were off, where joints are tied; None where none are."""
+    """Largest violation of a constraint by positions of the log; None where no joints are tied."""
     times: ContactTimes | None = None
-    """When contacts are on, where there are any."""
+    """Times at which contacts are on, where there are any."""
     phases: tuple[PlacedPhase, ...] = ()
-    """Those that were asked for."""
+    """Phases that were asked for."""
 
     def __getitem__(self, name: str) -> Array:
-        """One column (S,) by its name, as in the Parquet file: "tau/joint1/link2"; else LinkwiseError."""
+        """Return a column (S,) by its name, as in the Parquet file: "tau/joint1/link2".
+
+        Raises LinkwiseError for a name that no column has.
+        """
         for column, values in zip(self.columns, self.values, strict=True):
             if column.name == name:
                 found: Array = values
@@ -90,9 +93,10 @@ class AnalysisResult:
         return {column.name: values for column, values in zip(self.columns, self.values, strict=True)}
 
     def parts(self) -> Iterator[Self]:
-        """Results of some samples each, one after the other: all samples, of which memory holds few.
+        """Yield results of some samples each, one after the other, until all samples are done.
 
-        Totals, work and closure of each are those of the whole movement.
+        Memory holds few samples at a time. Totals, work and closure of each result are those of the whole
+        movement.
         """
         most = max(LEAST, PART_BYTES // (8 * len(self.columns)))
         for at in range(0, self.values.shape[1], most):
@@ -122,12 +126,12 @@ class AnalysisResult:
 
     @property
     def torque(self) -> Array:
-        """τ_i (S, n) in N·m or N."""
+        """Joint torques τ_i (S, n) in N·m or N."""
         return self._dense("tau", 1)
 
     @property
     def partial_torque(self) -> Array:
-        """τ_ij (S, n, N), on joint i through link j, in N·m or N."""
+        """Partial torques τ_ij (S, n, N), on joint i through link j, in N·m or N."""
         return self._dense("tau_link", 2)
 
     @property
@@ -137,37 +141,43 @@ class AnalysisResult:
 
     @property
     def velocity(self) -> Array:
-        """τp_ij(q̇_k) (S, n, N, n), the part by its velocity, in the convention asked for."""
+        """τp_ij(q̇_k) (S, n, N, n), the part of τ_ij by the velocity of coordinate k.
+
+        It is in the convention of `processing`.
+        """
         return self._dense("tau_qd", 3)
 
     @property
     def gravity(self) -> Array:
-        """g_ij (S, n, N), the part by gravity and other potentials."""
+        """g_ij (S, n, N), the part of τ_ij by gravity and other potentials."""
         return self._dense("tau_gravity", 2)
 
     @property
     def load_torque(self) -> Array:
-        """τ_ie (S, n, loads), what joint i takes to bear load e, in N·m or N."""
+        """τ_ie (S, n, loads), the torque of joint i that carries load e, in N·m or N."""
         return self._filled("tau_load", len(self.robot.joints), len(self.loads))
 
     @property
     def load_labels(self) -> tuple[str, ...]:
-        """How pictures call the loads: one on the foot and the foot's own share are told apart."""
+        """Names of the loads in figures, where a load on the foot differs from the foot's own share."""
         return tuple(f"load {borne.name}" for borne in self.loads)
 
     @property
     def power(self) -> Array:
-        """P_ij = τ_ij q̇_i (S, n, N) in W, what joint i sends into link j; Σ_i P_ij = d(K_j + P_j)/dt."""
+        """Power P_ij = τ_ij q̇_i (S, n, N) in W that joint i sends into link j.
+
+        Σ_i P_ij = d(K_j + P_j)/dt, less what contacts feed into link j where they slip.
+        """
         return self._dense("power_link", 2)
 
     @property
     def joint_power(self) -> Array:
-        """P_i = τ_i q̇_i (S, n) in W."""
+        """Power P_i = τ_i q̇_i (S, n) in W of each joint."""
         return self._dense("power", 1)
 
     @property
     def load_warnings(self) -> tuple[str, ...]:
-        """What was noticed in the files of loads, each with its file."""
+        """Warnings about the files of loads, each with its file."""
         every = (*self.loads, *(() if self.times is None else self.times.loads))
         return tuple(dict.fromkeys(warning for load in every for warning in load.warnings))
 
@@ -196,19 +206,19 @@ class AnalysisResult:
 
     @property
     def constraint_force(self) -> Array:
-        """What each row of the constraints bears, (S, C), in N or N·m; no column without constraints."""
+        """Force in each row of the constraints, (S, C), in N or N·m; no column without constraints."""
         return self._filled("force", self._rows)
 
     @property
     def constraint_force_by_link(self) -> Array:
-        """The part of it that each link causes, (S, N, C)."""
+        """Part of the constraint forces that each link causes, (S, N, C)."""
         return self._filled("force_link", len(self.robot.links), self._rows)
 
     @property
     def contact_wrench(self) -> Array:
-        """What the ground puts on each contact, (S, contacts, 6): moment about its point, force; world axes.
+        """Wrench of the ground on each contact, (S, contacts, 6): moment about its point, force; world axes.
 
-        In N m and N.
+        Moments are in N·m, forces in N.
         """
         ground = self.robot.contacts
         if ground is None:
@@ -222,12 +232,12 @@ class AnalysisResult:
         return len(self.robot.constraint_rows)
 
     def is_ever_on(self, contact: int) -> bool:
-        """Whether a contact is on at any sample."""
+        """Return whether a contact is on at any sample."""
         peaks = zip(self.columns, self.totals.peak, strict=True)
         return any(c.quantity == "contact" and c.cause == contact and peak > 0.0 for c, peak in peaks)
 
     def largest_slip(self, contact: int) -> tuple[float, float]:
-        """How fast what a contact holds moves at most while it is on, in m/s and rad/s, over all samples."""
+        """Return a contact's largest slip velocities while it is on, in m/s and rad/s, over all samples."""
         ground = self.robot.contacts
         found = {"m/s": 0.0, "rad/s": 0.0}
         for column, peak in zip(self.columns, self.totals.peak, strict=True):

@@ -1,4 +1,4 @@
-"""The columns of a result: what each holds, of which joint, link and cause, in which unit."""
+"""Columns of a result: the quantity of each, its joint, link and cause, and its unit."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ from linkwise.analysis.term_rows import TermRows
 from linkwise.escape import column_part
 
 Key = tuple[Quantity, int | None, int | None, int | None]
-"""What identifies a column, without names: quantity, joint, link, cause."""
+"""Identity of a column, without names: quantity, joint, link, cause."""
 
 
 @dataclass(frozen=True)
 class Column:
     """One column; `joint`, `link` and `cause` are indices, None where they mean nothing.
 
-    The cause is a coordinate; of what a load asks for the load, of what a constraint bears its row, with the
-    load that it bears where it is of one. An induced acceleration is of a point, by its number, and has a row
-    of that point's.
+    The cause is a coordinate; for the torque of a load it is that load, for share and power of a contact that
+    contact, and for a force or slip the row of the constraint, where `load` is the load that causes a force,
+    if one does. An induced acceleration has the number of its point and of a row of that point.
     """
 
     quantity: Quantity
@@ -34,17 +34,17 @@ class Column:
 
     @property
     def key(self) -> Key:
-        """What identifies the column, without names."""
+        """Identity of the column, without names: quantity, joint, link, cause."""
         return self.quantity, self.joint, self.link, self.cause
 
 
 def load_unit(unit: str) -> str:
-    """Unit of the load on a joint whose coordinate is in `unit`, "rad" or "m"."""
+    """Return the unit of torque or force on a joint whose coordinate is in `unit`, "rad" or "m"."""
     return "N·m" if unit == "rad" else "N"
 
 
 def force_unit(row: str) -> str:
-    """Unit of what a row of the constraints bears; a coupling's is on the unit of its sum."""
+    """Return the unit of force in a constraint's row; a coupling's depends on the unit of its sum."""
     return "N·m" if " moment" in row else "N" if " force" in row else "N·m or N"
 
 
@@ -55,9 +55,11 @@ def columns_of(
     power_terms: bool = False,
     measured: Sequence[int] = (),
 ) -> tuple[Column, ...]:
-    """Columns in order: time, motion, τ_i, τ_ij, terms, the joints' own, loads, forces, power.
+    """Return the columns of a result; what is identically 0 has none.
 
-    None for what is 0. measured: contacts of which loads were measured.
+    They are in order: time, motion, τ_i, τ_ij, terms, passive torques, loads, forces, contacts, power.
+
+    measured: contacts whose loads were measured
     """
     out = [Column("time", "time", "s")]
     motions: tuple[tuple[Quantity, str], ...] = (("q", ""), ("qd", "/s"), ("qdd", "/s²"))
@@ -92,7 +94,7 @@ def columns_of(
 
 
 def _forces(robot: LoadedRobot, loads: Sequence[PlacedLoad]) -> Iterator[Column]:
-    """What each row of the constraints bears, of all, of each link, of joints' own and of each load."""
+    """Yield the columns of constraint forces, row by row: whole, by link, by passive torque, by load."""
     own = [share for share, number in PASSIVE.items() if any(getattr(one, number) for one in robot.passive)]
     for row, name in enumerate(robot.constraint_rows):
         part, unit = column_part(name), force_unit(name)
@@ -108,7 +110,7 @@ def _forces(robot: LoadedRobot, loads: Sequence[PlacedLoad]) -> Iterator[Column]
 
 
 def _ground(robot: LoadedRobot, measured: Sequence[int]) -> Iterator[Column]:
-    """When each contact is on, how what it holds moves, and what was measured there."""
+    """Yield the columns of contacts: shares, power into links, slip, and what was measured there."""
     ground = robot.contacts
     if ground is None:
         return
@@ -131,13 +133,13 @@ def _ground(robot: LoadedRobot, measured: Sequence[int]) -> Iterator[Column]:
 
 
 def slip_name(row: str) -> str:
-    """What moves where a row bears: "foot angular_x" for "foot moment_x", "foot x" for "foot force_x"."""
+    """Return the name of a row's slip: "foot angular_x" for "foot moment_x", "foot x" for "foot force_x"."""
     name, _, force = row.rpartition(" ")
     return f"{name} {force.replace('moment_', 'angular_').replace('force_', '')}"
 
 
 def _powers(columns: Sequence[Column], quantities: Sequence[Quantity]) -> Iterator[Column]:
-    """The powers of all torques that are asked for, named like these."""
+    """Yield the power columns of the given quantities, named like the torques that they are made of."""
     for quantity in quantities:
         for c in columns:
             if c.quantity == TORQUE_OF[quantity]:

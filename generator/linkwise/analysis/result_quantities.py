@@ -1,4 +1,4 @@
-"""What a result holds: its quantities, what they mean, and which are made of which."""
+"""Quantities of a result, what they mean, and which are made of which."""
 
 from typing import Literal
 
@@ -122,10 +122,10 @@ PASSIVE: dict[Quantity, str] = {
     "tau_friction": "friction",
     "tau_armature": "armature",
 }
-"""Beside the links' what a joint's torque consists of, in the order of `passive_torque`, and the number that
-says whether a joint has it."""
+"""Parts of a joint's torque beside those of the links, in the order of `passive_torque`, each with the field
+of a `PassiveEntry` that is zero where there is no such part."""
 POWER: tuple[Quantity, ...] = ("power", "power_link", "power_load")
-"""Torques of joints times their velocities; beside them contacts have power, as they slip."""
+"""Power of joints, torque times velocity; contacts have power of their own, as they slip."""
 POWER_TERMS: tuple[Quantity, ...] = (
     "power_qdd",
     "power_qd",
@@ -135,7 +135,7 @@ POWER_TERMS: tuple[Quantity, ...] = (
     "power_friction",
     "power_armature",
 )
-"""The parts of what a joint sends into a link, or into its own; in a result where they are asked for."""
+"""Parts of the power that a joint sends into a link or its passive elements; in a result only on request."""
 TORQUE_OF: dict[Quantity, Quantity] = dict(
     zip((*POWER, *POWER_TERMS), ("tau", "tau_link", "tau_load", *TERMS, *PASSIVE), strict=True)
 )
@@ -148,7 +148,7 @@ FORCE_OF: dict[Quantity, Quantity] = {
     "tau_armature": "force_armature",
     "tau_load": "force_load",
 }
-"""What constraints bear of what stands beside the links' torques."""
+"""Constraint forces due to the torques that stand beside those of the links, by torque."""
 FORCES: tuple[Quantity, ...] = ("force", "force_link", *FORCE_OF.values())
 GROUND: tuple[Quantity, ...] = ("contact", "slip", "force_measured", "tau_as_loads", "power_contact")
-"""What is known of contacts beside the forces that they bear."""
+"""Quantities of contacts beside the constraint forces."""

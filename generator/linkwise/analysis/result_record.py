@@ -15,7 +15,7 @@ SCHEMA = 2
 
 
 def record(result: AnalysisResult) -> dict[str, Any]:
-    """Everything but the samples, as plain data: choices, closure, columns and their totals."""
+    """Return everything but the samples as plain data: choices, closure, columns and their totals."""
     robot = result.robot
     return {
         "schema": SCHEMA,
@@ -70,7 +70,10 @@ def _contacts(result: AnalysisResult) -> dict[str, Any]:
 
 
 def _work(result: AnalysisResult) -> dict[str, Any]:
-    """Work in J of each joint, all links together, and of each joint into each link that it moves."""
+    """Return the work in J of each joint in all, into each link that it moves, and against each load.
+
+    Work of contacts is added where there are any.
+    """
     joints, links = result.robot.joints, result.robot.links
 
     def entry(work: Work, *at: int) -> dict[str, float]:
@@ -92,7 +95,7 @@ def _work(result: AnalysisResult) -> dict[str, Any]:
 
 
 def _fed(result: AnalysisResult, entry: Callable[..., dict[str, float]]) -> dict[str, Any]:
-    """Work of contacts that slip, where there are any."""
+    """Return the work of contacts that slip, where there are any."""
     ground, links = result.robot.contacts, result.robot.links
     if ground is None:
         return {}

@@ -1,4 +1,4 @@
-"""An analysis as a notebook shows it: each joint's torque and work, and what loads it most."""
+"""Table of an analysis for a notebook: each joint's torque and work, and its largest cause."""
 
 import numpy as np
 from linkwise_runtime.html_tables import page_part, remark, table
@@ -12,7 +12,7 @@ HEAD = ("joint", "peak |τ|", "mean |τ|", "largest cause", "its share", "gave",
 
 
 def result_table(result: AnalysisResult) -> str:
-    """HTML of a result; peaks, means, shares and work are over all samples of the movement.
+    """Return the HTML of a result; peaks, means, shares and work are over all samples of the movement.
 
     Causes and shares are those of `--figure shares`.
     """
@@ -43,5 +43,5 @@ def result_table(result: AnalysisResult) -> str:
 
 
 def _work(work: Work, joint: int) -> tuple[str, str]:
-    """What a joint gave and took back."""
+    """Return the work that a joint gave and the work that it took back, as text in J."""
     return f"{float(np.asarray(work.given)[joint]):.4g} J", f"{float(np.asarray(work.taken)[joint]):.4g} J"

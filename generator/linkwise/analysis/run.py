@@ -30,7 +30,7 @@ from linkwise.progress import Progress, silent
 NO_LOADS = Loads()
 NO_CONTACTS = Contacts()
 RECORD = "analysis.json"
-"""The record, and the mark by which a directory is known to hold a former result."""
+"""File of the record, by which a directory is known to hold a former result."""
 
 
 def analyze(
@@ -48,13 +48,14 @@ def analyze(
 ) -> Analysis:
     """Analyse a motion log with a generated robot, all samples in memory.
 
-    robot: the directory of its package; of a robot's file `linkwise.kept_package` makes one
+    robot: the directory of its package; `linkwise.kept_package` makes one from a robot's file
     payloads: point masses that the robot carries, each a link of its own in the result
-    loads: forces and moments from outside, or files of them, each a cause of its own in the result;
-    loads_cutoff in Hz is of the low-pass that those of files get
-    induced: whose acceleration is to be told by its sources: FRAME or FRAME,X,Y,Z, joints, centre-of-mass
+    loads: external forces and moments, or files of them, each a cause of its own in the result
+    loads_cutoff: cutoff in Hz of the low-pass on loads from files
+    induced: points whose acceleration is split by source: FRAME or FRAME,X,Y,Z, joints, centre-of-mass
     contacts: frames that the ground holds, whose reactions are found from the motion; `Contacts` says when
-    phases: of the movement, as --phase has them, for the figure "causes": "stance/swing=LOAD"
+    phases: phases of the movement for the figure "causes", written as for --phase: "stance/swing=LOAD"
+
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
     held = Contacts.of(contacts)
@@ -82,9 +83,9 @@ def analyze_to(
 ) -> tuple[Analysis, Sequence[Path]]:
     """Analyse a log of any length with flat memory; `out` appears when everything is done.
 
-    Returns the analysis, whose samples are in a file without a name where figures or a page are wanted and
-    else are none, and the files written. Raises LinkwiseError, as `analyze` does, and where `out` holds
-    something else than a former result or cannot be written.
+    Returns the analysis and the paths of the files written. Samples of the analysis are in a file without a
+    name where figures or a page are wanted; otherwise it has none. Raises LinkwiseError, as `analyze` does,
+    and where `out` holds something else than a former result or cannot be written.
     """
     robot = standing_on(robot, contacts)
     for name in wanted.figures:
@@ -148,7 +149,10 @@ def _refuse_unless_result(target: Path) -> None:
 
 
 def _files_written(record: Path) -> set[str]:
-    """Names of the files of a result, as its record lists them; an empty set for what is no record."""
+    """Return the names of the files of a result, as its record lists them.
+
+    The set is empty where the file is no record.
+    """
     try:
         said = json.loads(record.read_text(encoding="utf-8")) if record.is_file() else None
     except (OSError, ValueError, RecursionError):

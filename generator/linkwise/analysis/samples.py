@@ -18,7 +18,7 @@ from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 SLOW = 5.0
-"""Hz; hardly any movement is recorded so slowly, and milliseconds taken for seconds look like it."""
+"""Rate in Hz below which hardly any movement is recorded; milliseconds taken for seconds look like it."""
 CLOCKS = {"ms": 1000, "µs": 10**6, "ns": 10**9}
 
 
@@ -30,7 +30,7 @@ class Samples:
     q: Array
     rate: float
     ignored: tuple[str, ...]
-    """Columns of the log that no joint has."""
+    """Columns of the log that belong to no joint."""
     warnings: tuple[str, ...]
     first_row: int | None = None
     """Number of the first sample's row in the log; None where they were resampled."""
@@ -49,10 +49,12 @@ def read_samples(
 ) -> Samples:
     """Read, convert to SI and check a log.
 
-    joint_units: one for each joint, "rad" for those that a log in degrees has in these
+    joint_units: one for each joint, "rad" for those that are in degrees in a log in degrees
     buffer: a directory on whose disk, as a rule, a buffer keeps the samples; None keeps them in memory
-    beside: columns that something else reads; reach: the largest magnitude that each joint's limits allow, in
-    its unit, of all joints or none; followers: joints whose columns may be left out unasked
+    beside: columns that are read elsewhere
+    reach: the largest magnitude that each joint's limits allow, in its unit, of all joints or none
+    followers: joints whose columns may be left out without `reading.ignore_extra`
+
     Raises LinkwiseError that names file, row and column for what cannot be analysed.
     """
     with within(str(log.path)):
@@ -93,7 +95,10 @@ def read_samples(
 def finite_blocks(
     log: Log, columns: Sequence[int], progress: Progress, others: Sequence[int] = ()
 ) -> Iterator[Array]:
-    """Blocks (rows, columns and others) of the log; LinkwiseError for what is not finite in the columns."""
+    """Yield blocks (rows, columns and others) of the log.
+
+    Raises LinkwiseError for values of the columns that are not finite; those of the others may be.
+    """
     row, width, names = log.first_row, len(columns), [log.columns[at] for at in columns]
     for block, done in log.read((*columns, *others)):
         with within(str(log.path)):
@@ -104,7 +109,7 @@ def finite_blocks(
 
 
 def slowness(rate: float) -> tuple[str, ...]:
-    """A warning where so many samples a second, Hz, are hardly those of a movement."""
+    """Return a warning, in a tuple, where a rate in Hz is hardly that of a movement; else an empty one."""
     if rate >= SLOW:
         return ()
     unit = next((unit for unit, factor in CLOCKS.items() if rate * factor >= 1.0), "ns")
@@ -112,7 +117,7 @@ def slowness(rate: float) -> tuple[str, ...]:
 
 
 def _thinned(rate: float, wanted: float | None) -> tuple[str, ...]:
-    """A warning where resampling to `wanted` Hz turns fast motion of a log into slow one."""
+    """Return a warning, in a tuple, where resampling to `wanted` Hz turns fast motion into slow motion."""
     if wanted is None or wanted >= rate * (1 - TOLERANCE):
         return ()
     return (

@@ -1,4 +1,4 @@
-"""How a log is read and its movement derived: the user's choices, as recorded in every output."""
+"""Settings of an analysis: how a log is read and its movement derived, as recorded in every output."""
 
 import math
 from collections.abc import Mapping
@@ -18,12 +18,14 @@ Convention = Literal["closing", "gradient"]
 
 @dataclass(frozen=True)
 class Reading:
-    """How columns become joint coordinates. Raises LinkwiseError for a rate that cannot be.
+    """Choices of how columns become joint coordinates.
 
     `units` is the angles' unit; None takes what the file says (`inDegrees`), else radians. Lengths
     are always metres. `time` names the column of the time, in s; None takes "time" or "t". `mapping`
     holds (column, joint) pairs, or is a dict of them; other joints take the column of their name, or
-    OpenSim's state of that coordinate. `ignore_extra` leaves out columns that no joint has.
+    OpenSim's state of that coordinate. `ignore_extra` leaves out columns that belong to no joint.
+
+    Raises LinkwiseError for values that are impossible or do not go together.
     """
 
     units: Units | None = None
@@ -33,11 +35,11 @@ class Reading:
     resample: float | None = None
     """Sampling rate in Hz to bring a log of uneven time to, by cubic splines."""
     loop_tolerance: float = 0.01
-    """How far positions of the log may be from closing the robot's loops, in m and rad."""
+    """Largest violation of the robot's loops by positions of the log, in m and rad."""
     topic: str | None = None
     """Topic of a bag, or group of a file of arrays, that has the joints; None takes the only one."""
     qpos: Order | None = None
-    """Whose positions and torques a file of arrays has, MuJoCo's or Pinocchio's; None for the robot's own."""
+    """Order of positions and torques in a file of arrays: MuJoCo's, Pinocchio's; None for the robot's own."""
 
     def __post_init__(self) -> None:
         if self.qpos is not None and self.units is not None:
@@ -60,8 +62,8 @@ class Lowpass:
     """A Butterworth low-pass run forwards and backwards, so without a shift in time.
 
     `cutoff` is in Hz, `order` that of one pass: both together have twice the order and -6 dB at the cutoff.
-    `padding` says how the log is continued past its ends while filtering. Raises LinkwiseError for values
-    that cannot be.
+    `padding` says how the log is continued past its ends while filtering. Raises LinkwiseError for impossible
+    values.
     """
 
     cutoff: float
@@ -77,13 +79,13 @@ class Lowpass:
 
 @dataclass(frozen=True)
 class Processing:
-    """How velocities and accelerations come from the samples, and the convention of the terms.
+    """Choices of how velocities and accelerations are derived, and the convention of the terms.
 
     The low-pass, if any, is applied to q before it is differentiated; both are linear, so away from
     the ends this equals the paper's filter after the derivative. `window` (in samples) and `degree` are
     Savitzky–Golay's. `edges` says whether samples near the ends get one-sided formulas or are cut off.
     `convention` "closing" makes velocity terms sum to the torque; "gradient" is the paper's Eq. 1, twice
-    that. Raises LinkwiseError for values that cannot be.
+    that. Raises LinkwiseError for impossible values.
     """
 
     derivative: Derivative = "five-point"
@@ -104,7 +106,7 @@ class Processing:
 
     @property
     def span(self) -> int:
-        """Samples that one derivative looks at."""
+        """Number of samples that one derivative uses."""
         return 5 if self.derivative == "five-point" else self.window
 
 
@@ -112,7 +114,7 @@ class Processing:
 class Payload:
     """A point mass in kg on a body of the robot's file, at a point in m in that body's own axes.
 
-    Its name, "payload BODY" unless given, stands beside those of the links. Raises LinkwiseError for a mass
+    The name, "payload BODY" unless given, stands beside those of the links. Raises LinkwiseError for a mass
     that is not above 0 and a point that is not three numbers.
     """
 
@@ -129,16 +131,16 @@ class Payload:
 
     @property
     def title(self) -> str:
-        """What it is called among the links."""
+        """Name of the payload among the links."""
         return self.name or f"payload {self.body}"
 
     def record(self) -> dict[str, Any]:
-        """As plain data, to record in the outputs; kg and m."""
+        """Return this as plain data, to record in the outputs; kg and m."""
         return {"name": self.title, "body": self.body, "mass": self.mass, "point": list(self.point)}
 
 
 def choices(reading: Reading, processing: Processing) -> dict[str, Any]:
-    """All choices as plain data, to record in the outputs."""
+    """Return all choices as plain data, to record in the outputs."""
     kept = asdict(processing)
     if processing.derivative == "five-point":
         del kept["window"], kept["degree"]

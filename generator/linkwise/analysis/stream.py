@@ -19,18 +19,18 @@ from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 Sink = Callable[[Array], None]
-"""Takes one block (columns, samples) after the other; the block is the sink's own."""
+"""A sink is given one block (columns, samples) after the other; the block is the sink's own."""
 
 INNER, LEAST = 4096, 1024
-"""Samples computed at once, so that the intermediate values stay in the cache; of wide results fewer."""
+"""Most and fewest samples computed at once: intermediate values stay in the cache; fewer for wide results."""
 
 BLOCK_BYTES = 48 << 20
-"""Size of a block handed on, about: some three of them are in memory at any time."""
+"""Approximate size in bytes of a block handed on: some three of them are in memory at any time."""
 
 
 @dataclass(frozen=True)
 class Streamed:
-    """What is known once every block is done."""
+    """Totals, work, closure and number of samples, known once every block is done."""
 
     totals: Totals
     work: Work
@@ -42,7 +42,10 @@ class Streamed:
 
 
 def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
-    """First sample analysed and the one after the last; LinkwiseError if there are too few."""
+    """Return the first sample analysed and the one after the last.
+
+    Raises LinkwiseError if there are too few samples.
+    """
     count, needed = len(samples.time), processing.span
     cut = needed // 2 if processing.edges == "trim" else 0
     if count < needed + 2 * cut:
@@ -99,7 +102,10 @@ def stream(
 
 
 def _overflow(samples: Samples, decomposer: Decomposer, out: Array, start: int) -> LinkwiseError:
-    """Say where the first result that is not finite stands, by time; columns come cause before effect."""
+    """Return an error that says where the first result that is not finite stands, by time.
+
+    Columns come cause before effect.
+    """
     bad = ~np.isfinite(out)
     at = int(bad.any(axis=0).argmax())
     column = int(bad[:, at].argmax()) if bad.any() else int(np.abs(out).max(axis=1).argmax())
@@ -111,7 +117,7 @@ def _overflow(samples: Samples, decomposer: Decomposer, out: Array, start: int) 
 
 
 def _largest(samples: Samples, decomposer: Decomposer, at: int) -> str:
-    """Tell of the largest coordinate near a sample."""
+    """Return a phrase about the largest coordinate near a sample, for a message."""
     first = max(0, at - INNER)
     near = np.abs(samples.q[first : at + INNER])
     near[np.isnan(near)] = np.inf  # of a filter that overflowed

@@ -18,7 +18,7 @@ class ResultTable(Protocol):
     """A sink that is closed at the end."""
 
     def __enter__(self) -> Self:
-        """Open; the file exists from now on."""
+        """Open the table; the file exists from now on."""
 
     def __exit__(
         self,
@@ -26,7 +26,7 @@ class ResultTable(Protocol):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Close."""
+        """Close the table."""
 
     def __call__(self, block: Array) -> None:
         """Write a block (columns, samples)."""

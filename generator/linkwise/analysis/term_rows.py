@@ -1,4 +1,4 @@
-"""Which torque terms a model has values of, and where among its packed values."""
+"""Torque terms that a model has values of, and their places among its packed values."""
 
 from typing import NamedTuple
 
@@ -6,9 +6,9 @@ from linkwise_runtime.structure import Layout
 
 
 class TermRows(NamedTuple):
-    """Of each kind of term its rows (i, j, source), or (i, j, k, source), sorted.
+    """Rows (i, j, source), or (i, j, k, source), of each kind of term, sorted.
 
-    The source is where packed values have it.
+    The source is the term's place among the packed values.
     """
 
     acceleration: tuple[tuple[int, ...], ...]
@@ -18,7 +18,7 @@ class TermRows(NamedTuple):
 
 
 def term_rows(layout: Layout) -> TermRows:
-    """All terms of a layout."""
+    """Return the rows of all terms of a layout."""
 
     def numbered(rows: list[list[int]]) -> tuple[tuple[int, ...], ...]:
         return tuple(sorted((*row, at) for at, row in enumerate(rows)))
@@ -32,7 +32,7 @@ def term_rows(layout: Layout) -> TermRows:
 
 
 def mirrored(layout: Layout) -> list[tuple[int, int, int, int]]:
-    """All (i, j, k, source) of c2, sorted: only i ≤ k is stored, and c2 is symmetric in i and k."""
+    """Return all (i, j, k, source) of c2, sorted: only i ≤ k is stored, and c2 is symmetric in i and k."""
     rows = set()
     for source, (i, j, k) in enumerate(layout.acceleration.tolist()):
         rows |= {(i, j, k, source), (k, j, i, source)}

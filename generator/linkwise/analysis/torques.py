@@ -1,4 +1,4 @@
-"""From positions, velocities and accelerations to every torque term of a block of samples."""
+"""Torque terms of a block of samples, from its positions, velocities and accelerations."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,11 +33,11 @@ class Decomposer:
     """Computes blocks of the result, stored by column: (columns, samples).
 
     With q̈_k and q̇_k the coordinates' motion, and index order joint i, link j, coordinate k:
-    τ_i = Σ_j τ_ij + what the joint has of its own + Σ_e τ_ie, with τ_ie = −J_iᵀ (n, f) of load e
+    τ_i = Σ_j τ_ij + passive torques of the joint + Σ_e τ_ie, with τ_ie = −J_iᵀ (n, f) of load e
     τ_ij = Σ_k c2_ijk q̈_k + Σ_k c1_ijk q̇_k + g_ij
-    P_ij = τ_ij q̇_i, what joint i sends into link j
+    P_ij = τ_ij q̇_i, the power that joint i sends into link j
 
-    Where the robot stands on contacts, all of these torques are what the contacts leave.
+    Where the robot stands on contacts, all of these torques are those that the contacts leave to the joints.
     """
 
     robot: LoadedRobot
@@ -48,14 +48,14 @@ class Decomposer:
     parts: tuple[tuple[int, tuple[int, ...]], ...]
     """Row of each τ_ij, and the rows of its terms."""
     wholes: tuple[tuple[int, tuple[int, ...]], ...]
-    """Row of each τ_i, and the rows of its parts: τ_ij, what the joint has of its own, τ_ie."""
+    """Row of each τ_i, and the rows of its parts: τ_ij, passive torques of the joint, τ_ie."""
     powers: tuple[tuple[int, int, int], ...]
     """Row of each power, the row of its torque, and the joint whose velocity multiplies."""
     induced: InducedShares
     forces: BorneForces
     times: ContactTimes | None
     terms: ContactTerms | None
-    """None where nothing stands on contacts."""
+    """Terms of the robot on its contacts; None without contacts."""
 
     @classmethod
     def of(
@@ -98,12 +98,12 @@ class Decomposer:
         return cls(robot, tuple(loads), convention, every, sources, *planned, induced, forces, times, terms)
 
     def rows(self, quantity: Quantity) -> slice:
-        """Where a quantity's columns stand; they stand together."""
+        """Return the slice of a quantity's columns, which stand together."""
         found = [at for at, column in enumerate(self.columns) if column.quantity == quantity]
         return slice(found[0], found[-1] + 1) if found else slice(0, 0)
 
     def fill(self, out: Array, time: Array, q: Array, qd: Array, qdd: Array) -> Closure:
-        """Fill `out` (columns, S) from time (S,) and q, qd, qdd (S, n); say how well it closes.
+        """Fill `out` (columns, S) from time (S,) and q, qd, qdd (S, n); return how well it closes.
 
         Where joints are tied, the motion of the independent ones counts. Raises LinkwiseError, with the time,
         where ties cannot be closed or joints do not follow.
@@ -148,7 +148,7 @@ class Decomposer:
         return closure
 
     def _dense(self, torque: Array, n: int) -> Array:
-        """tau_ij (S, n, N) of packed ones, before contacts bear any; empty where none do."""
+        """Return tau_ij (S, n, N) from packed values, before contacts carry any; empty without contacts."""
         if self.terms is None:
             return np.zeros((0, n, 0))
         out = np.zeros((len(torque), n, len(self.robot.links)))
@@ -157,7 +157,11 @@ class Decomposer:
         return out
 
     def _standing(self, time: Array, q: Array) -> Standing | None:
-        """How the ground holds the robot; None where nothing does."""
+        """Return the rows of the contacts that are on at each sample; None without contacts.
+
+        Raises LinkwiseError, with the time, where the torques of unactuated joints do not determine what
+        contacts carry.
+        """
         if self.times is None or self.robot.contacts is None:
             return None
         model, ground = self.robot.model, self.robot.contacts
@@ -172,7 +176,7 @@ class Decomposer:
         return ground.standing(q, self.times.shares(model, time, q))
 
     def _add_passive(self, out: Array, standing: Standing | None, q: Array, qd: Array, qdd: Array) -> None:
-        """Fill what joints have of their own, and add it to their torques."""
+        """Fill the passive torques of the joints, and add them to the joint torques."""
         if not self.robot.passive:
             return
         every = self.robot.model.passive_torque(q, qd, qdd)
@@ -184,7 +188,7 @@ class Decomposer:
                 out[whole[column.joint]] += values
 
     def _add_loads(self, out: Array, standing: Standing | None, time: Array, q: Array) -> None:
-        """Fill what joints take to bear loads, and add it to their torques."""
+        """Fill the torques by which joints carry loads, and add them to the joint torques."""
         asked = [_left(standing, borne.torque(self.robot.model, time, q)) for borne in self.loads]
         whole = self._wholes()
         for column, values in zip(self.columns, out, strict=True):
@@ -193,15 +197,17 @@ class Decomposer:
                 out[whole[column.joint]] += values
 
     def _wholes(self) -> dict[int, int]:
-        """Row of each joint's whole torque."""
+        """Return the row of each joint's whole torque, by joint."""
         return {
             c.joint: at for at, c in enumerate(self.columns) if c.quantity == "tau" and c.joint is not None
         }
 
     def _closure(self, out: Array, partial: Array) -> Closure:
-        """Check the closing sums, by unit: a joint that carries but rounding is measured by its peers.
+        """Return the largest errors of the closing sums, by unit.
 
-        partial: tau_ij (S, n, N) before contacts bear any: what they leave may be but its rounding
+        A joint that carries only rounding is measured by its peers.
+
+        partial: tau_ij (S, n, N) before contacts carry any; what they leave may be only its rounding
         """
         worst, units = Closure(), self.robot.units
         before = np.abs(partial).sum(axis=-1).max(axis=0, initial=0.0)
@@ -230,7 +236,7 @@ def _rows(
 
 
 def _left(standing: Standing | None, torque: Array) -> Array:
-    """What contacts leave of torques (S, n, ...)."""
+    """Return what contacts leave to the joints of torques (S, n, ...)."""
     return np.asarray(torque) if standing is None else standing.left(np.asarray(torque))
 
 

@@ -1,4 +1,7 @@
-"""How near a log comes to where three turns about one place leave only two: the pole of a base or a ball."""
+"""Warnings about logs near the pole of a floating base or a ball joint.
+
+At the pole, three turns about one point leave only two.
+"""
 
 from collections.abc import Iterator, Sequence
 
@@ -9,17 +12,18 @@ from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry
 
 NEAR = 10.0
-"""So many times as much, beside a pole, the outer turns magnify what is wrong with the angles of a log."""
+"""Least factor by which the outer turns magnify errors of a log's angles, near a pole, to be reported."""
 AT_ONCE = 1 << 16
 
 
 def pole_warnings(
     bodies: Sequence[BodyEntry] | None, joints: Sequence[str], samples: Samples
 ) -> Iterator[str]:
-    """Warnings of three successive turns about one place that a log brings near their pole.
+    """Yield a warning for three successive turns about one point that a log brings near their pole.
 
-    With z1, z2, z3 their axes, |z1 . z2 x z3| is largest a right angle of the middle turn away from the pole.
-    Nearer, what is wrong with an orientation is wrong with the outer angles by its inverse.
+    With z1, z2, z3 their axes, |z1 . z2 x z3| is largest where the middle turn is a right angle away from
+    the pole. Nearer, an error of an orientation is an error of the outer angles by the inverse of that
+    number, as a fraction of its largest.
     """
     for first, middle, last in _triples(bodies or ()):
         angles = samples.q[:, middle.coordinate]
@@ -43,7 +47,7 @@ def _near(turns: Sequence[str], size: float, time: float) -> str:
 
 
 def _triples(bodies: Sequence[BodyEntry]) -> Iterator[tuple[BodyEntry, BodyEntry, BodyEntry]]:
-    """Turns that follow each other at one place, with no mass between."""
+    """Yield three turns that follow each other at one point, with no mass between."""
     for last in bodies:
         middle = None if last.parent is None else bodies[last.parent]
         if middle is None or middle.parent is None:
@@ -56,7 +60,10 @@ def _triples(bodies: Sequence[BodyEntry]) -> Iterator[tuple[BodyEntry, BodyEntry
 
 
 def _apart(middle: BodyEntry, last: BodyEntry, angles: Array) -> Array:
-    """|z1 . z2 x z3| at angles (S,) of the middle turn, in the first one's axes, beside the largest."""
+    """Return |z1 . z2 x z3| (S,) at angles (S,) of the middle turn, as a fraction of its largest value.
+
+    Axes are those of the first turn.
+    """
     z2 = np.array(middle.rotation)[:, 2]
     x, y, z = np.array(last.rotation)[:, 2]
     cosine, sine = np.cos(middle.ratio * angles), np.sin(middle.ratio * angles)
@@ -64,6 +71,6 @@ def _apart(middle: BodyEntry, last: BodyEntry, angles: Array) -> Array:
     z3 = np.array(middle.rotation) @ turned
     largest = np.hypot(z2[0], z2[1]) * np.hypot(x, y)
     if largest == 0.0:
-        return np.ones_like(angles)  # two of the axes are one at every angle, which no angle mends
+        return np.ones_like(angles)  # two of the axes coincide at every angle, which no angle changes
     found: Array = np.abs(z2[0] * z3[1] - z2[1] * z3[0]) / largest
     return found

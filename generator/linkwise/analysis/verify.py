@@ -1,4 +1,4 @@
-"""How far a result can be believed: its parts sum to the whole, and an independent recursion agrees."""
+"""Checks of a result: its parts sum to the whole, and an independent recursion agrees."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -6,45 +6,46 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.rule.joint_tree import TreeFrame
 
 from linkwise.analysis.contacts.contact_reference import ContactReference
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.result_columns import Column
 from linkwise.analysis.result_quantities import Quantity
-from linkwise.check.loop_equations import LoopEquations
-from linkwise.check.newton_euler import NewtonEuler
 from linkwise.errors import LinkwiseError
+from linkwise.oracle.loop_equations import LoopEquations
+from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import Array
-from linkwise.package.manifest import FrameEntry
 
 LIMIT = 1e-9
 """A relative error above this is not rounding: the package does not compute what it says."""
 
 AGAINST_RECURSION = 1e-6
-"""The same against another way of computing, whose rounding is another."""
+"""Largest relative error against an independent computation, whose rounding differs."""
 
 SAMPLES = 8
 """Samples of each block that are computed again; the recursion is slow in Python."""
 
 STEP = 1e-30
-"""Of the complex step, in s: its square is nothing beside 1."""
+"""Complex step in s: its square is nothing beside 1."""
 
 LARGEST = 1e6
-"""In rad or m; past it a coordinate's own rounding hides what the comparison would show."""
+"""Largest coordinate in rad or m; beyond it, its own rounding hides what the comparison would show."""
 
 
 @dataclass(frozen=True)
 class Closure:
-    """Largest errors of Σ_k τp_ij + g_ij against τ_ij (terms) and of the sum that τ_i is (links).
+    """Largest errors of the sum Σ_k τp_ij + g_ij against τ_ij (terms) and of the sum for τ_i (links).
 
-    That is Σ_j τ_ij, what joint i has of its own, and Σ_e τ_ie of loads.
+    The sum for τ_i is Σ_j τ_ij, the passive torques of joint i, and Σ_e τ_ie of loads.
 
-    Absolute in N·m (N), relative to the largest sum of magnitudes in the same block of samples. Packages
-    may sum τ_i from the τ_ij, so both sums say only that nothing was lost; `recursion` is the largest
-    error of τ_ij and τ_ie against an independent Newton–Euler recursion, and `energy` that of Σ_i P_ij, in
-    W, against dE_j/dt of link j's energy there; None where the energies are hand-written. `induced` is the
-    residual of induced accelerations, the sum of all shares less J q̈ + J̇ q̇; None where none were asked for.
+    Absolute errors are in N·m (N), relative ones to the largest sum of magnitudes in a block of samples.
+    Packages may sum τ_i from the τ_ij, so both sums show only that nothing was lost; `recursion` is the
+    largest error of τ_ij and τ_ie against an independent Newton–Euler recursion, and `energy` that of
+    Σ_i P_ij, in W, against dE_j/dt of link j's energy there; None where the energies are hand-written.
+    `induced` is the residual of induced accelerations, the sum of all shares less J q̈ + J̇ q̇; None where
+    none were asked for.
     """
 
     terms_absolute: float = 0.0
@@ -59,7 +60,7 @@ class Closure:
     induced_relative: float | None = None
 
     def __or__(self, other: "Closure") -> "Closure":
-        """The larger of both, error by error."""
+        """Return the larger of both, error by error."""
         a, b = asdict(self), asdict(other)
         return Closure(**{name: _larger(a[name], b[name]) for name in a})
 
@@ -94,7 +95,7 @@ def _larger(a: Any, b: Any) -> Any:
 
 
 def residual(parts: list[Array], whole: Array) -> tuple[float, float]:
-    """Largest |Σ parts - whole| over samples, and the largest Σ |parts|; arrays (S,)."""
+    """Return the largest |Σ parts - whole| over samples, and the largest Σ |parts|; arrays (S,)."""
     if not parts:
         return float(np.abs(whole).max(initial=0.0)), 0.0
     error = reduce(np.add, parts) - whole
@@ -103,7 +104,7 @@ def residual(parts: list[Array], whole: Array) -> tuple[float, float]:
 
 
 def worst_of(pairs: list[tuple[float, float]]) -> tuple[float, float]:
-    """Largest error of (error, scale) pairs, absolute and relative to the largest scale."""
+    """Return the largest error of (error, scale) pairs, absolute and relative to the largest scale."""
     error, scale = np.max(np.array([(0.0, 0.0), *pairs]), axis=0).tolist()
     return error, error / scale if scale else error
 
@@ -111,11 +112,10 @@ def worst_of(pairs: list[tuple[float, float]]) -> tuple[float, float]:
 def against_recursion(
     robot: LoadedRobot, loads: Sequence[PlacedLoad], columns: tuple[Column, ...], block: Array
 ) -> Closure:
-    """τ_ij, P_ij, τ_ie of some samples of a block (columns, S) against Newton–Euler; none for energies.
+    """Return the errors of τ_ij, P_ij, τ_ie of some samples of a block (columns, S) against Newton–Euler.
 
-    Of what a motion slips at contacts, these feed energy to links, beside the joints.
-
-    Relative errors are by unit: a joint that carries nothing but rounding is measured by its peers.
+    There are none for robots of energies. Contacts at which a motion slips feed energy to links, beside the
+    joints. Relative errors are by unit: a joint that carries nothing but rounding is measured by its peers.
     """
     if robot.recursion is None:
         return Closure()
@@ -155,11 +155,11 @@ def against_recursion(
     for unit in set(robot.units):
         alike = [i for i, other in enumerate(robot.units) if other == unit]
         error = float(np.abs(ours - expected)[:, alike].max(initial=0.0))
-        # What contacts leave may be but the rounding of what they bear.
+        # What contacts leave may be only the rounding of what they carry.
         scale = float(max(np.abs(a).sum(axis=2)[:, alike].max(initial=0.0) for a in (expected, free)))
         absolute = max(absolute, error)
         relative = max(relative, error / scale if scale else error)
-        # Power that is but rounding is measured by the torques and speeds that it is the rounding of.
+        # Power that is only rounding is measured by the torques and speeds that it is made of.
         carried = float(np.abs(partial).sum(axis=2)[:, alike].max(initial=0.0))
         watts += carried * float(np.abs(qd[:, alike]).max(initial=0.0))
     apart = float(np.abs(power.sum(axis=1) + fed - _gain(robot.recursion, q, qd, qdd)).max(initial=0.0))
@@ -172,13 +172,16 @@ def against_recursion(
 
 
 def load_torque(recursion: NewtonEuler, borne: PlacedLoad, time: Array, q: Array) -> Array:
-    """τ_ie (S, n): minus the power that the load gives to the body where q̇_i = 1 and all else rests."""
+    """Return τ_ie (S, n), in N·m or N.
 
-    def pose(frame: FrameEntry, q: Array) -> Array:
+    It is minus the power that the load gives to the body where q̇_i = 1 and all else rests.
+    """
+
+    def pose(frame: TreeFrame, q: Array) -> Array:
         return recursion.poses([frame], q)[:, 0]
 
     force, moment, place = borne.wrench(time, q, pose)
-    seat = [(borne.seat.frame.body, np.zeros(3))]
+    seat = [(borne.seat.frame.joint, np.zeros(3))]
     arm = place - recursion.places(seat, q)[:, 0]
     out = np.zeros_like(q)
     for i in range(recursion.n):
@@ -189,7 +192,7 @@ def load_torque(recursion: NewtonEuler, borne: PlacedLoad, time: Array, q: Array
 
 
 def _gain(recursion: NewtonEuler, q: Array, qd: Array, qdd: Array) -> Array:
-    """dE_j/dt of K_j + P_j in W, (S, N): along the motion, by a complex step, which has no cancellation."""
+    """Return dE_j/dt of K_j + P_j in W, (S, N), along the motion: by a complex step, free of cancellation."""
     kinetic, potential = recursion.energies(q + 1j * STEP * qd, qd + 1j * STEP * qdd)
     gain: Array = (kinetic + potential).imag / STEP
     return gain

@@ -1,4 +1,4 @@
-"""Work: the integral of power over a movement, what was given and what was taken back apart."""
+"""Work: the integral of power over a movement, with what was given and what was taken back apart."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class WorkSum:
         self._last = self._sums
 
     def __call__(self, block: Array) -> None:
-        """Take a block (columns, samples)."""
+        """Add a block (columns, samples)."""
         power = block[self._rows]
         parts = np.stack([np.maximum(power, 0.0), np.maximum(-power, 0.0)])
         self._sums += parts.sum(axis=-1)
@@ -50,9 +50,9 @@ class WorkSum:
     def work(
         self, step: float, joints: int, links: int, loads: int, contacts: int
     ) -> tuple[Work, Work, Work, Work]:
-        """Work in J into each link (n, N), into all together (n,), against each load (n, loads).
+        """Return the work in J into each link (n, N), into all together (n,), against each load (n, loads).
 
-        And what contacts fed into links (N, contacts). Samples are `step` s apart.
+        The last of the four is what contacts fed into links (N, contacts). Samples are `step` s apart.
         """
         first = self._last if self._first is None else self._first
         energy = step * (self._sums - 0.5 * (first + self._last))

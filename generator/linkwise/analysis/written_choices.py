@@ -1,4 +1,4 @@
-"""Choices of an analysis as commands and studies have them written: numbers, names and short texts."""
+"""Choices of an analysis as written in commands and studies: numbers, names and short texts."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,10 @@ def chosen_processing(
     edges: Edges,
     convention: Convention = "closing",
 ) -> Processing:
-    """How velocities come about, by the flags; raises LinkwiseError for those of another derivative."""
+    """Return the choices of how velocities and accelerations are derived, by the flags.
+
+    Raises LinkwiseError for flags of another derivative.
+    """
     if derivative == "five-point" and (window, degree) != (None, None):
         raise LinkwiseError("--window and --degree go with --derivative savitzky-golay; add it")
     return Processing(
@@ -31,7 +34,10 @@ def chosen_processing(
 
 
 def chosen_lowpass(cutoff: float | None, order: int | None, padding: Padding | None) -> Lowpass | None:
-    """The filter that the flags ask for; raises LinkwiseError for flags of none."""
+    """Return the filter that the flags ask for, None without a cutoff.
+
+    Raises LinkwiseError for other flags of a filter without a cutoff.
+    """
     if cutoff is not None:
         return Lowpass(cutoff, 2 if order is None else order, padding or "odd")
     if (order, padding) != (None, None):
@@ -40,7 +46,10 @@ def chosen_lowpass(cutoff: float | None, order: int | None, padding: Padding | N
 
 
 def pairs(flag: str, given: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    """Columns and joints of a flag's COLUMN=JOINT; raises LinkwiseError for what is written otherwise."""
+    """Return the columns and joints of a flag's COLUMN=JOINT.
+
+    Raises LinkwiseError for text of another form.
+    """
     found = []
     for text in given:
         column, sign, joint = text.rpartition("=")
@@ -51,7 +60,10 @@ def pairs(flag: str, given: Sequence[str]) -> tuple[tuple[str, str], ...]:
 
 
 def carried(given: Sequence[str], robot: LoadedRobot) -> tuple[Payload, ...]:
-    """Payloads of [NAME:]BODY=MASS[,x,y,z]; raises LinkwiseError for what is written otherwise."""
+    """Return the payloads of [NAME:]BODY=MASS[,x,y,z].
+
+    Raises LinkwiseError for text of another form.
+    """
     found = []
     for text in given:
         where, sign, numbers = text.rpartition("=")
@@ -68,7 +80,10 @@ def carried(given: Sequence[str], robot: LoadedRobot) -> tuple[Payload, ...]:
 
 
 def constant_loads(given: Sequence[str], robot: LoadedRobot) -> tuple[Load, ...]:
-    """Loads of [NAME:]BODY=FX,FY,FZ[,MX,MY,MZ][@X,Y,Z]; raises LinkwiseError for another text."""
+    """Return the loads of [NAME:]BODY=FX,FY,FZ[,MX,MY,MZ][@X,Y,Z].
+
+    Raises LinkwiseError for text of another form.
+    """
     found = []
     for text in given:
         where, sign, numbers = text.rpartition("=")

@@ -1,4 +1,4 @@
-"""Whether a package is as generated: its files, what Python compiled of them, and its manifest."""
+"""Checks that a package is as generated: its files, the modules that Python compiled, and its manifest."""
 
 import re
 from collections.abc import Iterator
@@ -22,17 +22,20 @@ from linkwise.package.own_files import own_folder
 from linkwise.package.runtime_imports import of_copy, of_library
 
 TOLD = 3
-"""Faults that one line tells."""
+"""Number of faults that one line reports."""
 MARK = "\0"
 BODY = re.compile(
     r"^ {8}ParametricBody\(\n {12}(.*),\n {12}(.*),\n {12}lambda p: \(\n((?: {16}.*,\n)*) {12}\),\n",
     re.MULTILINE,
 )
-"""Link, parameters and values of a body in names.py."""
+"""Pattern of a body in names.py: its link, parameters and values."""
 
 
 def check_files(directory: Path, manifest: Manifest) -> list[Result]:
-    """Hold every file against its hash, and each compiled module against its source; links are faults."""
+    """Check every file against its hash, and each compiled module against its source.
+
+    Symbolic links are faults.
+    """
     wrong = [] if manifest.files else ["the manifest lists no files"]
     wrong += changed(directory, manifest.files)
     try:
@@ -53,7 +56,7 @@ def check_files(directory: Path, manifest: Manifest) -> list[Result]:
 
 
 def check_texts(directory: Path, manifest: Manifest) -> Result:
-    """Read every file that could run as text: nothing is imported or compiled that linkwise doesn't write."""
+    """Read as text every file that could run: nothing is imported or compiled that linkwise doesn't write."""
     wrong = foreign(directory, manifest)
     version = manifest.generator.get("linkwise")
     if not wrong and manifest.runtime.vendored and version != VERSION:
@@ -63,7 +66,7 @@ def check_texts(directory: Path, manifest: Manifest) -> Result:
 
 
 def check_manifest(package: Package) -> Result:
-    """Hold every entry of the manifest against the package itself, else against its checksum."""
+    """Check every entry of the manifest against the package itself, else against its checksum."""
     wrong = [
         *disagreements(package.manifest, package.module),
         *miscounted(package.directory, package.manifest),
@@ -73,7 +76,7 @@ def check_manifest(package: Package) -> Result:
 
 
 def check_made(package: Package) -> Result:
-    """Hold the files that linkwise makes alike of every manifest, where this version wrote it."""
+    """Check the files that follow from the manifest alone, if this version of linkwise wrote the package."""
     version = package.manifest.generator.get("linkwise")
     if version != VERSION:
         unchecked = "__init__.py, names.py, tree.py and what it carries of the runtime were not checked"
@@ -86,7 +89,7 @@ def check_made(package: Package) -> Result:
 
 
 def _added_or_missing(directory: Path, manifest: Manifest) -> Iterator[str]:
-    """Files of linkwise's own that a package must have and has not, or has and need not have."""
+    """Yield a fault for each file of linkwise's own that a package lacks, or has and does not need."""
     own = {
         path: of_library(path, (directory / path).read_text(encoding="utf-8"))
         for path in manifest.files
@@ -104,10 +107,11 @@ def _added_or_missing(directory: Path, manifest: Manifest) -> Iterator[str]:
 
 
 def _made_otherwise(package: Package) -> Iterator[str]:
-    """Which of __init__.py, names.py and tree.py differ from the texts that the manifest's entries give.
+    """Yield those of __init__.py, names.py and tree.py that differ from the texts given by the manifest.
 
-    The manifest does not have the docstring's lines on what parameters mean, which may be any; nor the
-    expressions of bodies and the links with terms linear in the velocities, which are held by what they give.
+    The manifest has neither the docstring's lines on the meaning of parameters, which may be any, nor the
+    expressions of bodies and the links with terms linear in the velocities, which are checked by their
+    values.
     """
     directory, manifest, robot = package.directory, package.manifest, package.module.ROBOT
     chosen = [backend for name, backend in backends_of(manifest.kernel).items() if name in package.backends]

@@ -1,4 +1,4 @@
-"""The table of what is held of each back end."""
+"""Table of the checks of each back end."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.check.compare import Result
-from linkwise.check.frame_reference import frame_calls
+from linkwise.check.constraint_checks import loop_calls
+from linkwise.check.derivations import recorded_parts
+from linkwise.check.frame_checks import frame_calls
 from linkwise.check.impedance_checks import impedance_calls
 from linkwise.check.induced_checks import induced_calls
-from linkwise.check.loop_checks import loop_calls
 from linkwise.check.model_calls import Named, against_reference
-from linkwise.check.passive_reference import passive_calls
-from linkwise.check.recorded_parts import recorded_parts
-from linkwise.check.regressor_reference import regressor_calls
+from linkwise.check.passive_checks import passive_calls
+from linkwise.check.regressor_checks import regressor_calls
 from linkwise.check.simulation_checks import simulation_calls
 from linkwise.check.subject import Subject, Way, there
 from linkwise.check.sum_checks import sums_against_reference
@@ -21,14 +21,14 @@ from linkwise.check.sum_checks import sums_against_reference
 
 @dataclass(frozen=True)
 class Check:
-    """Calls of a back end that are held against one thing.
+    """Calls of a back end that are compared with one reference.
 
-    title: what is told where the check itself does not come to its end
-    run: its results, from the subject, the back end's label and its model
-    by_rule: whether it concerns the vectorised rule too; what is composed of answers that both kernels were
-    held against does not
-    composed: whether its calls are put together from coefficients and torques alike for every back end
-    of: of which subjects and back ends it is
+    title: reported where the check itself does not run to its end
+    run: yields the results, given the subject, the back end's label and its model
+    by_rule: whether the check also concerns the vectorised rule; it does not where calls are composed of
+    answers that were checked for both kernels
+    composed: whether its calls are composed of coefficients and torques alike for every back end
+    of: whether the check applies to a subject and a back end
     """
 
     title: str
@@ -38,7 +38,7 @@ class Check:
     of: Callable[[Subject, Way], bool] = lambda subject, way: True
 
     def concerns(self, subject: Subject, way: Way) -> bool:
-        """Whether this back end of this package has such calls."""
+        """Return whether this back end of this package has such calls."""
         return (self.by_rule or way.kernel != "rule") and self.of(subject, way)
 
 
@@ -102,4 +102,4 @@ CHECKS = (
         lambda s, name, model: impedance_calls(name, model, s.tree, s.reference, s.package.module.Natural),
     ),
 )
-"""What is held of each back end, in the order in which it is told."""
+"""Checks of each back end, in the order in which they are reported."""

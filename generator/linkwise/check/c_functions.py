@@ -1,4 +1,4 @@
-"""Every function that a package's C must have, in double and float, against the reference."""
+"""Checks of every function that a package's C must have, in double and float, against the reference."""
 
 import math
 import re
@@ -10,16 +10,30 @@ from pathlib import Path
 import numpy as np
 
 from linkwise.check.c_headers import wrong_header
-from linkwise.check.compare import Entries, Result, compare, is_short_of_memory, skipped
+from linkwise.check.compare import (
+    Entries,
+    IndexRows,
+    Result,
+    Rows,
+    compare,
+    is_short_of_memory,
+    packed,
+    skipped,
+)
 from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype
-from linkwise.check.control_functions import CONTROL, control_calls, control_prototypes
-from linkwise.check.frame_reference import FrameReference
-from linkwise.check.impedance_functions import NOT_CALLED, impedance_calls, impedance_prototypes
+from linkwise.check.control_functions import (
+    CONTROL,
+    NOT_CALLED,
+    control_calls,
+    control_prototypes,
+    impedance_calls,
+    impedance_prototypes,
+)
+from linkwise.check.frame_checks import FrameReference
 from linkwise.check.model_calls import FLOAT32
-from linkwise.check.packed_layout import IndexRows, Rows, packed
-from linkwise.check.reference import Reference, dense_quantities
-from linkwise.check.states import NUMBERS
 from linkwise.errors import LinkwiseError
+from linkwise.oracle.reference import Reference, dense_quantities
+from linkwise.oracle.states import NUMBERS
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
@@ -37,26 +51,27 @@ DENSE = {
     "gradient_propagation": (("c2 qdd", "slopes qd", "g"), ("acceleration", "velocity", "gravity")),
     "dense_position_gradient": (("c0",), ("gradient",)),
 }
-"""Functions whose results have their zeros: what these are, and what the header calls them."""
+"""Functions whose results include zeros: their quantities, and the names of these in the header."""
 
 REGRESSORS = {
     "regressor": (("Y",), ("regressor",)),
     "coefficient_regressors": (("Y c2", "Y c1", "Y g"), ("acceleration", "velocity", "gravity")),
 }
-"""The same of functions that robots of rigid links have."""
+"""Functions of robots of rigid links alone whose results include zeros: quantities, and names in the
+header."""
 
 AT_REST = ("coefficients", "coefficient_regressors")
 """Functions that take no qdd."""
 
 MOST = 16
-"""Samples that functions of a large robot are called for at once: one block, and rows that fill none."""
+"""Most samples in one call of a function of a large robot: one block, or rows that fill none."""
 MANY = 192
-"""Bytes for each result of a sample that still count as few: 24 samples in double, 48 in float."""
+"""Bytes per result of a sample up to which results count as few: 24 samples in double, 48 in float."""
 
 
 @dataclass(frozen=True)
 class References:
-    """What functions are held against; links of energies have no regressors and no frames."""
+    """References that functions are compared with; links of energies have no regressors and no frames."""
 
     reference: Reference
     regressors: Reference | None
@@ -64,7 +79,7 @@ class References:
 
 
 class CFunctions:
-    """A package's compiled C for given parameters, beside the indices of what it answers with."""
+    """A package's compiled C for given parameters, and the indices of its results."""
 
     def __init__(
         self, manifest: Manifest, compiled: CompiledPackage, rows: IndexRows, parameters: Mapping[str, float]
@@ -75,7 +90,7 @@ class CFunctions:
         self.functions = prototypes(manifest, rows)
 
     def torque(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Dense τ_ij (samples, n, N) of the function for torques alone, in double."""
+        """Return dense τ_ij (samples, n, N) from the C function for torques alone, in double."""
         function = next(f for f in self.functions if f.name == "torque")
         given = {"q": q, "qd": qd, "qdd": qdd, "p": self.parameters}
         found = self.compiled.call(function, len(q), given, {"tau": len(q) * len(self.rows.tau)}, 0)
@@ -85,7 +100,7 @@ class CFunctions:
         return dense
 
     def check(self, label: str, references: References) -> Iterator[Result]:
-        """One result a function; `label` stands before its name."""
+        """Yield one result per function; `label` stands before its name."""
         reference = references.reference
         for function in self.functions:
             symbol = f"{self.manifest.name}_{function.name}"
@@ -110,7 +125,7 @@ class CFunctions:
                 yield Result(name, False, None, f"{error.args[0]} wrote beyond its arrays")
 
     def _calls(self, function: Prototype, reference: Reference) -> Iterator[Entries]:
-        """Calls of a function for several numbers of samples, its outputs on a cache line and off it."""
+        """Yield results of a function for several numbers of samples, outputs on a cache line and off it."""
         link = re.fullmatch(r"link_(\d+)", function.short)
         if link:
             yield from self._link(function, reference, int(link[1]) - 1)
@@ -146,7 +161,7 @@ class CFunctions:
     def _dense(
         self, function: Prototype, reference: Reference, expected: Mapping[str, tuple[Array, Array]]
     ) -> Iterator[Entries]:
-        """Calls of a function whose results have their zeros."""
+        """Yield results of a function whose results include zeros."""
         what, names = (DENSE | REGRESSORS)[function.short]
         shapes = [expected[quantity][0].shape[1:] for quantity in what]
         most = max(1, NUMBERS // max(map(math.prod, shapes)))
@@ -187,11 +202,11 @@ class CFunctions:
 
 
 class _OutOfBounds(Exception):
-    """A function wrote beyond its arrays."""
+    """Error of a function that wrote beyond its arrays."""
 
 
 def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
-    """The functions that a package's header must declare, by the manifest's links and parameters."""
+    """Return the functions that a package's header must declare, by the manifest's links and parameters."""
     inputs = ("q", "qd", "qdd", *(["p"] if manifest.parameters else []))
     every = tuple(what for what in OUTPUTS if len(rows.of(what)))
     rigid = REGRESSORS if manifest.tree is not None else {}
@@ -219,14 +234,15 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
 
 
 def _inputs(name: str, every: tuple[str, ...]) -> tuple[str, ...]:
-    """Arrays that a function reads: coefficients do not depend on qdd."""
+    """Return the arrays that a function reads: coefficients do not depend on qdd."""
     return tuple(what for what in every if name not in AT_REST or what != "qdd")
 
 
 def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[CompiledPackage | None, Result]:
-    """Compile a package's C, and hold what its headers say against the manifest's paths.
+    """Compile a package's C, and check its headers against the manifest's paths.
 
-    That is every number, every index, and every function with its arguments, by name.
+    The check covers every number, every index, and every function with its arguments, by name. Returns None
+    in place of the C where it cannot be compiled.
     """
     results = sum(len(rows.of(what)) for what in ("c2", "c1", "g", "tau", "h1"))
     try:
@@ -242,5 +258,5 @@ def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[Com
 
 
 def _blocks(motion: Array, width: int) -> Array:
-    """Samples (count, n) in blocks of `width`, samples innermost; rows for a width of 1."""
+    """Return samples (count, n) in blocks of `width`, samples innermost; rows for a width of 1."""
     return motion.reshape(-1, width, motion.shape[-1]).swapaxes(1, 2)

@@ -1,4 +1,4 @@
-"""What the headers of a package's C say beside its functions' bodies, held against the manifest."""
+"""Checks of the headers of a package's C, bodies of functions aside, against the manifest."""
 
 import math
 import re
@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from linkwise.check.compare import IndexRows
 from linkwise.check.compiled_c import CompiledPackage, Prototype, declared
-from linkwise.check.packed_layout import IndexRows
 from linkwise.escape import identifiers
 from linkwise.package.manifest import Manifest
 
 LIMITS = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
-"""Arrays of the joints' limits, and what stands for none."""
+"""Arrays of the joints' limits, and the value that stands for no limit."""
 
 
 def wrong_header(
@@ -23,7 +23,7 @@ def wrong_header(
     rows: IndexRows,
     functions: Iterable[Prototype],
 ) -> str:
-    """The first number, index, name, limit or function that is not as the manifest says; empty if none."""
+    """Return the first number, index, name, limit or function unlike the manifest's; empty if none."""
     return (
         _wrong_number(manifest, compiled, rows)
         or _wrong_table(manifest, directory, rows)
@@ -77,7 +77,7 @@ def _wrong_function(name: str, header: str, functions: Iterable[Prototype]) -> s
 
 
 def _wrong_joint(manifest: Manifest, header: str) -> str:
-    """What is wrong of the joints' names and limits."""
+    """Return what is wrong with the joints' names and limits; empty if nothing."""
     size = rf"\[{re.escape(manifest.name.upper())}_JOINTS\] = \{{(.*?)\}};"
     named = re.search(rf"\b{re.escape(manifest.name)}_joint_names{size}", header, re.DOTALL)
     names = [_decoded(text) for text in re.findall(r'"((?:[^"\\]|\\.)*)"', named[1])] if named else []
@@ -93,6 +93,6 @@ def _wrong_joint(manifest: Manifest, header: str) -> str:
 
 
 def _decoded(text: str) -> str:
-    """What a literal of C says, whose only escapes are octal ones of UTF-8."""
+    """Return the text of a C string literal whose only escapes are octal ones of UTF-8."""
     plain = re.sub(r"\\([0-7]{3})", lambda found: chr(int(found[1], 8)), text)
     return plain.encode("latin-1", "replace").decode("utf-8", "replace")

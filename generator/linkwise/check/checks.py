@@ -17,14 +17,13 @@ from linkwise_runtime.native.native_system import system_here
 from linkwise.check.as_generated import check_files, check_made, check_manifest, check_texts
 from linkwise.check.back_end_checks import CHECKS
 from linkwise.check.c_functions import CFunctions, References, compile_c
-from linkwise.check.compare import Result, is_short_of_memory, skipped
+from linkwise.check.compare import IndexRows, Result, is_short_of_memory, skipped
 from linkwise.check.derivations import derivations
 from linkwise.check.formula_texts import check_formulas
-from linkwise.check.packed_layout import IndexRows
 from linkwise.check.parametric_tree import changed_values, check_bodies
-from linkwise.check.reference import Reference
-from linkwise.check.states import affordable
 from linkwise.check.subject import Subject, Way, long_enough
+from linkwise.oracle.reference import Reference
+from linkwise.oracle.states import affordable
 from linkwise.own_process import Ended, begun
 from linkwise.package.load import Package, load_package, staying
 from linkwise.package.manifest import Manifest
@@ -37,18 +36,24 @@ LARGE = (
     "graphs of links that many joints carry; what cuts batches and records graphs is alike for all robots"
 )
 SAMPLES = 100
-"""Random states, where none are asked for."""
+"""Number of random states, unless another is asked for."""
 LEAST = 10
-"""States below which nothing is proved of energies that are not defined everywhere."""
+"""Number of states below which nothing is proved of energies that are not defined everywhere."""
 
 
 def check_package(directory: Path, samples: int = SAMPLES) -> list[Result]:
-    """Run every check on a package; raises LinkwiseError when `directory` holds none that can be read."""
+    """Run every check on a package and return the results.
+
+    Raises LinkwiseError when `directory` holds no package that can be read.
+    """
     return list(results_of(directory, samples))
 
 
 def results_of(directory: Path, samples: int = SAMPLES) -> Iterator[Result]:
-    """The same, each result as soon as it is there."""
+    """Yield the results of every check on a package, each as soon as it is there.
+
+    Raises LinkwiseError when `directory` holds no package that can be read.
+    """
     manifest = Manifest.read(directory)
     files = check_files(directory, manifest)
     yield from files
@@ -79,7 +84,7 @@ def results_of(directory: Path, samples: int = SAMPLES) -> Iterator[Result]:
 
 
 def _compile(package: Package) -> None:
-    """Make the libraries of `native` beside other work; that there are none is told when it is called."""
+    """Compile the libraries of `native` beside other work; a failure is reported when they are needed."""
     sources = Sources(package.manifest.name, package.directory / "c")
     with suppress(RuntimeError), open(os.devnull, "w") as nobody, redirect_stderr(nobody):
         for real, what in product(("double", "float"), PARTS):
@@ -109,7 +114,7 @@ def _load(package: Package) -> tuple[dict[Way, Dynamics], list[Result]]:
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Let torch compute in one thread where it is loaded: of few samples, others only wait."""
+    """Let torch compute in one thread if it is loaded: with few samples, further threads only wait."""
     torch = sys.modules.get("torch")
     if torch is None:
         yield
@@ -123,7 +128,7 @@ def _one_thread() -> Iterator[None]:
 
 
 def _lacks(error: Exception) -> bool:
-    """Whether a library, a compiler, a place to compile or stack is missing here: not the package's fault."""
+    """Return whether a library, compiler, place to compile or stack is missing: not the package's fault."""
     if is_short_of_memory(error):
         return True
     if isinstance(error, ImportError):
@@ -134,7 +139,7 @@ def _lacks(error: Exception) -> bool:
 
 
 def _numbers(package: Package, loaded: Mapping[Way, Dynamics], samples: int) -> Iterator[Result]:
-    """Everything for the parameters as generated, and, where there are some, for others too."""
+    """Yield all results for the parameters as generated and, if there are any, for other values too."""
     manifest = package.manifest
     rows = IndexRows.of_paths([link.path for link in manifest.links], package.module.ROBOT.linear)
     compiled = None
@@ -148,7 +153,7 @@ def _numbers(package: Package, loaded: Mapping[Way, Dynamics], samples: int) -> 
     values = dict(manifest.parameters)
     yield from _results(Subject(package, "", values, loaded, rows, compiled, count))
     if values:
-        # Every parameter changed a little: equal ones tell no longer one from another, and none is zero.
+        # Every parameter changed a little, so that no two are equal and none is zero.
         values = changed_values(manifest.parameters, manifest.tree)
         loaded = {way: package.load(way.backend, values, way.kernel) for way in loaded}
         others = ", other parameters"
@@ -156,7 +161,7 @@ def _numbers(package: Package, loaded: Mapping[Way, Dynamics], samples: int) -> 
 
 
 def _results(subject: Subject) -> Iterator[Result]:
-    """The bodies, the texts, the C, and every back end."""
+    """Yield the results of the bodies, the texts, the C, and every back end."""
     manifest, label = subject.package.manifest, subject.label
     if manifest.tree is not None and subject.parameters:
         unphysical = bool(manifest.request.get("allow_unphysical"))
@@ -177,7 +182,7 @@ def _results(subject: Subject) -> Iterator[Result]:
     if reference.is_large:
         yield skipped(f"parts of the checks{label}", LARGE)
     functions, wrong = subject.functions, False
-    # A wrong function of C may write anywhere: in a process of its own, beside the back ends but native.
+    # A wrong function of C may write anywhere: it runs in its own process, beside all back ends but native.
     calls = begun(_c_calls(functions, f"c{label}", subject), long_enough()) if functions else list
     for way, model in sorted(subject.loaded.items(), key=lambda item: item[0].backend == "native"):
         name = f"{way.label}{label}"
@@ -186,7 +191,7 @@ def _results(subject: Subject) -> Iterator[Result]:
             wrong = any(result.failed for result in results)
             yield from results
         if way.backend == "native" and wrong:
-            # What writes beyond its arrays takes the interpreter with it.
+            # C that writes beyond its arrays would crash the interpreter.
             yield skipped(f"{name}: not called", "its C is wrong, see above")
             continue
         for check in CHECKS:
@@ -204,13 +209,13 @@ def _results(subject: Subject) -> Iterator[Result]:
 
 
 def _guarded(title: str, results: Iterator[Result]) -> Iterator[Result]:
-    """Results up to where a check breaks off, and that it did: the others are made all the same.
+    """Yield results up to where a check breaks off, and then one that reports so: other checks still run.
 
-    Each is computed by itself, for what holds while it is must not hold for whoever takes it.
+    Each result is computed by itself, since the settings used meanwhile must not reach whoever receives it.
     """
     while True:
         try:
-            # Energies of a user's own need not be defined everywhere.
+            # A user's energies need not be defined everywhere.
             with staying(), np.errstate(all="ignore"), _one_thread():
                 result = next(results, None)
         except Exception as error:
@@ -225,7 +230,7 @@ def _guarded(title: str, results: Iterator[Result]) -> Iterator[Result]:
 
 
 def _told(name: str, reference: Reference | None, tried: int, samples: int) -> Iterator[Result]:
-    """What is to be known of energies that a user wrote: what they are held against, and where."""
+    """Yield remarks on energies that a user wrote: what they are compared with, and at how many states."""
     if not find_spec("torch"):
         own = "a user's own, and no torch here to differentiate them: its own torques are what counts"
         yield skipped(f"{name}: not held against their text", own)
@@ -238,13 +243,13 @@ def _told(name: str, reference: Reference | None, tried: int, samples: int) -> I
 
 
 def _c_calls(functions: CFunctions, name: str, subject: Subject) -> Callable[[], list[Result]]:
-    """What each function of the C gives, when called."""
+    """Return a call that gives the results of each function of the C."""
     references = References(subject.reference, subject.regressors, subject.frames)
     return lambda: list(functions.check(name, references))
 
 
 def _c_results(calls: Callable[[], list[Result]], name: str) -> list[Result]:
-    """The same, where nothing ends its process."""
+    """Return the results of the C functions, or a failed one where their process ended."""
     try:
         return calls()
     except Ended as ended:

@@ -1,14 +1,14 @@
-"""Entries against a reference: each value by its own size, or by the rounding of what it is summed from."""
+"""Comparison with a reference: each value by its own size, or by the rounding of what it is summed from."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwise.check.reference import TOLERANCE, Reference
+from linkwise.oracle.reference import TOLERANCE, Reference
 from linkwise.package.load import Array
 
 ROUNDINGS = 10.0
@@ -16,17 +16,17 @@ ROUNDINGS = 10.0
 
 
 SHORT_OF_MEMORY = ("allocate memory", "failed to map segment")
-"""In errors of torch, and of the system where it loads a library."""
+"""Words for too little memory in errors of torch, and of the system where it loads a library."""
 BLOCK = 1 << 20
 """Entries compared at a time."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """One check: its name, whether it held, the largest error (None: not a number's matter), and a line.
+    """Result of a check: its name, whether it held, the largest error (None: not numerical), and a line.
 
-    held is None for what could not be checked here, which speaks neither for the package nor against it;
-    the line says why.
+    held is None for what could not be checked here, which speaks neither for the package nor against it; the
+    line says why.
     """
 
     name: str
@@ -36,24 +36,24 @@ class Result:
 
     @property
     def failed(self) -> bool:
-        """Whether the package is wrong."""
+        """True if the package is wrong."""
         return self.held is False
 
     @property
     def mark(self) -> str:
-        """Return ok, FAIL or skip."""
+        """Mark of the result: ok, FAIL or skip."""
         return {True: "ok", False: "FAIL", None: "skip"}[self.held]
 
 
 def skipped(name: str, reason: str) -> Result:
-    """What could not be checked, and why."""
+    """Return the result of a check that could not be made here, and why."""
     return Result(name, None, None, reason)
 
 
 def is_short_of_memory(error: Exception) -> bool:
-    """Whether there was too little of it for an array, for one of torch's or for a library.
+    """Return whether an error means too little memory for an array, a tensor of torch or a library.
 
-    These say so as RuntimeError, OSError and ImportError; any other may quote such words from a package.
+    The latter two raise RuntimeError, OSError and ImportError; any other may quote such words from a package.
     """
     if isinstance(error, RuntimeError | OSError | ImportError):
         return any(words in str(error) for words in SHORT_OF_MEMORY)
@@ -62,9 +62,9 @@ def is_short_of_memory(error: Exception) -> bool:
 
 @dataclass(frozen=True)
 class Entries:
-    """Values beside those expected, samples first; scale: size of the numbers that each is the sum of.
+    """Values beside the expected ones, samples first; scale: size of the numbers that each is the sum of.
 
-    rows: of packed values (samples, count), the indices (count, 2 or 3) that they are told by, from 0
+    rows: for packed values (samples, count), the indices (count, 2 or 3) that they are reported by, from 0
     """
 
     what: str
@@ -77,11 +77,11 @@ class Entries:
 def compare(
     name: str, groups: Iterable[Entries], tolerance: float = TOLERANCE, epsilon: float = 2.0**-52
 ) -> Result:
-    """Hold groups of entries against what is expected of them, and report the worst.
+    """Compare groups of entries with their expected values, and return the worst as a result.
 
-    A value's error is relative to the value itself; where that is next to nothing, an error as large as what
-    rounding leaves of its operands, ROUNDINGS · epsilon · scale, passes just so. Where there are no entries,
-    nothing is held.
+    A value's error is relative to the value itself; where that is next to nothing, an error as large as the
+    rounding of its operands, ROUNDINGS · epsilon · scale, just passes. Without any entries the check is
+    skipped.
     """
     worst, place, compared = 0.0, "", False
     for entries in groups:
@@ -118,7 +118,7 @@ def compare(
 
 
 def _blocks(shape: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
-    """Parts of an array along its second axis, so that no more than BLOCK entries are compared at a time."""
+    """Yield parts of an array along its second axis, so that at most BLOCK entries are compared at a time."""
     if len(shape) < 2:
         yield (slice(None),)
         return
@@ -128,5 +128,60 @@ def _blocks(shape: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
 
 
 def dense(what: str, value: Array, reference: Reference, rows: Any = slice(None)) -> Entries:
-    """A dense quantity of some of the reference's samples."""
+    """Return a dense quantity beside that of some of the reference's samples."""
     return Entries(what, value, reference.values[what][rows], reference.scales[what][rows])
+
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class IndexRows:
+    """Indices (i, j, k) of every packed c2, c1 and h1, and (i, j) of every tau and g, in order."""
+
+    c2: Rows
+    c1: Rows
+    tau: Rows
+    h1: Rows
+
+    @classmethod
+    def of_paths(cls, paths: Sequence[Sequence[int]], linear: Sequence[int]) -> "IndexRows":
+        """Return indices by link, then i, then k along the path.
+
+        c2 has k from i on only, h1 the links in `linear` only.
+        """
+        c1 = [(i, j, k) for j, path in enumerate(paths) for i in path for k in path]
+        return cls(
+            _table([row for row in c1 if row[0] <= row[2]], 3),
+            _table(c1, 3),
+            _table([(i, j) for j, path in enumerate(paths) for i in path], 2),
+            _table([row for row in c1 if row[1] in linear], 3),
+        )
+
+    def of(self, what: str) -> Rows:
+        """Return the indices of a quantity."""
+        return {"c2": self.c2, "c1": self.c1, "c0": self.c1, "tau": self.tau, "g": self.tau, "h1": self.h1}[
+            what
+        ]
+
+    def fields(self, packed: Any) -> dict[str, Array]:
+        """Return the fields of `packed` by quantity; h1 only where there is any."""
+        named = dict(zip(("c2", "c1", "g", "tau", "h1"), packed, strict=True))
+        return (
+            named if len(self.h1) or np.shape(named["h1"])[-1] else {k: named[k] for k in named if k != "h1"}
+        )
+
+
+def packed(what: str, value: Any, rows: Rows, reference: Reference, at: Rows) -> Entries:
+    """Return packed values (..., count) beside the reference's; `at` (...) gives the sample of each."""
+    value = np.asarray(value)
+    picked, scale = (
+        source[what][(at.reshape(-1, 1), *rows.T)] for source in (reference.values, reference.scales)
+    )
+    if value.shape != (*at.shape, len(rows)):
+        return Entries(what, value, np.empty((*at.shape, len(rows))), scale)
+    return Entries(what, value.reshape(picked.shape), picked, scale, rows)
+
+
+def _table(rows: Sequence[Sequence[int]], width: int) -> Rows:
+    return np.array(rows, dtype=np.intp).reshape(-1, width)

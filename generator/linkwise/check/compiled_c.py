@@ -1,4 +1,4 @@
-"""A package's C, compiled here and called through the functions that there must be."""
+"""A package's C, compiled here and called through the functions that it must have."""
 
 import ctypes
 import re
@@ -20,10 +20,10 @@ from linkwise.errors import LinkwiseError
 Numbers = NDArray[Any]
 
 FLAGS = ("-std=c99", "-O0")
-"""As quick to compile as can be; the native back end, held against the same, has its own."""
+"""Flags for quick compilation; the native back end, compared with the same reference, has its own."""
 
 GUARD = 4096
-"""Bytes before and behind each output, which nothing may write to."""
+"""Bytes before and after each output, which nothing may write to."""
 LINE = 64
 """Bytes of a cache line; half of the calls write to arrays that start on one."""
 
@@ -32,8 +32,8 @@ LINE = 64
 class Prototype:
     """A function of the header: its name without the package's, its number type, and its arrays in order.
 
-    counted: name of the argument that says how many samples or blocks, or which frame; empty for none
-    kinds: inputs that are not of the number type, and what they are
+    counted: name of the argument that gives the number of samples or blocks, or the frame; empty for none
+    kinds: inputs that are not of the number type, and their types
     """
 
     name: str
@@ -45,7 +45,7 @@ class Prototype:
     kinds: tuple[tuple[str, str], ...] = ()
 
     def declaration(self, package: str) -> str:
-        """Its prototype, on one line."""
+        """Return the prototype on one line."""
         kind = "int" if self.counted == "frame" else "size_t"
         counts = [f"{kind} {self.counted}"] if self.counted else []
         kinds = dict(self.kinds)
@@ -55,7 +55,7 @@ class Prototype:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """NumPy's word for its number type."""
+        """NumPy's data type for its numbers."""
         return np.dtype(np.float32 if self.real == "float" else np.float64)
 
     @property
@@ -67,11 +67,15 @@ class Prototype:
 class CompiledPackage:
     """The functions of a package's NAME.c and NAMEf.c; arrays in, arrays out, guards around every output.
 
-    large: bytes of results above which they go past the cache, far fewer here, so that this way is tried.
+    large: bytes of results above which they bypass the cache, far fewer here, so that this path is tried
     """
 
     def __init__(self, name: str, directory: Path, large: int) -> None:
-        """Raise LinkwiseError for sources that do not compile, RuntimeError where none do or none can run."""
+        """Compile and load the C of a package.
+
+        Raises LinkwiseError for sources that do not compile, RuntimeError where none can be compiled or run
+        here.
+        """
         require_stack(name, directory)
         self.header = (directory / f"{name}.h").read_text(encoding="utf-8")
         self.name = name
@@ -91,10 +95,10 @@ class CompiledPackage:
         sizes: Mapping[str, int],
         shift: int,
     ) -> dict[str, Numbers] | None:
-        """Outputs of the given sizes, flat; None where the function wrote beyond one of them.
+        """Return outputs of the given sizes, flat; None where the function wrote beyond one of them.
 
         count: samples, blocks or a frame's number; given: arrays by name, None for NULL
-        shift: numbers between a cache line and where each output starts
+        shift: how many numbers each output starts behind a cache line
         """
         read = [given[name] for name in function.inputs]
         inputs = [None if a is None else np.ascontiguousarray(a, function.dtype) for a in read]
@@ -112,7 +116,7 @@ class CompiledPackage:
 
 
 class _Guarded:
-    """An array of NaN between two stretches of memory that must stay as they are."""
+    """An array of NaN between two stretches of memory that must stay unchanged."""
 
     def __init__(self, size: int, dtype: np.dtype[Any], shift: int) -> None:
         self._memory = np.full(2 * GUARD + LINE + (size + shift) * dtype.itemsize, 0xA5, np.uint8)
@@ -123,7 +127,7 @@ class _Guarded:
 
     @property
     def whole(self) -> bool:
-        """Whether nothing outside the array was written to."""
+        """True if nothing outside the array was written to."""
         around = self._memory[: self._inside.start], self._memory[self._inside.stop :]
         return all(bool((outside == 0xA5).all()) for outside in around)
 
@@ -134,14 +138,14 @@ def _constants(name: str, header: str) -> dict[str, int]:
 
 
 def declared(name: str, header: str) -> dict[str, str]:
-    """What a header says of each of the package's functions, on one line, by the name in C."""
+    """Return the declaration of each of the package's functions in a header, on one line, by name in C."""
     code = " ".join(re.sub(r'/\*.*?\*/|"[^"\n]*"', " ", header, flags=re.DOTALL).split())
     found = re.finditer(rf"[^;{{}}]*\b({re.escape(name)}_\w+) *\([^;]*;", code)
     return {statement[1]: statement[0].strip() for statement in found}
 
 
 def _compile(compiler: Compiler, sources: Sequence[Path], library: Path, large: int) -> None:
-    """Both number types side by side, then one library of them."""
+    """Compile both number types side by side, then link them into one library."""
     flags = (*FLAGS, *compiler.tuning, *compiler.anywhere)
     objects = [library.with_name(f"{source.name}.o") for source in sources]
     commands = [

@@ -1,4 +1,4 @@
-"""Functions of C for one sample: frames, mass matrix, forward dynamics, joints' own torques."""
+"""Checks of C functions for one sample: frames, mass matrix, forward dynamics, passive torques, impedance."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -7,11 +7,11 @@ import numpy as np
 
 from linkwise.check.compare import Entries
 from linkwise.check.compiled_c import Numbers, Prototype
-from linkwise.check.frame_reference import FrameReference
-from linkwise.check.passive_reference import passive_reference
-from linkwise.check.reference import Reference
-from linkwise.check.states import States
+from linkwise.check.frame_checks import FrameReference
+from linkwise.check.passive_checks import SHARES, passive_reference
 from linkwise.check.sum_checks import REGULAR, SINGLE, acceleration_scales, regular
+from linkwise.oracle.reference import Reference
+from linkwise.oracle.states import States
 from linkwise.package.entries import PassiveEntry
 from linkwise.package.manifest import Manifest
 
@@ -24,17 +24,17 @@ CONTROL = {
     "forward_dynamics": ("", (), ("q", "qd", "tau"), "qdd"),
     "forward_dynamics_of_links": ("", (), ("q", "qd", "tau"), "qdd"),
 }
-"""Functions by name: what is asked for by number, what stands before the motion, that motion, the output."""
+"""Functions by name: the argument that is a number, the inputs before the motion, the motion, the output."""
 
 MOST = 8
-"""States that each function is called at."""
+"""Most states that each function is called at."""
 
 Call = Callable[..., dict[str, Numbers]]
-"""A function, its number, what it is given, sizes of its outputs, and their place beside a cache line."""
+"""Call of a function with its number, its inputs, sizes of its outputs, and their shift from a cache line."""
 
 
 def control_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Prototype]:
-    """These functions of one number type: those that the robot's links and joints have a use for."""
+    """Return the functions of CONTROL, in one number type, that apply to the robot's links and joints."""
     parameters = ("p",) if manifest.parameters else ()
     return [
         Prototype(
@@ -51,7 +51,10 @@ def control_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Proto
 
 
 def _has(manifest: Manifest, name: str) -> bool:
-    """Joints that are tied move as their open tree does not; most have nothing of their own."""
+    """Return whether a package has a function of CONTROL.
+
+    Tied joints do not move as those of their open tree do; most joints have no passive torques.
+    """
     tree = manifest.tree
     if tree is None or (tree.tied and name.startswith("forward_dynamics")):
         return False
@@ -61,7 +64,7 @@ def _has(manifest: Manifest, name: str) -> bool:
 def control_calls(
     call: Call, function: Prototype, manifest: Manifest, reference: Reference, frames: FrameReference | None
 ) -> Iterator[Entries]:
-    """Calls of one of these functions."""
+    """Yield results of one of these functions."""
     passive = manifest.tree.passive if manifest.tree is not None else ()
     if function.short == "mass_matrix":
         yield from _masses(call, function, reference)
@@ -100,7 +103,7 @@ def _passive_torques(
 def _accelerations(
     call: Call, function: Prototype, reference: Reference, joints: Sequence[PassiveEntry]
 ) -> Iterator[Entries]:
-    """Accelerations of the reference's torques, and of those of `joints`."""
+    """Yield accelerations under the reference's torques and the passive torques of `joints`."""
     least = SINGLE if function.real == "float" else REGULAR
     for row in _some(np.flatnonzero(regular(reference, least))):
         state = reference.states.at(np.array([row]))
@@ -130,7 +133,7 @@ def _poses(
 def _of_points(
     call: Call, function: Prototype, numbers: dict[str, int], frames: FrameReference
 ) -> Iterator[Entries]:
-    """Jacobians or their rates; a point at the origin may also be NULL."""
+    """Yield Jacobians or their rates; a point at the origin may also be NULL."""
     what = function.outputs[0]
     value, scale = getattr(frames, what)
     n = frames.states.q.shape[-1]
@@ -145,3 +148,58 @@ def _of_points(
             yield Entries(f"{what} of {frame}", found(point), value[row, f][None], scale[row, f][None])
             origin = found(np.zeros(3))
             yield Entries(f"{what} of {frame} without a point", found(None), origin, scale[row, f][None])
+
+
+TARGETS = ("q_d", "qd_d", "qdd_d")
+FRAME_TARGETS = ("pose_d", "velocity_d", "acceleration_d")
+
+NOT_CALLED = "frame_partial_impedance"
+"""Function that takes more than arrays: only its declaration and its presence are checked."""
+
+
+def impedance_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Prototype]:
+    """Return impedance functions of one number type: of free joints, and of frames of rigid links."""
+    tree, kind = manifest.tree, f"{manifest.name}_impedance{suffix}"
+    if tree is not None and tree.tied:
+        return []
+    state = ("q", "qd", *(["p"] if manifest.parameters else []))
+    joints = Prototype(
+        f"partial_impedance{suffix}",
+        real,
+        "",
+        (*state, "wanted", *TARGETS, "task", "external"),
+        ("tau",),
+        "int",
+        (("wanted", kind),),
+    )
+    if tree is None:
+        return [joints]
+    frame = Prototype(
+        NOT_CALLED + suffix,
+        real,
+        "",
+        (*state, "posture", *TARGETS, "wanted", *FRAME_TARGETS, "external"),
+        ("tau",),
+        "int",
+        (("posture", kind), ("wanted", f"{manifest.name}_frame_impedance{suffix}")),
+    )
+    return [joints, frame]
+
+
+def impedance_calls(
+    call: Callable[..., dict[str, Numbers]], function: Prototype, manifest: Manifest, reference: Reference
+) -> Iterator[Entries]:
+    """Yield torques of natural impedance on a motion without error: inverse dynamics and passive torques."""
+    states, none = reference.states, dict.fromkeys(("wanted", "q_d", "task", "external"))
+    passive = manifest.tree.passive if manifest.tree is not None else ()
+    for row in range(0, len(states.q), max(1, len(states.q) // MOST)):
+        state = states.at(row)
+        given: dict[str, Any] = {"q": state.q, "qd": state.qd, "qd_d": state.qd, "qdd_d": state.qdd, **none}
+        found = call(function, 0, given, {"tau": state.q.shape[-1]}, row % 2)["tau"]
+        value, scale = (kept["tau"][row].sum(-1) for kept in (reference.values, reference.scales))
+        if passive:
+            taken, sizes = passive_reference(passive, states.at(np.array([row])))
+            friction = SHARES.index("friction")  # its compensation is not asked for
+            value = value + (taken.sum(0) - taken[friction])[0]
+            scale = scale + sizes.sum(0)[0]
+        yield Entries("tau", found[None], value[None], scale[None])

@@ -1,4 +1,4 @@
-"""formulas.txt and formulas.tex, read back as formulas and held against the reference."""
+"""Checks of formulas.txt and formulas.tex, read back as formulas, against the reference."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -8,26 +8,24 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.version import VERSION
 
-from linkwise.check.compare import Entries, Result, compare, skipped
-from linkwise.check.latex_reader import LatexReader, Unreadable
-from linkwise.check.packed_layout import IndexRows
-from linkwise.check.reference import Reference
-from linkwise.check.text_reader import NUMPY, TextFormula, parameter_values
+from linkwise.check.compare import Entries, IndexRows, Result, compare, skipped
 from linkwise.emit.formula_page import Row, formula_page
-from linkwise.emit.formula_symbols import MOTION, motion_symbol, parameter_symbols
+from linkwise.oracle.formula_text import NUMPY, LatexReader, TextFormula, Unreadable, parameter_values
+from linkwise.oracle.reference import Reference
+from linkwise.package.formula_symbols import MOTION, motion_symbol, parameter_symbols
 from linkwise.package.load import Array, Package
 from linkwise.package.manifest import Manifest
 
 Formula = Callable[[Mapping[str, Any]], Any]
-"""Value for given values of the symbols; raises Unreadable."""
+"""Function that returns a formula's value for given values of the symbols; raises Unreadable."""
 
-# Coordinates have one digit, since more than a few have no formulas.
+# Coordinates have one digit, since robots of many coordinates have no formulas.
 PATTERNS = {
     "txt": re.compile(r"^tau_(\d+)_(\d+) = (.*)$", re.MULTILINE),
     "tex": re.compile(r"^\\\[ \\tau_\{(\d)(\d+)\} = (.*) \\\]$", re.MULTILINE),
 }
 DIGITS = 1e-12
-"""Numbers in these texts are rounded to twelve digits; what cancelling leaves below them is left out."""
+"""Rounding of numbers in these texts, to twelve digits; what cancelling leaves below it is left out."""
 
 
 def check_formulas(
@@ -37,7 +35,7 @@ def check_formulas(
     label: str,
     reference: Reference | None,
 ) -> Iterator[Result]:
-    """What there is to say of each text; every line of it counts, whatever stands between the formulas."""
+    """Yield the results of each text; every line of it counts, also those between the formulas."""
     manifest = package.manifest
     readers = {"txt": _text_row, "tex": _latex_row(manifest)}
     for ending, pattern in PATTERNS.items():
@@ -60,7 +58,7 @@ def check_formulas(
 
 
 def _lines(manifest: Manifest, ending: str, text: str, found: Sequence[Row]) -> Result:
-    """Hold the text against the page that linkwise makes of the same formulas."""
+    """Compare the text with the page that linkwise makes of the same formulas."""
     name, version = f"formulas.{ending}: lines", manifest.generator.get("linkwise")
     if version != VERSION:
         return skipped(name, f"those of linkwise {version}, which is not at hand to compare with")
@@ -81,7 +79,7 @@ def _numbers(
     parameters: Mapping[str, float],
     reference: Reference,
 ) -> Result:
-    """Hold the formulas' values against the reference; one that cannot be read as a formula fails."""
+    """Compare the formulas' values with the reference; one that cannot be read as a formula fails."""
     names = _names(parameters, reference)
     try:
         tau = np.stack([_filled(formula(names), reference) for formula in formulas], -1)
@@ -89,7 +87,7 @@ def _numbers(
         return Result(f"{name}: can be read", False, None, f"it holds {unread}")
     at = (slice(None), *rows.tau.T)
     entries = [Entries("entry ", tau, reference.values["tau"][at], reference.scales["tau"][at])]
-    # Rounding of numbers with DIGITS in place of that of float64.
+    # The rounding is that of numbers with DIGITS, not that of float64.
     told = f"{name}: tau_ij against {reference.name}"
     return compare(told, entries, reference.tolerance, epsilon=DIGITS / 10)
 
@@ -120,7 +118,7 @@ def _latex_row(manifest: Manifest) -> Callable[[str], Formula]:
 
 
 def _latex_symbols(manifest: Manifest, names: Mapping[str, Any]) -> dict[str, Any]:
-    """Values by the LaTeX of their symbols."""
+    """Return values by the LaTeX of their symbols."""
     n = len(manifest.joints)
     motion = [motion_symbol(kind, k) for kind in MOTION for k in range(1, n + 1)]
     symbols = (*motion, *parameter_symbols(list(manifest.parameters)))

@@ -1,4 +1,4 @@
-"""Controllers of a back end: what they promise, held against the reference's coefficients."""
+"""Checks of a back end's controllers: their promised impedance, by the reference's coefficients."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -7,15 +7,15 @@ import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.check.compare import Entries, Result, compare, skipped
-from linkwise.check.passive_reference import passive_reference
-from linkwise.check.reference import Reference
-from linkwise.check.states import States
+from linkwise.check.passive_checks import passive_reference
 from linkwise.check.sum_checks import is_tied, regular
+from linkwise.oracle.reference import Reference
+from linkwise.oracle.states import States
 from linkwise.package.entries import PassiveEntry, RigidTree
 from linkwise.package.load import Array
 
 WIDTH = 0.5
-"""Of the friction that is compensated."""
+"""Width `friction_width` of the friction that is compensated."""
 
 
 def impedance_calls(
@@ -25,14 +25,17 @@ def impedance_calls(
     reference: Reference,
     natural: Callable[..., Any],
 ) -> Iterator[Result]:
-    """A scaled impedance with springs, and a cancelled motion; `natural` is the package's `Natural`."""
+    """Yield checks of a scaled impedance with springs, and of a cancelled motion.
+
+    natural: the package's `Natural`
+    """
     if is_tied(model):
         return
     rows = np.flatnonzero(regular(reference))
     if not rows.size:
         yield skipped(f"{name}: controllers", "no mass matrix can be inverted here")
         return
-    # an impedance is there where M is positive, which that of negative masses is not
+    # impedance needs a positive definite M, which negative masses do not give
     positive = rows[np.linalg.eigvalsh(reference.values["c2"][rows].sum(2)).min(-1) > 0.0]
     joints = () if tree is None else tree.passive
     entries = [_cancelled(model, joints, reference, rows)]
@@ -44,7 +47,7 @@ def impedance_calls(
 
 
 def _are_masses(tree: RigidTree | None) -> bool:
-    """Whether no link has an inertia that is negative anywhere, so that each may be kept in part."""
+    """Return whether no link has a negative mass or principal moment, so that each may be kept in part."""
     if tree is None:
         return False
     moments = np.linalg.eigvalsh([body.inertia for body in tree.bodies])
@@ -61,9 +64,9 @@ def _shaped(
     kept: Array,
     natural: Any,
 ) -> Iterator[Entries]:
-    """M* qdd + B* qd + K* e = f of the acceleration, and the torque that the plant takes for it.
+    """Yield M* qdd + B* qd + K* e = f of the acceleration, and the torque that the plant needs for it.
 
-    kept: how much of each link M* has, (N,)
+    kept: share of each link in M*, (N,)
     """
     n = len(model.joint_names)
     q, qd, _ = reference.states.at(rows).motion
@@ -102,9 +105,9 @@ def _shaped(
 
 
 def _eliminated(inertia: Array) -> Array:
-    """What elimination sums for each entry of M (samples, n, n): |L| |L^T|, at most sqrt(M_ii M_kk).
+    """Return what elimination sums for each entry of M (samples, n, n): |L| |L^T|, at most sqrt(M_ii M_kk).
 
-    Rounding of that is in whoever solves M x = f, also where M_ik is next to nothing (Higham, Accuracy and
+    Any solution of M x = f has the rounding of that, also where M_ik is next to nothing (Higham, Accuracy and
     Stability of Numerical Algorithms, theorem 10.4).
     """
     size = np.sqrt(np.abs(np.einsum("sii->si", inertia)))
@@ -113,7 +116,10 @@ def _eliminated(inertia: Array) -> Array:
 
 
 def _cancelled(model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference, rows: Any) -> Entries:
-    """Velocity torques of the last link on the first joint that moves it; no inertia is changed."""
+    """Return a torque that cancels the last link's velocity torques on the first joint that moves it.
+
+    No inertia is changed.
+    """
     q, qd, task = reference.states.at(rows).motion
     moving = np.flatnonzero(np.abs(reference.values["c2"]).sum((0, 1, 3)))
     j = int(moving[-1])

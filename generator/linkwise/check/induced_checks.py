@@ -1,4 +1,4 @@
-"""Induced accelerations of a back end, source by source, against the reference's shares and an own solve."""
+"""Checks of induced accelerations, source by source, against the reference's shares and a solution of M."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -9,12 +9,12 @@ from linkwise_runtime.dynamics import Dynamics
 from numpy.typing import NDArray
 
 from linkwise.check.compare import Entries, Result, compare, skipped
-from linkwise.check.frame_reference import FrameReference, chosen_rows
+from linkwise.check.frame_checks import FrameReference, chosen_rows
 from linkwise.check.model_calls import FLOAT32
-from linkwise.check.passive_reference import passive_reference
-from linkwise.check.reference import Reference
-from linkwise.check.states import States
+from linkwise.check.passive_checks import passive_reference
 from linkwise.check.sum_checks import SINGLE, regular
+from linkwise.oracle.reference import Reference
+from linkwise.oracle.states import States
 from linkwise.package.entries import PassiveEntry
 from linkwise.package.load import Array
 
@@ -24,19 +24,19 @@ Quantity = tuple[Array, Array]
 
 @dataclass(frozen=True)
 class _Sources:
-    """Forces by source at some of the reference's states, and what they accelerate."""
+    """Forces by source at some of the reference's states, and the mass matrix there."""
 
     states: States
     mass: Quantity
     forces: dict[str, Quantity]
 
     def accelerations(self) -> dict[str, Quantity]:
-        """M^-1 F; rounding of F and of M qdd moves qdd by |M^-1| times as much.
+        """Return M^-1 F by source; rounding of F and of M qdd moves qdd by |M^-1| times as much.
 
-        A force that is zero but for rounding moves the joints by that, of which M qdd rounds again.
+        A force that is zero but for rounding moves the joints by that rounding, of which M qdd rounds again.
         """
         mass, noise = self.mass
-        # Of joints that are measured alike: a finger's digits are not lost beside a leg's.
+        # Scaled to comparable joints, so that a finger's digits are not lost beside a leg's.
         own = np.abs(np.einsum("sii->si", mass))
         units = np.sqrt(np.where(own > 0.0, own, 1.0))
         inverse = (
@@ -59,7 +59,7 @@ def induced_calls(
     frames: FrameReference | None,
     load_of: Callable[..., Any],
 ) -> Iterator[Result]:
-    """Shares of the coordinates, also for the torques that a motion asks for, and of a point under a load."""
+    """Yield checks of the coordinates' shares, also for a motion's torques, and of a point under a load."""
     rows = chosen_rows(len(reference.states.q))
     rows, at = rows[regular(reference)[rows]], np.flatnonzero(regular(reference)[rows])
     if not rows.size:
@@ -88,7 +88,7 @@ def _given(
     rows: NDArray[np.intp],
     kind: type = np.float64,
 ) -> Iterator[Entries]:
-    """Of torques, with what joints have of their own."""
+    """Yield accelerations by given torques, with the passive torques of the joints."""
     sources = _sources(reference, rows, joints)
     motion: list[Any] = [a.astype(kind) for a in sources.states.motion]
     calls: Any = model
@@ -98,7 +98,7 @@ def _given(
 
 
 def _asked(model: Dynamics, reference: Reference, rows: NDArray[np.intp]) -> Iterator[Entries]:
-    """Of the actuators that give a motion."""
+    """Yield accelerations by the actuators that produce a given motion."""
     states = reference.states.at(rows)
     torque, size = (a["tau"][rows].sum(-1) for a in (reference.values, reference.scales))
     sources = _sources(reference, rows, ())
@@ -115,7 +115,7 @@ def _of_a_point(
     at: NDArray[np.intp],
     load_of: Callable[..., Any],
 ) -> Iterator[Entries]:
-    """The last frame at its point, on which a load acts; the same load twice in one source too."""
+    """Yield accelerations of the last frame at its point under a load; one source has that load twice."""
     sources = _sources(reference, rows, ())
     f, point, frame = len(frames.chosen) - 1, frames.points[-1], frames.chosen[-1]
     (jacobian, reach), (rate, change) = ((a[at, f] for a in q) for q in (frames.jacobian, frames.rate))
@@ -147,7 +147,7 @@ def _of_a_point(
 
 
 def _sources(reference: Reference, rows: NDArray[np.intp], joints: Sequence[PassiveEntry]) -> _Sources:
-    """All sources but loads; the states' qdd stand for the actuators' torques."""
+    """Return all sources but loads; the states' qdd serve as the actuators' torques."""
     states = reference.states.at(rows)
     values, scales = ({k: a[rows] for k, a in kept.items()} for kept in (reference.values, reference.scales))
     over = states.qd[:, None, None, :]
@@ -166,16 +166,16 @@ def _sources(reference: Reference, rows: NDArray[np.intp], joints: Sequence[Pass
 
 
 def _by_kind(shares: Array) -> Array:
-    """Diagonals (samples, n, 3, n) of shares (3, samples, n)."""
+    """Return the diagonal matrices (samples, n, 3, n) of shares (3, samples, n)."""
     return np.moveaxis(diagonal(shares), 0, 2)
 
 
 def diagonal(values: Array) -> Array:
-    """Matrices (..., n, n) with these (..., n) on their diagonals."""
+    """Return matrices (..., n, n) with these values (..., n) on their diagonals."""
     matrices: Array = np.eye(values.shape[-1]) * values[..., None, :]
     return matrices
 
 
 def flat(values: Array) -> Array:
-    """(samples, n, ...) as columns (samples, n, X)."""
+    """Return values (samples, n, ...) as columns (samples, n, X)."""
     return values.reshape(*values.shape[:2], int(np.prod(values.shape[2:])))

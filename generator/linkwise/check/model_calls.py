@@ -1,4 +1,4 @@
-"""Every public call of a back end against the reference."""
+"""Checks of every public call of a back end against the reference."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple, cast
@@ -6,16 +6,15 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 
-from linkwise.check.compare import Entries, Result, compare, dense, skipped
-from linkwise.check.packed_layout import IndexRows, Rows, packed
-from linkwise.check.reference import Reference
-from linkwise.check.states import States
+from linkwise.check.compare import Entries, IndexRows, Result, Rows, compare, dense, packed, skipped
 from linkwise.extras import extra
+from linkwise.oracle.reference import Reference
+from linkwise.oracle.states import States
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 FLOAT32 = {"tolerance": 1e-5, "epsilon": 2.0**-23}
-"""How exact single precision is asked to be."""
+"""Accuracy that is asked of single precision."""
 FEW_LINKS = 8
 TOO_LARGE = "the numbers are too large for it, or too small, at every state"
 
@@ -30,7 +29,7 @@ class Named(NamedTuple):
 
 
 def against_reference(checked: Named, manifest: Manifest) -> Iterator[Result]:
-    """Every quantity, every call, batches of all shapes, single precision, and what holds for any robot."""
+    """Yield checks of every quantity and call, batches of all shapes, single precision, and structure."""
     name, model, rows, reference = checked
     states = reference.states
     yield _layout(checked)
@@ -69,7 +68,7 @@ def _layout(checked: Named) -> Result:
 
 
 def _calls(checked: Named) -> Iterator[Entries]:
-    """The dense calls, masks, sums and both conventions."""
+    """Yield entries of the dense calls, masks, sums and both conventions."""
     _, model, rows, reference = checked
     q, qd, qdd = reference.states.motion
     values, scales = reference.values, reference.scales
@@ -101,7 +100,7 @@ def _calls(checked: Named) -> Iterator[Entries]:
 
 
 def _batches(checked: Named) -> Iterator[Entries]:
-    """One sample, batches that fill no block, of two axes, of no samples, and a q that all samples share."""
+    """Yield one sample, batches that fill no block, of two axes or no samples, and a q that samples share."""
     reference = checked.reference
     states, count = reference.states, len(reference.states.q)
     if not count:
@@ -124,7 +123,7 @@ def _few(checked: Named, states: States, at: Rows) -> Iterator[Entries]:
 
 
 def _flat(what: str, value: Array, reference: Reference, at: Rows) -> Entries:
-    """Entries whose batch of shape `at` became one axis."""
+    """Return entries whose batch of shape `at` is flattened to one axis."""
     inner = reference.values[what].shape[1:]
     if value.shape != (*at.shape, *inner):
         shape = np.empty((*at.shape, *inner))
@@ -133,7 +132,7 @@ def _flat(what: str, value: Array, reference: Reference, at: Rows) -> Entries:
 
 
 def _single(checked: Named) -> Iterator[Entries]:
-    """The same in float32, in a large batch and in one that fills no block."""
+    """Yield packed values, torques and c0 in float32, of a large batch and of ones that fill no block."""
     _, model, rows, reference = checked
     fitting = np.flatnonzero(reference.fits_single())
     for at in (fitting,) if reference.is_large else (fitting, fitting[:7], fitting[:1]):
@@ -145,7 +144,7 @@ def _single(checked: Named) -> Iterator[Entries]:
 
 
 def _energies(checked: Named) -> Iterator[Result]:
-    """Each module's Lagrangian against kinetic less potential energy."""
+    """Yield checks of each module's Lagrangian against kinetic less potential energy."""
     name, model, _, reference = checked
     if reference.lagrangian is None:
         return
@@ -157,7 +156,7 @@ def _energies(checked: Named) -> Iterator[Result]:
 
 
 def _links(checked: Named) -> Iterator[Entries]:
-    """What each module gives of its own link; of a large robot the first ones, which fewer joints carry."""
+    """Yield each module's values for its own link; of a large robot the first, which fewer joints carry."""
     torch, reference = extra("torch"), checked.reference
     backend: Any = checked.model.backend
     modules = list(backend.modules)[: FEW_LINKS if reference.is_large else None]
@@ -177,10 +176,10 @@ def _lagrangians(model: Dynamics, states: States) -> Array:
 
 
 def _structure(checked: Named, manifest: Manifest) -> Iterator[Result]:
-    """Zeros off the path, and the mass matrix, which no other check looks at as a whole.
+    """Yield checks of zeros off the path, and of the mass matrix, which no other check sees as a whole.
 
-    Off the path not even rounding may be left.
-    A user's energies, and bodies allowed to be unphysical, may have any mass matrix: there it is told only.
+    Off the path not even rounding may be left. A user's energies, and bodies allowed to be unphysical, may
+    have any mass matrix: there it is only reported.
     """
     name, model, rows, reference = checked
     q, qd, qdd = reference.states.motion
@@ -190,7 +189,7 @@ def _structure(checked: Named, manifest: Manifest) -> Iterator[Result]:
     error = float(np.abs(tau[:, off]).max(initial=0.0))
     yield Result(f"{name}: tau_ij = 0 off the path", error == 0.0, error, f"largest value {error:.1e}")
     mass = model.mass_matrix(q)
-    # Of the matrix with ones on its diagonal: a hand's inertia is not lost beside a body's.
+    # Scaled to a diagonal of ones, so that a hand's inertia is not lost beside a body's.
     diagonal = np.einsum("sii->si", mass)
     size = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
     scaled = mass / (size[:, :, None] * size[:, None, :])
@@ -207,10 +206,10 @@ def _structure(checked: Named, manifest: Manifest) -> Iterator[Result]:
 
 
 def _over(motion: Array) -> Array:
-    """Motion (samples, n) beside coefficients (samples, n, N, n)."""
+    """Return motion (samples, n) as (samples, 1, 1, n), beside coefficients (samples, n, N, n)."""
     return motion[:, None, None, :]
 
 
 def _column(motion: Array) -> Array:
-    """Motion (samples, n) as columns to multiply with coefficients (samples, n, N, n)."""
+    """Return motion (samples, n) as columns to multiply with coefficients (samples, n, N, n)."""
     return motion[:, None, :, None]

@@ -9,19 +9,19 @@ import numpy as np
 from linkwise_runtime.parameter_values import ParametricBody, faults
 
 from linkwise.check.compare import Result
-from linkwise.check.text_reader import TextFormula, parameter_values
+from linkwise.oracle.formula_text import TextFormula, parameter_values
 from linkwise.package.entries import PLACE, BodyEntry, RigidTree
 from linkwise.package.load import Array
 
 MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 VARIED = ("translation", "mass", "com", "inertia")
-"""Numbers of a body that may hang on parameters."""
+"""Fields of a body that may depend on parameters."""
 ROUNDING = 1e-12
-"""Of the largest number of a vector or an inertia, which formulas and numbers may differ by."""
+"""Largest difference of formulas and numbers, relative to the largest number of a vector or an inertia."""
 
 
 def tree_with(tree: RigidTree, values: Mapping[str, float]) -> RigidTree:
-    """The tree for other values of the parameters; raises Unreadable where a formula is none."""
+    """Return the tree for other values of the parameters; raises Unreadable where a text is no formula."""
     given = parameter_values(values)
     found = {place: float(TextFormula(text).value(given)) for place, text in tree.formulas.items()}
 
@@ -42,9 +42,9 @@ def tree_with(tree: RigidTree, values: Mapping[str, float]) -> RigidTree:
 
 
 def changed_values(values: Mapping[str, float], tree: RigidTree | None) -> dict[str, float]:
-    """Each value changed by up to 3 % of its own; a zero, by 1 to 3 % of the numbers that it stands among.
+    """Return each value changed by up to 3 % of its own; a zero, by 1 to 3 % of the numbers beside it.
 
-    These are the lengths or the moments of the bodies that it is of; 1 where there are none.
+    These are the lengths, the mass or the moments of the bodies that it belongs to; 1 where there are none.
     """
     generator = np.random.default_rng(2)
     sizes = _neighbours(values, tree) if tree else {}
@@ -56,7 +56,7 @@ def changed_values(values: Mapping[str, float], tree: RigidTree | None) -> dict[
 
 
 def _neighbours(values: Mapping[str, float], tree: RigidTree) -> dict[str, float]:
-    """By parameter, the largest number among those that it stands among in the tree."""
+    """Return, by parameter, the largest of the numbers beside it in the tree."""
     own = parameter_values({name: name for name in values})
     sizes: dict[str, float] = {}
     for place, text in tree.formulas.items():
@@ -80,7 +80,7 @@ def check_bodies(
     unphysical: bool,
     label: str,
 ) -> Iterator[Result]:
-    """Hold the tree's numbers and the bodies that `load` looks at against the tree's formulas."""
+    """Yield checks of the tree's numbers, and the bodies that `load` looks at, against its formulas."""
     varied = tree_with(tree, values)
     if not label:
         wrong = [
@@ -115,7 +115,7 @@ def check_bodies(
 
 
 def _names(tree: RigidTree, b: int, parameters: Sequence[str]) -> set[str]:
-    """Parameters that the mass and the inertia of a body hang on."""
+    """Return the parameters that the mass and the inertia of a body depend on."""
     place = re.compile(rf"bodies\[{b}\]\.(mass|inertia.*)")
     formulas = [TextFormula(text) for at, text in tree.formulas.items() if place.fullmatch(at)]
     used = {name for formula in formulas for name in formula.names()}
@@ -124,7 +124,7 @@ def _names(tree: RigidTree, b: int, parameters: Sequence[str]) -> set[str]:
 
 
 def _listed(body: BodyEntry) -> Array:
-    """Mass, and xx, yy, zz, xy, xz, yz of the inertia."""
+    """Return the mass, and xx, yy, zz, xy, xz, yz of the inertia, (7,)."""
     return np.array([body.mass, *(body.inertia[i][k] for i, k in MOMENTS)])
 
 

@@ -1,4 +1,4 @@
-"""A short simulated motion against Runge and Kutta's method on the recursion's own mass matrix and forces."""
+"""Check of a short simulated motion against the Runge-Kutta method on the recursion's equations of motion."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -8,35 +8,36 @@ from linkwise_runtime.dynamics import Dynamics
 from numpy.typing import NDArray
 
 from linkwise.check.compare import Entries, Result, compare, skipped
-from linkwise.check.held_motion import held_motion, mass_matrix, steady
-from linkwise.check.loop_equations import LoopEquations, following
-from linkwise.check.magnitudes import Magnitudes
-from linkwise.check.newton_euler import NewtonEuler
-from linkwise.check.rounding import measured
-from linkwise.check.states import States
+from linkwise.oracle.held_motion import held_motion, mass_matrix, steady
+from linkwise.oracle.loop_equations import LoopEquations, following
+from linkwise.oracle.magnitudes import Magnitudes
+from linkwise.oracle.newton_euler import NewtonEuler
+from linkwise.oracle.rounding import measured
+from linkwise.oracle.states import States
 from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 TRIED = 8
-"""States, of which the motion starts from that with the least acceleration: next to a base's pitch of 90
+"""States tried; the motion starts from that with the least acceleration: next to a base's pitch of 90
 degrees, or to a dead point, there is no bound to it."""
 STEP = 2e-3
 STEPS = 2
 CLOSING = 8
-"""Most steps that close ties from where an integration has left them."""
+"""Most steps that close ties after an integration step."""
 CLOSED = 1e-12
-"""Of such a step, in rad and m; what is left is about its square."""
+"""Step of closing, in rad and m, below which ties are closed; what is left is about its square."""
 AGREED = 3e-5
-"""Of numbers of rows, by how much some may disagree that follow from others: somewhat more than `RANK`."""
+"""Largest disagreement of rows that follow from others, relative to their numbers: somewhat more than
+`RANK`."""
 SINGULAR = "no mass matrix can be inverted here"
 HELD_TWICE = "what holds a loop twice does not agree where it moves to"
 DEAD_POINT = "it moves to where no position near by closes a loop"
-"""Why there is no motion to compare."""
+"""Reasons why there is no motion to compare."""
 
 
 class SimulatedMotion(NamedTuple):
-    """Torques tau that act from a state on, and what comes of it: q, qd and work, and their scales."""
+    """Torques tau that act from a state on, and the resulting q, qd and work, with their scales."""
 
     q: Array
     qd: Array
@@ -47,13 +48,13 @@ class SimulatedMotion(NamedTuple):
 
 
 class _NoMotionError(Exception):
-    """Why there is none, where ties do not agree or cannot be closed."""
+    """Reason why there is no motion, where ties do not agree or cannot be closed."""
 
 
 def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> SimulatedMotion | str:
-    """From the calmest of the first states on, in which ties close; or why there is none.
+    """Return a motion from the calmest of the first states in which ties close, or why there is none.
 
-    Torques are those of a modest acceleration: of any others a light link would be thrown away.
+    Its torques are those of a modest acceleration: any others would throw a light link away.
     """
     try:
         return _simulated_motion(manifest, tree, states)
@@ -84,7 +85,7 @@ def _simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Si
     sizes = np.abs(motion(tree, np.ones(n) + 0.0 * tried.q)(tried.q, tried.qd[:, own])[2]).max(axis=-1)
     calm = np.array([int(np.where(np.isfinite(sizes), sizes, np.inf).argmin())])
     q, qd, _ = tried.at(calm).motion
-    qdd = np.random.default_rng(9).uniform(-1.0, 1.0, q.shape)  # that of states may be none
+    qdd = np.random.default_rng(9).uniform(-1.0, 1.0, q.shape)  # the states' own may be zero
     tau = recursion.torque(q, qd, qdd)
 
     def ends(tree: RigidTree) -> dict[str, Array]:
@@ -95,7 +96,7 @@ def _simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Si
 
 
 def simulation_calls(name: str, model: Dynamics, expected: SimulatedMotion | str) -> Iterator[Result]:
-    """The motion of one back end."""
+    """Yield the result for the motion of one back end."""
     if isinstance(expected, str):
         yield skipped(f"{name}: a simulated motion", expected)
         return
@@ -116,11 +117,12 @@ def _compared(calls: Any, found: Any, expected: SimulatedMotion) -> Iterator[Ent
 
 
 Rates = Callable[[Array, Array], tuple[Array, Array, Array, Array]]
-"""q that ties allow, qd of all joints, accelerations of the independent ones and power, of q and v."""
+"""Function of q and v: q that ties allow, qd of all joints, accelerations of independent joints, and
+power."""
 
 
 def _integrated(motion: Rates, start: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-    """q, qd and work after all steps of order 4."""
+    """Return q, qd and work after all steps, each of order 4."""
     q, v, work = start
     for _ in range(STEPS):
         slopes: list[tuple[Array, ...]] = []
@@ -169,7 +171,7 @@ def _tied(recursion: NewtonEuler, tree: RigidTree, tau: Array) -> Rates:
 
 
 def _agree(rows: Array, mapped: Array) -> NDArray[np.bool_]:
-    """At which samples no row of A is left by G, but for what a file's rounded numbers leave of it."""
+    """Return at which samples A G is zero, up to the rounding of a file's numbers, as booleans (samples,)."""
     left, sizes = (np.abs(part).max((1, 2)) for part in (rows @ mapped, np.abs(rows) @ np.abs(mapped)))
     agreed: NDArray[np.bool_] = left <= AGREED * sizes
     return agreed

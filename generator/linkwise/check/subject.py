@@ -1,4 +1,4 @@
-"""A package for given values of its parameters, and what its numbers are held against."""
+"""A package for given values of its parameters, and the references for its numbers."""
 
 import math
 import time
@@ -10,23 +10,20 @@ from typing import NamedTuple, TypeVar
 
 from linkwise_runtime.dynamics import Dynamics
 
-from linkwise.check.body_reference import body_reference
 from linkwise.check.c_functions import CFunctions
+from linkwise.check.compare import IndexRows
 from linkwise.check.compiled_c import CompiledPackage
-from linkwise.check.contact_checks import HeldContacts
-from linkwise.check.energy_reference import energy_reference, states_of_energies
-from linkwise.check.frame_reference import FrameReference, frame_reference
-from linkwise.check.loop_reference import LoopReference, loop_reference
-from linkwise.check.magnitudes import Magnitudes
-from linkwise.check.newton_euler import NewtonEuler
-from linkwise.check.packed_layout import IndexRows
+from linkwise.check.constraint_checks import HeldContacts
+from linkwise.check.frame_checks import FrameReference, frame_reference
 from linkwise.check.parametric_tree import tree_with
-from linkwise.check.reference import Reference
-from linkwise.check.regressor_reference import regressor_reference
+from linkwise.check.regressor_checks import regressor_reference
 from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion
-from linkwise.check.states import States, random_states
-from linkwise.check.text_lagrangian import TextLagrangian
-from linkwise.check.torque_reference import states_of_torques, torque_reference
+from linkwise.oracle.energies import TextLagrangian, energy_reference, states_of_energies
+from linkwise.oracle.loop_reference import LoopReference, loop_reference
+from linkwise.oracle.magnitudes import Magnitudes
+from linkwise.oracle.newton_euler import NewtonEuler
+from linkwise.oracle.reference import Reference, body_reference, states_of_torques, torque_reference
+from linkwise.oracle.states import States, random_states
 from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.package.entries import PassiveEntry, RigidTree
 from linkwise.package.load import Array, Package
@@ -35,9 +32,9 @@ from linkwise.package.manifest import Manifest
 T = TypeVar("T")
 LEAST_SECONDS = 300
 TIMES = 20
-"""C may take so much of the processor's time, and so many times what was done before it is called."""
+"""Limits of C's processor time: so many s, and so many times the time that was spent before it is called."""
 UNBOUNDED = 1 << 50
-"""Bytes of memory, which are not bounded."""
+"""Bytes that stand for unbounded memory."""
 
 
 class Way(NamedTuple):
@@ -48,26 +45,26 @@ class Way(NamedTuple):
 
     @property
     def label(self) -> str:
-        """What results are told under: of two kernels, closed forms bear the name of the back end alone."""
+        """Name that results are reported under: of two kernels, closed forms have the back end's alone."""
         return f"{self.backend} by rule" if self.kernel == "rule" else self.backend
 
 
 def long_enough() -> ProcessLimits:
-    """Time in which C that ends at all has ended, of a robot of any size on any machine."""
+    """Return limits of time in which C that ends at all has ended, for any robot on any machine."""
     return ProcessLimits(LEAST_SECONDS + TIMES * math.ceil(time.process_time()), UNBOUNDED)
 
 
 def there(what: T | None) -> T:
-    """What a check that concerns a subject finds there."""
+    """Return `what`, which is not None: a check that concerns a subject finds it there."""
     assert what is not None
     return what
 
 
 @dataclass(frozen=True)
 class Subject:
-    """A package for given values of its parameters, and what its numbers are held against.
+    """A package for given values of its parameters, and the references for its numbers.
 
-    label: what tells its results from those for other values
+    label: distinguishes its results from those for other values
     """
 
     package: Package
@@ -77,85 +74,85 @@ class Subject:
     rows: IndexRows
     compiled: CompiledPackage | None
     count: tuple[int, int]
-    """Of random states, and of those at rest."""
+    """Number of random states, and of those at rest."""
 
     @property
     def composed_elsewhere(self) -> bool:
-        """Whether what autograd takes long for, of a large robot, is held of torch, which is alike in it."""
+        """True if slow calls of autograd, for a large robot, are checked with torch, composed alike."""
         return self.reference.is_large and any(way.backend == "torch" for way in self.loaded)
 
     @property
     def manifest(self) -> Manifest:
-        """That of the package."""
+        """Manifest of the package."""
         return self.package.manifest
 
     @cached_property
     def tree(self) -> RigidTree | None:
-        """Rigid bodies with these parameters; energies have none."""
+        """Rigid bodies with these parameters; None for energies."""
         tree = self.package.manifest.tree
         return None if tree is None else tree_with(tree, self.parameters)
 
     @property
     def tied(self) -> bool:
-        """Whether loops of the open tree are closed."""
+        """True if loops of the open tree are closed."""
         return self.tree is not None and self.tree.tied
 
     @property
     def passive(self) -> tuple[PassiveEntry, ...]:
-        """What joints take of their own."""
+        """Passive properties of the joints."""
         return () if self.tree is None else self.tree.passive
 
     @cached_property
     def functions(self) -> CFunctions | None:
-        """The C, if it compiled."""
+        """Compiled C; None if it did not compile."""
         if self.compiled is None:
             return None
         return CFunctions(self.package.manifest, self.compiled, self.rows, self.parameters)
 
     @property
     def reference(self) -> Reference:
-        """What torques and their coefficients are held against."""
+        """Reference for torques and their coefficients."""
         return there(self.found[0])
 
     @cached_property
     def regressors(self) -> Reference | None:
-        """What regressors are held against; energies have none."""
+        """Reference for regressors; None for energies."""
         if self.tree is None:
             return None
         return regressor_reference(self.manifest, self.tree, self.reference.states)
 
     @cached_property
     def frames(self) -> FrameReference | None:
-        """What kinematics is held against; energies have none."""
+        """Reference for kinematics; None for energies."""
         return None if self.tree is None else frame_reference(self.manifest, self.tree, self.reference.states)
 
     @cached_property
     def loops(self) -> LoopReference | None:
-        """What constraints are held against; a robot without ties has none."""
+        """Reference for constraints; None without ties, or where no state leads to closed loops."""
         if self.tree is None or not self.tied:
             return None
         return loop_reference(self.manifest, self.tree, self.reference.states)
 
     @property
     def closed(self) -> States | None:
-        """States that the robot can move on from: where ties close."""
+        """States that the robot can move on from, in which ties close; None if there are none."""
         if not self.tied:
             return None if self.tree is None else self.reference.states
         return None if self.loops is None else self.loops.states
 
     @cached_property
     def contacts(self) -> HeldContacts:
-        """What contacts are held against."""
+        """Reference for contacts."""
         return HeldContacts(self.manifest, there(self.tree), there(self.closed))
 
     @cached_property
     def simulated(self) -> SimulatedMotion | str:
-        """A short motion, or why there is none."""
+        """A short motion, or the reason why there is none."""
         return simulated_motion(self.manifest, there(self.tree), there(self.closed))
 
     @cached_property
     def found(self) -> tuple[Reference | None, int]:
-        """What numbers are held against, None if nothing can compute or at no state; how many were tried."""
+        """Reference for numbers, None if nothing can compute or at no state; and how many were tried."""
         manifest = self.manifest
         if self.tree is not None:
             samples, rest = self.count
@@ -174,7 +171,7 @@ class Subject:
         return self._own_reference()
 
     def _own_reference(self) -> tuple[Reference | None, int]:
-        """The torques of one of the package's back ends, else those of its C."""
+        """Return the reference from torques of a back end, else of the C, and how many states were tried."""
 
         def of(name: str, torque: Callable[[Array, Array, Array], Array]) -> tuple[Reference | None, int]:
             found = states_of_torques(torque, self.manifest.joints, self.count[0])

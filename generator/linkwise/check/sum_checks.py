@@ -1,4 +1,4 @@
-"""Sums over the links, forward dynamics, energies and power of a back end against the reference."""
+"""Checks of sums over the links, forward dynamics, energies and power of a back end against the reference."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -9,26 +9,26 @@ from numpy.typing import NDArray
 
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.model_calls import FLOAT32, TOO_LARGE
-from linkwise.check.reference import Reference
-from linkwise.check.states import NUMBERS
+from linkwise.oracle.reference import Reference
+from linkwise.oracle.states import NUMBERS
 from linkwise.package.load import Array
 
 REGULAR = 1e-8
-"""Least eigenvalue of a mass matrix, with ones on its diagonal, from which accelerations are looked at."""
+"""Least eigenvalue of a mass matrix, with ones on its diagonal, for which accelerations are checked."""
 SINGLE = 1e-3
-"""The same, in single precision."""
+"""Least such eigenvalue for which accelerations in single precision are checked."""
 MOST = 12
-"""States of Christoffel symbols; of many joints, fewer."""
+"""Most states for Christoffel symbols; fewer for many joints."""
 
 FLOAT = " in single precision"
 LARGEST = 1 << 27
-"""Bytes of Christoffel symbols by link that are asked for."""
+"""Most bytes of Christoffel symbols by link that are asked for."""
 
 Samples = NDArray[np.intp]
 
 
 def sums_against_reference(name: str, model: Dynamics, reference: Reference) -> Iterator[Result]:
-    """Every call, of all states, of none and of one, and in single precision."""
+    """Yield checks of every call, at all states, none and one, and in single precision."""
     every = np.arange(len(reference.states.q))
     few = [every[:0], *([every[0], every[:1, None]] if len(every) else [])]
     batches = [every, *(() if reference.is_large else few)]
@@ -40,7 +40,7 @@ def sums_against_reference(name: str, model: Dynamics, reference: Reference) -> 
     if reference.energies:
         energies = (each for at in batches for each in _energies(model, reference, at))
         yield compare(f"{name}: energies of the links", energies, reference.tolerance)
-    if not is_tied(model):  # that under ties is held where these close
+    if not is_tied(model):  # under ties it is checked where these close
         yield _forward_dynamics(name, model, reference)
     fitting = np.flatnonzero(reference.fits_single())
     if fitting.size:
@@ -51,7 +51,7 @@ def sums_against_reference(name: str, model: Dynamics, reference: Reference) -> 
 
 
 def _sums(model: Dynamics, reference: Reference, at: Any, kind: Any = float) -> Iterator[Entries]:
-    """Matrices and gravity of some samples, whole and link by link."""
+    """Yield matrices and gravity of some samples, whole and link by link."""
     q, qd, _ = (a.astype(kind) for a in reference.states.at(at).motion)
     for by_link in (False, True):
         calls = (
@@ -70,9 +70,9 @@ def _summed(what: str, value: Array, shares: tuple[Array, Array], at: Any, by_li
 
 
 def _symbols(name: str, model: Dynamics, reference: Reference) -> Iterator[Result]:
-    """Christoffel symbols are right if they make the Coriolis matrix of velocities at random.
+    """Yield checks that Christoffel symbols make the Coriolis matrix of random velocities.
 
-    That is but for what terms of energies linear in the velocities have in it.
+    The part of that matrix by energy terms linear in the velocities is left out.
     """
     n, links = len(model.joint_names), len(model.link_names)
     few = np.arange(min(max(1, min(MOST, NUMBERS // (n**3 * links))), len(reference.states.q)))
@@ -100,7 +100,7 @@ def _symbols(name: str, model: Dynamics, reference: Reference) -> Iterator[Resul
 
 
 def _power(model: Dynamics, reference: Reference) -> Iterator[Entries]:
-    """Each part, and their sum for each link."""
+    """Yield each part of the power, and their sum for each link."""
     q, qd, qdd = reference.states.motion
     values, scales, power = reference.values, reference.scales, model.power(q, qd, qdd)
     rate = qd[:, :, None, None]
@@ -125,7 +125,7 @@ def _energies(model: Dynamics, reference: Reference, at: Any) -> Iterator[Entrie
 
 
 def _forward_dynamics(name: str, model: Dynamics, reference: Reference) -> Result:
-    """Whether it undoes inverse dynamics, of all states and of one."""
+    """Check that forward dynamics undoes inverse dynamics, at all states and at one."""
     invertible = np.flatnonzero(regular(reference))
     if not invertible.size:
         return skipped(f"{name}: forward dynamics", "no mass matrix can be inverted here")
@@ -134,14 +134,17 @@ def _forward_dynamics(name: str, model: Dynamics, reference: Reference) -> Resul
 
 
 def _accelerations(model: Dynamics, reference: Reference, at: Any) -> Iterator[Entries]:
-    """Of the reference's torques: rounding of these and of M qdd moves qdd by |M^-1| times as much."""
+    """Yield accelerations by the reference's torques.
+
+    Rounding of these and of M qdd moves qdd by |M^-1| times as much.
+    """
     q, qd, qdd = reference.states.at(at).motion
     found = model.forward_dynamics(q, qd, reference.values["tau"][at].sum(-1), passive=False)
     yield _flat("qdd", found, qdd, acceleration_scales(reference, at), np.ndim(at))
 
 
 def is_tied(model: Dynamics) -> bool:
-    """Whether ties or couplings close loops of the open tree."""
+    """Return whether ties or couplings close loops of the open tree."""
     tree = model.backend.tree
     return tree is not None and tree.tied
 
@@ -149,9 +152,9 @@ def is_tied(model: Dynamics) -> bool:
 def acceleration_scales(
     reference: Reference, at: Any, armature: Array | float = 0.0, own: Array | float = 0.0
 ) -> Array:
-    """What the accelerations of some samples are summed from: |M^-1| times what their torques are.
+    """Return sizes of what the accelerations of some samples are summed from: |M^-1| times their torques'.
 
-    armature (n, n) stands beside M; own (n) are sizes of what joints take of their own.
+    armature (n, n) is added to M; own (n) are sizes of the passive torques.
     """
     mass = reference.values["c2"][at].sum(np.ndim(at) + 1) + armature
     noise = (reference.scales["tau"][at].sum(-1) + own)[..., None]
@@ -162,13 +165,13 @@ def acceleration_scales(
 
 
 def regular(reference: Reference, least: float = REGULAR) -> NDArray[np.bool_]:
-    """Samples whose mass matrix is far from singular, however its joints are measured."""
+    """Return which samples have a mass matrix far from singular, in whatever units joints are measured."""
     far: NDArray[np.bool_] = reference.regularity > least
     return far
 
 
 def _flat(what: str, value: Array, expected: Array, scale: Array, axes: int) -> Entries:
-    """Entries of a batch of so many axes, samples in one."""
+    """Return entries of a batch of `axes` axes, with samples on one axis."""
     if value.shape != expected.shape:
         return Entries(what, value, expected, scale)
     value, expected, scale = (a.reshape(-1, *a.shape[axes:]) for a in (value, expected, scale))

@@ -12,7 +12,7 @@ import typer
 from linkwise.escape import printable
 
 BUDGET = 2_000_000
-"""Terms of one expansion; a polynomial of this size takes about 0.5 GB."""
+"""Most terms of one expansion; a polynomial of this size takes about 0.5 GB."""
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON")]
 Details = Annotated[
@@ -29,5 +29,5 @@ def tell(*lines: str, err: bool = False) -> None:
 
 
 def counted(number: int, what: str) -> str:
-    """A number of things, "1 joint" or "3 joints"."""
+    """Return a number of things in words, "1 joint" or "3 joints"."""
     return f"{number} {what}{'' if number == 1 else 's'}"

@@ -214,7 +214,7 @@ def _told(analysis: Analysis, files: Sequence[Path]) -> list[str]:
 
 
 def _of_contacts(analysis: Analysis) -> list[str]:
-    """How far a motion is from keeping its contacts."""
+    """Return lines on how far a motion is from keeping its contacts."""
     robot, ground = analysis.robot, analysis.robot.contacts
     if ground is None:
         return []

@@ -1,4 +1,4 @@
-"""The command line's start: which commands there are, and how a mistake is told."""
+"""Start of the command line: the list of commands, and the report of a mistake."""
 
 import io
 import sys
@@ -34,7 +34,7 @@ REPORTS = {
 
 NUMPY = "numpy"
 LOADS = {"analyze": "pyarrow", "study": "pyarrow", "check": "torch", "graph": "torch"}
-"""The library of a command that wants most memory, if it is here; of others NumPy."""
+"""Library that takes most memory in a command, if it is installed; NumPy for other commands."""
 
 STATUSES = (
     f"Exit status: 0 done; 1 a check failed; {MISTAKE} a mistake in the input; {FAULT} a fault of linkwise"
@@ -45,11 +45,11 @@ STATUSES = (
 class OnDemand(TyperGroup):
     """A group that imports the file of a command, `NAME` or `GROUP_NAME`, when the command is called.
 
-    So `--help` need not wait for SymPy and NumPy, and a command not for the libraries of another.
+    Then `--help` need not wait for SymPy and NumPy, and a command not for the libraries of another.
     """
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
-        """Put the command itself in place of the entry that `--help` lists."""
+        """Return the command itself in place of the entry that `--help` lists."""
         name, command, rest = super().resolve_command(ctx, args)
         if command is None or isinstance(command, TyperGroup):
             return name, command and readable(command), rest
@@ -61,12 +61,12 @@ class OnDemand(TyperGroup):
 
 
 def command_of(app: typer.Typer) -> Any:
-    """The command of `app`, as `--help` and the documentation show it."""
+    """Return the command of `app`, as `--help` and the documentation show it."""
     return readable(typer.main.get_command(app))
 
 
 def readable(command: Any) -> Any:
-    """The command with nothing behind its switches, and names in capitals behind what may be repeated.
+    """Return the command with no types behind its switches, and capitals behind options that may repeat.
 
     Typer itself shows types of Python there, <bool> and <list[str]>.
     """
@@ -94,7 +94,7 @@ def _group(title: str, commands: dict[str, str], epilog: str | None = None) -> t
 
 
 def _entry() -> None:
-    """Stand in the list of commands."""
+    """Stand for a command in the list of commands."""
 
 
 def _show_version(asked: bool) -> None:
@@ -128,11 +128,11 @@ def _options(
         ),
     ] = False,
 ) -> None:
-    """Stand for the options of the whole."""
+    """Stand for the options of the whole program."""
 
 
 def main() -> None:
-    """Run the command line; what ends it early is one line on stderr, and an exit status (see `endings`)."""
+    """Run the command line; an early end gives one line on stderr, and an exit status (see `endings`)."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # whatever letters the terminal lacks

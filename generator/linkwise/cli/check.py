@@ -17,7 +17,7 @@ from linkwise.escape import json_text
 app = typer.Typer(add_completion=False)
 
 WIDTH = 64
-"""Columns of a check's name, for each is told as soon as it is made."""
+"""Columns of a check's name, fixed as each check is printed as soon as it is made."""
 
 
 @app.command()
@@ -42,7 +42,7 @@ def check(
 
 
 def verdict(results: Sequence[Result]) -> str:
-    """Of all checks in one line: how many held, how many failed, and how many could not be made."""
+    """Return one line on all checks: how many held, how many failed, and how many could not be made."""
     failed = [result.name for result in results if result.failed]
     held = sum(result.held is True for result in results)
     left = len(results) - held - len(failed)
@@ -55,6 +55,6 @@ def verdict(results: Sequence[Result]) -> str:
 
 
 def _row(result: Result) -> dict[str, Any]:
-    """JSON has no infinite error: the detail says it."""
+    """Return a result for JSON, which has no infinite error: the detail says it."""
     finite = result.error is not None and math.isfinite(result.error)
     return asdict(result) | {"error": result.error if finite else None, "mark": result.mark}

@@ -1,4 +1,4 @@
-"""What the files of a package depend on, as make and ninja read it.
+"""Dependencies of a package's files, as make and ninja read them.
 
 A package is made of the robot's file, of its own modules where it is one of Python, and of what `makers`
 lists.
@@ -17,13 +17,13 @@ from linkwise.makers import HOMES
 INSTALLED = {"site-packages", "dist-packages"}
 SPOKEN = str.maketrans({" ": "\\ ", "#": "\\#", "$": "$$"})
 UNFIT = re.compile(r"""[\x00-\x1f"&'*;<>?\[\\\]^`|:]|^~|\)$""")
-"""What make or ninja has no way to say in a file's name, or each a way of its own."""
+"""Characters of a file's name that make or ninja cannot write, or that each writes in its own way."""
 PATTERN = re.compile("[%=+!]")
-"""What makes something else of a line of make that begins with a file's name."""
+"""Characters that change the meaning of a line of make that begins with a file's name."""
 
 
 def depfile_text(targets: Iterable[str], inputs: Iterable[str]) -> str:
-    """Say in make's syntax that `targets` are made of `inputs`; raises LinkwiseError for an unfit name.
+    """Return make's rule by which `targets` depend on `inputs`; raises LinkwiseError for an unfit name.
 
     Each input has an empty rule of its own too, as those of `gcc -MP`: one that is gone then means "make it
     again" and not an error.
@@ -35,7 +35,10 @@ def depfile_text(targets: Iterable[str], inputs: Iterable[str]) -> str:
 
 
 def own_modules(before: Iterable[str]) -> Iterator[str]:
-    """Files of modules that a file of energies imported since `before`, not Python's own nor installed."""
+    """Yield the files of modules that a file of energies imported since `before`.
+
+    Python's own and installed modules are left out.
+    """
     places = [Path(sysconfig.get_path("stdlib")), Path(sysconfig.get_path("platstdlib"))]
     places += [Path(str(import_module(home).__file__)).parent for home in HOMES]
     for name in sorted(sys.modules.keys() - set(before)):

@@ -1,4 +1,4 @@
-"""How a command ends that cannot go on: one printable line on stderr, and an exit status."""
+"""Endings of a command that cannot go on: one printable line on stderr, and an exit status."""
 
 import os
 import sys
@@ -11,20 +11,20 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import one_line, short
 
 MISTAKE = 2
-"""Exit status where the input, an option or the system stands in the way: the user can mend it."""
+"""Exit status where the input, an option or the system stands in the way: the user can fix it."""
 FAULT = 70
 """Exit status of a fault of linkwise itself, as sysexits.h numbers it."""
 INTERRUPTED, CLOSED_PIPE = 130, 141
-"""As a shell reports a program that the signals SIGINT and SIGPIPE ended."""
+"""Exit statuses with which a shell reports a program that the signals SIGINT and SIGPIPE ended."""
 TRACEBACK = "LINKWISE_TRACEBACK"
-"""Set to 1, it adds the traceback of whatever ends a command."""
+"""Environment variable that, set to 1, adds the traceback of whatever ends a command."""
 LONGEST_LINE = 1000
-"""Characters of a message; lists are shortened where they are made, so hardly any comes near."""
+"""Most characters of a message; lists are shortened where they are made, so hardly any comes near."""
 
 
 @contextmanager
 def ended_in_one_line() -> Iterator[None]:
-    """Turn what is raised inside into a line on stderr and SystemExit."""
+    """Turn an exception that is raised inside into a line on stderr and SystemExit."""
     try:
         yield
         sys.stdout.flush()  # a full disk or a closed pipe shows here, and not after the end
@@ -42,7 +42,7 @@ def ended_in_one_line() -> Iterator[None]:
 
 
 def _let_go_of_output() -> None:
-    """Print what waits; where that cannot be, send it nowhere, as Python would try again at its end."""
+    """Print what waits; where that fails, send it nowhere, as Python would try again at its end."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
@@ -53,7 +53,7 @@ def _let_go_of_output() -> None:
 
 
 def ending(error: BaseException) -> tuple[str, int]:
-    """What is said of an error, and the exit status."""
+    """Return the message for an error, and the exit status."""
     match error:
         case LinkwiseError():
             return f"error: {error}", MISTAKE
@@ -71,7 +71,7 @@ def ending(error: BaseException) -> tuple[str, int]:
 
 
 def _place(error: BaseException) -> str:
-    """Where in linkwise the error came from, file and line."""
+    """Return the file and line in linkwise that an error came from, in words; empty for none."""
     home = Path(__file__).parents[1]
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         path = Path(frame.filename)

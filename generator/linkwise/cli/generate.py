@@ -1,7 +1,7 @@
 """The command `generate`.
 
-For build tools it says what it would write, what that depends on and whether it is up to date; it says no
-more than that where nobody watches.
+For build tools it reports the files that it would write, their dependencies and whether they are up to date;
+without --verbose it reports no more than that where the output is no terminal.
 """
 
 import sys
@@ -37,7 +37,7 @@ PANEL = "For build tools"
 
 @dataclass(frozen=True)
 class Choices:
-    """What is asked of every robot of one call."""
+    """Choices for every robot of one call."""
 
     options: Options
     out: Path
@@ -51,7 +51,7 @@ class Choices:
 
 @dataclass(frozen=True)
 class Order:
-    """A package that was asked for: of which robot, what makes its files, and where they go."""
+    """A package that was asked for: its robot, the plan of its files, and their directory."""
 
     robot: str
     plan: pipeline.PackagePlan
@@ -169,7 +169,7 @@ def generate(
 
 
 def _check_flags(list_outputs: bool, check: bool, depfile: Path | None, stamp: Path | None) -> None:
-    """Raise LinkwiseError for flags of which one writes and another must not."""
+    """Raise LinkwiseError for a flag that writes nothing together with another one."""
     flags = {"--list-outputs": list_outputs, "--check": check, "--depfile": depfile, "--stamp": stamp}
     given = [flag for flag, value in flags.items() if value]
     if len(given) > 1 and (list_outputs or check):
@@ -177,7 +177,10 @@ def _check_flags(list_outputs: bool, check: bool, depfile: Path | None, stamp: P
 
 
 def _order(robot: str, asked: Choices) -> Order:
-    """Read a robot; raises LinkwiseError, before anything is derived, where its package cannot be made."""
+    """Return the order for a robot's package.
+
+    Raises LinkwiseError, before anything is derived, where the package cannot be made.
+    """
     system = pipeline.read_system(robot, asked.options)
     made = pipeline.plan(
         system, asked.backends or None, asked.name, asked.kernel, asked.derivation, asked.vendor_runtime
@@ -188,7 +191,7 @@ def _order(robot: str, asked: Choices) -> Order:
 
 
 def _check_places(orders: Iterable[Order]) -> None:
-    """Raise LinkwiseError for two robots whose packages would have one place."""
+    """Raise LinkwiseError for two robots whose packages would have the same place."""
     taken: dict[Path, str] = {}
     for order in orders:
         if order.directory in taken:
@@ -218,7 +221,7 @@ def _check_side_files(orders: Sequence[Order], places: Iterable[Path], options: 
 
 
 def _told_differences(packages: Iterable[tuple[Order, dict[str, str]]], watched: bool) -> int:
-    """Print how each package on disk differs from its files; the exit status that says whether any does."""
+    """Print how each package on disk differs from its files; return the exit status for any difference."""
     status = 0
     for order, files in packages:
         found = differences(files, order.directory)
@@ -248,7 +251,7 @@ def _rule(
     stamp: Path | None,
     before: Iterable[str],
 ) -> str:
-    """Text of the depfile.
+    """Return the text of the depfile.
 
     A stamp stands for the packages: it is older than none of their files, and without one of them it is void.
     """

@@ -98,7 +98,7 @@ def _parts(robot: Any, i: int, j: int | None, k: int | None, m: int | None) -> l
 
 
 def _elsewhere(robot: Any, graph: Overlay) -> dict[str, int]:
-    """Operations of these parts in the torques through other links, where there are any."""
+    """Return the count of these operations in the torque through each other link, where there are any."""
     if graph.link is None:
         return {}
     counts = {}

@@ -10,18 +10,18 @@ from linkwise import pipeline
 from linkwise.cli import Json, counted
 from linkwise.cli.inspect_page import SUBJECTS, page
 from linkwise.cli.options import RobotName, reads_robot, tell_run
-from linkwise.emit.definition import joint_entries, rigid_tree
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, listed, printable
 from linkwise.package.entries import RigidTree
 from linkwise.robot import Options, kept_apart, left_out
 from linkwise.robot.robot import Parameter
+from linkwise.symbolic.definition import joint_entries, rigid_tree
 from linkwise.symbolic.system import EnergySystem, System
 
 LESS = "…"
-"""In place of an end that a joint does not have."""
+"""Text in place of an end that a joint does not have."""
 ALLOWING = "--allow-unphysical"
-"""What is told wherever a body that cannot exist is refused."""
+"""Flag that is named wherever a body that cannot exist is refused."""
 
 app = typer.Typer(add_completion=False)
 
@@ -47,12 +47,12 @@ def inspect(
         print(table(data))
     else:
         tree = rigid_tree(system)
-        ground = [frame.name for frame in tree.frames if frame.body is None] if tree else None
+        ground = [frame.name for frame in tree.frames if frame.joint is None] if tree else None
         print(page(data, ground, _joint, _moved_link, _constraint))
 
 
 def _system(robot: str, options: Options) -> tuple[System, str]:
-    """System, and why `generate` refuses it where that is for what cannot exist; else an empty text."""
+    """Return the system, and why `generate` refuses it as impossible, or else an empty string."""
     try:
         return pipeline.read_system(robot, options), ""
     except LinkwiseError as error:
@@ -66,7 +66,11 @@ def _system(robot: str, options: Options) -> tuple[System, str]:
 
 
 def inspection(system: System, details: bool = False, refused: str = "") -> dict[str, Any]:
-    """Joints, links, parameters and notes, ready for JSON; with `details` frames, and each joint's notes."""
+    """Return joints, links, parameters and notes, ready for JSON.
+
+    With `details` frames and each joint's notes are there too. `refused` says why `generate` refuses the
+    robot.
+    """
     tree = rigid_tree(system)
     notes = system.notes
     if not details:
@@ -93,7 +97,7 @@ def inspection(system: System, details: bool = False, refused: str = "") -> dict
 
 
 def _constraints(tree: RigidTree, joints: Sequence[str]) -> dict[str, Any]:
-    """Constraints, and the joints that move all others then; nothing without constraints."""
+    """Return the constraints, and the joints that then move all others; empty without constraints."""
     if not tree.independent:
         return {}
     ties = (
@@ -113,22 +117,22 @@ def _constraints(tree: RigidTree, joints: Sequence[str]) -> dict[str, Any]:
 
 
 def _frames(tree: RigidTree) -> list[dict[str, str | None]]:
-    """Frames that kinematics knows by name, and the moving link that carries each; None for the ground."""
+    """Return the frames that kinematics knows by name, each with its moving link; None for the ground."""
     return [
-        {"name": frame.name, "link": None if frame.body is None else tree.bodies[frame.body].link}
+        {"name": frame.name, "link": None if frame.joint is None else tree.bodies[frame.joint].link}
         for frame in tree.frames
     ]
 
 
 def parameters(system: System) -> tuple[Parameter, ...]:
-    """Run-time parameters: values in the file, units and meanings."""
+    """Return the run-time parameters: values in the file, units and meanings."""
     if isinstance(system, EnergySystem):
         return tuple(Parameter(s.name, float(v), "", "of the energies") for s, v in system.parameters.items())
     return system.robot.parameters
 
 
 def table(data: dict[str, Any]) -> str:
-    """Every line for a person."""
+    """Return all of `inspection`'s data as lines for a person."""
     lines = [
         f"{data['name']}: {counted(len(data['joints']), 'joint')}, {counted(len(data['links']), 'link')}"
     ]
@@ -172,7 +176,7 @@ def _link(number: int, link: dict[str, Any], most: int | None = None) -> str:
 
 
 def _moved_link(number: int, link: dict[str, Any]) -> str:
-    """A link, with the first of what moves it."""
+    """Return the row of a link, with the first of the joints that move it."""
     return _link(number, link, SUBJECTS)
 
 
@@ -181,7 +185,7 @@ def _constraint(_: int, constraint: dict[str, Any]) -> str:
 
 
 def _limits(joint: dict[str, Any]) -> str:
-    """The limits of a joint that the file gives, in words."""
+    """Return the limits of a joint that the file gives, in words."""
     unit = joint["unit"]
     ends = [joint[what] for what in ("lower", "upper")]
     said = [f"{LESS if e is None else f'{e:g}'}" for e in ends]
@@ -192,7 +196,7 @@ def _limits(joint: dict[str, Any]) -> str:
 
 
 def _held(constraint: dict[str, Any]) -> str:
-    """What a constraint holds, in words."""
+    """Return what a constraint holds, in words."""
     if constraint["kind"] == "coupling":
         return f"coupling of {', '.join(constraint['terms'])}"
     length = f" of {constraint['length']:g} m" if "length" in constraint else ""

@@ -1,4 +1,4 @@
-"""What `inspect` says of a robot in one page: how much there is, what matters, the first of each table."""
+"""One page of `inspect` on a robot: its size, what matters, and the first rows of each table."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
@@ -9,20 +9,20 @@ from linkwise.escape import listed, printable, short
 ROWS = 8
 """Most rows of a table on the page."""
 SUBJECTS = 4
-"""Most subjects of a remark; with their details where they are fewer."""
+"""Most subjects of a remark; if there are fewer, they are shown with their details."""
 LONGEST = 90
-"""Characters of a subject with its details."""
+"""Most characters of a subject with its details."""
 OF_DETAILS = ("constraint", "promoted")
-"""Kinds of remarks that tables with --details say."""
+"""Kinds of remarks that tables with --details contain."""
 
 Row = Callable[[int, dict[str, Any]], str]
 
 
 def page(data: dict[str, Any], ground: Sequence[str] | None, joint: Row, link: Row, held: Row) -> str:
-    """Lines for a person, of `inspection`'s data; no more for a large robot than for a small one.
+    """Return lines for a person, of `inspection`'s data; no more for a large robot than for a small one.
 
     ground: frames that stand still, none on a floating base; None where that is not known
-    joint, link, held: the row of a joint, a link, a constraint in its table, with its number from 1
+    joint, link, held: functions for the row of a joint, a link, a constraint, with its number from 1
     """
     lines = [_title(data)]
     if ground is not None:
@@ -59,7 +59,7 @@ def _rows(title: str, items: Sequence[dict[str, Any]], row: Row) -> Iterator[str
 
 
 def _remarks(notes: Iterable[dict[str, Any]]) -> Iterator[str]:
-    """A line for each kind of remark with the same effect: how many there are, what the first are about."""
+    """Yield a line for each kind of remark with one effect: how many there are, and the first subjects."""
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for note in notes:
         if note["kind"] not in OF_DETAILS:

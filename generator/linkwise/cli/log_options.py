@@ -15,7 +15,7 @@ UNITS = {
     "analysing": "samples",
     "fitting": "samples",
 }
-"""What progress is counted in."""
+"""Units in which progress is counted, by stage."""
 
 Log = Annotated[
     Path,

@@ -25,7 +25,7 @@ def _flag(*names: str, help: str, metavar: str | None = None) -> Any:
 
 
 def tell_run(*robots: str | Path) -> None:
-    """Say, in a line each, which of these robots are programs, and so were run to be read."""
+    """Print, in a line each, which of these robots are programs, and so were run to be read."""
     for robot in filter(is_program, robots):
         tell(f"note: {robot} is a Python program, which was run", err=True)
 
@@ -74,7 +74,7 @@ def robot_options(
         ),
     ] = None,
 ) -> Options:
-    """Options of the flags' values; raises LinkwiseError naming the flag."""
+    """Return the options of the flags' values; raises LinkwiseError naming the flag."""
     return Options(
         parameters,
         _locks(lock or ()),
@@ -91,7 +91,7 @@ def robot_options(
 def reads_robot(
     parameters: Parameters = "numeric",
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Give a command the flags of `robot_options`; it gets what they say as its argument `options`.
+    """Return a decorator that gives a command the flags of `robot_options`, as its argument `options`.
 
     `parameters` is the default of the flag of that name.
     """
@@ -114,7 +114,10 @@ def reads_robot(
 
 
 def _names(items: Iterable[str]) -> tuple[str, ...]:
-    """Lists A,B as they were given, for a joint's name may have a comma."""
+    """Return the lists A,B as they were given, for a joint's name may have a comma.
+
+    Raises LinkwiseError for an empty name.
+    """
     given = tuple(item.strip() for item in items)
     if not all(name.strip() for item in given for name in item.split(",")):
         raise LinkwiseError("--independent has an empty name; give joints as A,B")
@@ -122,7 +125,7 @@ def _names(items: Iterable[str]) -> tuple[str, ...]:
 
 
 def _locks(items: Iterable[str]) -> dict[str, float]:
-    """Values of the held joints, from JOINT=VALUE."""
+    """Return the values of the held joints, from JOINT=VALUE; raises LinkwiseError for another form."""
     locked: dict[str, float] = {}
     for item in items:
         joint, _, text = item.rpartition("=")

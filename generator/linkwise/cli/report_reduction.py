@@ -32,10 +32,10 @@ from linkwise.robot.size import MOST_JOINTS
 from linkwise.symbolic.system import System, rigid_system
 
 CHECKED_TO = 14
-"""A planar arm is counted at least to here: the paper's ten joints, and four to confirm."""
+"""Joints to which a planar arm is counted at least: the paper's ten, and four to confirm."""
 PLANAR_ARM = "planar arm"
 ASKED_FOR = 10
-"""Degrees of freedom at most where nobody says how many: as many as the paper's."""
+"""Most degrees of freedom where nobody says how many: as many as the paper's."""
 
 app = typer.Typer(add_completion=False)
 
@@ -89,7 +89,10 @@ def reduction(
 
 
 def dof_range(text: str) -> tuple[int, int]:
-    """Parse FIRST..LAST or a single number; raises LinkwiseError for an empty or negative range."""
+    """Return FIRST and LAST of FIRST..LAST or a single number.
+
+    Raises LinkwiseError for an empty or negative range.
+    """
     # Nine digits: more than any robot's joints, and far below what Python takes for one number.
     match = re.fullmatch(r"(\d{1,9})(?:\.\.(\d{1,9}))?", text)
     first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
@@ -101,7 +104,7 @@ def dof_range(text: str) -> tuple[int, int]:
 
 
 def _arm(robot: str, last: int, options: Options) -> tuple[str, System, int]:
-    """Name of the arm, the arm, and up to how many degrees of freedom to count it beyond those asked for."""
+    """Return the arm's name, the arm, and the degrees of freedom up to which it is counted in any case."""
     if robot == "planar":
         arm = read_robot(f"planar{_planar_joints(last, len(options.lock))}", options)
         return PLANAR_ARM, rigid_system(replace(arm, name=PLANAR_ARM)), CHECKED_TO
@@ -109,7 +112,7 @@ def _arm(robot: str, last: int, options: Options) -> tuple[str, System, int]:
 
 
 def _planar_joints(last: int, locked: int) -> int:
-    """Joints of the planar arm of which `locked` are held, so that enough move."""
+    """Return the number of joints of the planar arm of which `locked` are held, so that enough move."""
     if last > MOST_JOINTS:
         raise LinkwiseError(f"--dof reaches {last}, but the planar arm has at most {MOST_JOINTS} joints")
     return min(max(last, CHECKED_TO) + locked, MOST_JOINTS)

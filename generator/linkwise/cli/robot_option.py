@@ -18,7 +18,7 @@ RobotOption = Annotated[
 
 
 def opened_robot(robot: Path, backend: str | None, options: Options, progress: Progress) -> LoadedRobot:
-    """The robot, loaded; says that it was run, if it is a program, and what of a file touches the torques.
+    """Load the robot; report that it was run, if it is a program, and what of its file affects the torques.
 
     Raises LinkwiseError.
     """

@@ -8,7 +8,7 @@ from linkwise.expression.expression_graph import Graph, Node
 
 @dataclass(frozen=True)
 class Inputs:
-    """Nodes of q, q̇ and q̈, by coordinate, and of the run-time parameters, by name."""
+    """Nodes of q, q̇ and q̈, by coordinate."""
 
     q: tuple[Node, ...]
     qd: tuple[Node, ...]
@@ -38,7 +38,7 @@ class LinkForms:
     velocity_linear: dict[tuple[int, int], Node] = field(default_factory=dict)
 
     def decomposition(self) -> Iterator[Node]:
-        """Every output of the full decomposition, in the packed order: c2, c1, g, τ."""
+        """Yield every output of the full decomposition, in the packed order: c2, c1, g, τ."""
         yield from self.acceleration.values()
         yield from self.velocity.values()
         yield from self.gravity.values()

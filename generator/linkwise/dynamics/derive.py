@@ -1,4 +1,4 @@
-"""From a system to kernels: the closed forms of each link."""
+"""Derivation of kernels from a system: the closed forms of each link."""
 
 from operator import itemgetter
 from typing import Literal
@@ -12,13 +12,13 @@ from linkwise.symbolic.link_energy import lineage, link_energies
 from linkwise.symbolic.system import EnergySystem, System, refuse_curves
 
 Method = Literal["rule", "energy"]
-"""How the closed forms of rigid links are found: by the rigid-link rule, or from their SymPy energies."""
+"""Ways to the closed forms of rigid links: the rigid-link rule, or their SymPy energies."""
 
 
 def link_kernel(system: System, link: int, method: Method = "rule") -> Kernel:
-    """Closed forms of one link from its own path alone, whatever else the robot has.
+    """Return the closed forms of one link from its own path alone, whatever else the robot has.
 
-    Those of energies that a user wrote come from these in any case. Raises LinkwiseError for joints
+    For energies that a user wrote, they are derived from these in any case. Raises LinkwiseError for joints
     that follow curves.
     """
     refuse_curves(system)
@@ -33,7 +33,7 @@ def link_kernel(system: System, link: int, method: Method = "rule") -> Kernel:
 
 
 def _energy_kernel(system: System, link: int) -> Kernel:
-    """Closed forms by Euler-Lagrange on the expression graph."""
+    """Return the closed forms of a link by Euler-Lagrange on the expression graph."""
     lower, x = lowering(system)
     energies = link_energies(system)
     for carrier in lineage(energies, link):
@@ -48,7 +48,7 @@ def _energy_kernel(system: System, link: int) -> Kernel:
 
 
 def derive(system: System, progress: Progress = silent, method: Method = "rule") -> tuple[Kernel, ...]:
-    """One kernel per link: its closed forms on a graph."""
+    """Return one kernel per link: its closed forms on a graph."""
     kernels = []
     for j in range(len(system.links)):
         progress("derive", j, len(system.links))

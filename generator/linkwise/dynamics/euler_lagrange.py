@@ -4,7 +4,8 @@
 c2_ik = ∂²L/∂q̇_i∂q̇_k          g_i = −∂L/∂q_i at q̇ = 0
 h_i  = Σ_s ∂²L/∂q̇_i∂q_s q̇_s − ∂L/∂q_i = h2 + h1 + g, of degree 2, 1 and 0 in q̇
 c1_ik = ½ ∂h2_i/∂q̇_k + ∂h1_i/∂q̇_k = ½ (H + H₀), H = ∂h_i/∂q̇_k and H₀ = H at q̇ = 0.
-H₀ is there where L has terms b(q)·q̇, b = ∂L/∂q̇ at q̇ = 0, though zero where b is the slope of a function of q.
+H₀ is there where L has terms b(q)·q̇, with b = ∂L/∂q̇ at q̇ = 0, but is zero where b is the gradient of a
+function of q.
 """
 
 from linkwise.dynamics.coefficients import Inputs, LinkForms
@@ -13,7 +14,7 @@ from linkwise.expression.expression_graph import Graph, Node
 
 
 def euler_lagrange(graph: Graph, lagrangian: Node, path: tuple[int, ...], x: Inputs) -> LinkForms:
-    """Closed forms of one link from its Lagrangian alone, over the coordinates of `path`."""
+    """Return the closed forms of one link from its Lagrangian alone, over the coordinates of `path`."""
     g = graph
     rest = {x.qd[s]: g.zero for s in path}
     momentum = {i: derivative(g, lagrangian, x.qd[i]) for i in path}

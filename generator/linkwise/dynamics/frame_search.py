@@ -1,4 +1,4 @@
-"""Common frames of the rigid-link rule: a few are tried, and the one of the fewest operations is kept."""
+"""Search for the common frame of the rigid-link rule: a few are tried, that of fewest operations is kept."""
 
 from collections.abc import Iterator, Sequence
 from operator import itemgetter
@@ -18,9 +18,9 @@ Attempt = tuple[int, CommonAxes, Origin]
 
 
 class FrameSearch:
-    """Common frames for some links of a tree, by what their decomposition costs.
+    """Search for a common frame for some links of a tree, by the cost of their decomposition.
 
-    links: their indices in the system; chains: of each its path in `tree`, which lists (parent, joint)
+    links: indices of the links in the system; chains: path of each in `tree`, which lists (parent, joint)
     """
 
     def __init__(
@@ -30,7 +30,7 @@ class FrameSearch:
         self.links = [system.links[j] for j in links]
 
     def build(self, axes: CommonAxes, origin: Origin, gradient: bool = True) -> Kernel:
-        """Kernel in a common frame, with or without the position gradient."""
+        """Return the kernel in a common frame, with or without the position gradient."""
         lower, x = lowering(self.system)
         turn = Orientation(lower, self.tree, self.system.robot.gravity, axes, x)
         forms = tuple(
@@ -41,13 +41,13 @@ class FrameSearch:
         return Kernel(lower.graph, x, parameter_nodes(self.system, lower), forms, frame)
 
     def attempt(self, axes: CommonAxes, origin: Origin) -> Attempt:
-        """Operations of a common frame, and the frame."""
+        """Return the number of operations in a common frame, and the frame: its axes and origin."""
         kernel = self.build(axes, origin, gradient=False)
         outputs = [node for forms in kernel.forms for node in forms.decomposition()]
         return count_operations(kernel.graph, outputs).arithmetic, axes, origin
 
     def framed(self, most_axes: int) -> Iterator[Attempt]:
-        """Frames of the longest chain, their own axes and origin, then the best with other origins."""
+        """Yield attempts in frames of the longest chain, with own origins, then the best with others."""
         longest = max(self.chains, key=len)
         tried = [self.attempt(axes, Origin(axes.frame)) for axes in _axes(longest, most_axes)]
         yield from tried
@@ -57,10 +57,10 @@ class FrameSearch:
                 yield self.attempt(best, Origin(frame))
 
     def central(self, most_axes: int) -> Iterator[Attempt]:
-        """Origins in the one link's centre of mass; the best one also by points.
+        """Yield attempts with the origin in the one link's centre of mass; the best axes also by points.
 
-        Its principal axes are not among them: they make three products zero and the turns before them full,
-        and were the cheapest for none of the robots that they were tried on.
+        The link's principal axes are not among them: they make three products zero and the rotations before
+        them full, and were the cheapest for none of the robots that they were tried on.
         """
         tried = [self.attempt(axes, Origin()) for axes in _axes(self.chains[0], most_axes)]
         yield from tried
@@ -68,7 +68,7 @@ class FrameSearch:
 
 
 def _axes(chain: Sequence[int], most: int) -> Iterator[CommonAxes]:
-    """Axes to try: the base's, and those before and behind joints spread over the chain."""
+    """Yield the axes to try: the base's, and those before and behind joints spread over the chain."""
     yield CommonAxes(-1)
     for f in _spread(chain, most):
         yield CommonAxes(f)
@@ -76,7 +76,7 @@ def _axes(chain: Sequence[int], most: int) -> Iterator[CommonAxes]:
 
 
 def _spread(items: Sequence[int], most: int) -> list[int]:
-    """At most `most` of the items: all of the first few, then spread evenly to the last."""
+    """Return at most `most` of the items: all of the first few, then spread evenly to the last."""
     if len(items) <= most:
         return list(items)
     near = list(items[: most // 2])

@@ -30,7 +30,7 @@ class Kernel:
 
 
 def lowering(system: System) -> tuple[Lowering, Inputs]:
-    """Return an empty graph with symbols for the coordinates, velocities and parameters."""
+    """Return a lowering to an empty graph with symbols for q, q̇, q̈ and the parameters, and its inputs."""
     graph = Graph()
     x = inputs(graph, len(system.coordinates))
     symbols = {c.q: node for c, node in zip(system.coordinates, x.q, strict=True)}
@@ -40,13 +40,13 @@ def lowering(system: System) -> tuple[Lowering, Inputs]:
 
 
 def parameter_names(system: System) -> dict[sp.Symbol, str]:
-    """Identifiers of the run-time parameters: their names made safe, and told apart when they then agree."""
+    """Return identifiers of the run-time parameters: safe names, distinguished where they then agree."""
     symbols = list(system.parameters)
     return dict(zip(symbols, identifiers([symbol.name for symbol in symbols], "p_"), strict=True))
 
 
 def decomposition_cost(kernels: Iterable[Kernel]) -> int:
-    """Additions, multiplications and divisions of full decompositions, each kernel by itself."""
+    """Return the additions, multiplications and divisions of full decompositions, each kernel by itself."""
     return sum(
         count_operations(k.graph, [node for forms in k.forms for node in forms.decomposition()]).arithmetic
         for k in kernels

@@ -1,4 +1,4 @@
-"""Motion of one link's path about a common origin o: what placing decides, beside what turning decides.
+"""Motion of one link's path about a common origin o: the part that depends on o, and not on the axes alone.
 
 Coordinate k's axis is S_k = (z_k, s_k) with s_k = (p_k − o) × z_k, p_k a point on the axis (prismatic: z = 0,
 s the direction). With the twist V_k = (ω, v) and the acceleration A_k, gravity included, before joint k:
@@ -17,7 +17,7 @@ from linkwise.symbolic.system import RigidLink
 
 @dataclass(frozen=True)
 class Origin:
-    """The common frame's origin o: a frame of the tree, at rest, or with None the centre of mass, moving.
+    """Origin o of the common frame: that of a frame of the tree, at rest; None: the centre of mass, moving.
 
     `by_points` finds each ṡ of a moving o from the velocity of a point on the axis relative to it: cheaper
     where axes keep their direction.
@@ -40,7 +40,7 @@ class Screw:
 
 @dataclass(frozen=True)
 class LinkMotion:
-    """One link in the common frame.
+    """Motion of one link in the common frame.
 
     m: its mass; com: its centre of mass from o; gravity: the gravity vector
     twist (ω, v) and acceleration (α, a − gravity) of the link; screws: those of its path, root first
@@ -57,7 +57,7 @@ class LinkMotion:
 
 
 def link_motion(turn: Orientation, link: RigidLink, chain: Sequence[int], origin: Origin) -> LinkMotion:
-    """Motion of the link at the end of `chain`, the indices of its path in the tree of `turn`."""
+    """Return the motion of the link at the end of `chain`, the indices of its path in the tree of `turn`."""
     g, end = turn.g, chain[-1]
     mass = turn.lower(link.mass)
     # √m of a run-time parameter would have no gradient at 0, and a negative mass has none at all.
@@ -95,12 +95,15 @@ class _Path:
     unit: Node
 
     def step(self, f: int) -> Vector:
-        """From the origin of the parent's frame to that of frame f."""
+        """Return the vector from the origin of the parent's frame to that of frame f."""
         g, turn = self.turn.g, self.turn
         return vec.apply(g, turn.rotations[turn.tree[f][0]], vec.scale(g, self.unit, turn.offset(f)))
 
     def places(self, start: int, at: Vector) -> dict[int, Vector]:
-        """Origins of the frames of the chain, from the one of frame `start`, up to the base and out again."""
+        """Return the origins of the frames of the chain.
+
+        They are found from that of frame `start`, up to the base and out again.
+        """
         g, tree = self.turn.g, self.turn.tree
         places, f = {start: at}, start
         while f >= 0:
@@ -112,7 +115,7 @@ class _Path:
         return places
 
     def axis(self, f: int, place: Vector) -> Spatial:
-        """S = (z, s) of joint f."""
+        """Return S = (z, s) of joint f."""
         g, turn = self.turn.g, self.turn
         if turn.tree[f][1].kind == "revolute":
             s = vec.cross(g, place, turn.z[f])
@@ -121,7 +124,7 @@ class _Path:
         return turn.z[f], vec.named(g, f"s{turn.labels[f]}", s)
 
     def twists_from_the_base(self, axes: Sequence[Spatial]) -> list[Spatial]:
-        """Twist before each joint, then the link's, about an o at rest: v = 0 at the base."""
+        """Return the twist before each joint, then the link's, about an o at rest: v = 0 at the base."""
         g, turn = self.turn.g, self.turn
         v = [vec.zero(g)]
         for f, (_, s) in zip(self.chain, axes, strict=True):
@@ -130,7 +133,10 @@ class _Path:
         return self._with_omega(v)
 
     def twists_from_the_link(self, axes: Sequence[Spatial]) -> list[Spatial]:
-        """The same about an o that moves with the link: v = 0 at the link."""
+        """Return the twist before each joint, then the link's, about an o that moves with the link.
+
+        v = 0 at the link.
+        """
         g, turn = self.turn.g, self.turn
         v = [vec.zero(g)]
         for f, (_, s) in zip(reversed(self.chain), reversed(axes), strict=True):
@@ -146,10 +152,10 @@ class _Path:
     def motion_of_points(
         self, axes: Sequence[Spatial], places: dict[int, Vector]
     ) -> tuple[list[Spatial], list[Vector]]:
-        """Twist before each joint, then the link's, and each ṡ, from velocities u relative to the moving o.
+        """Return the twist before each joint, then the link's, and each ṡ, by velocities u relative to o.
 
-        With r the place of a frame: ṙ = u, u = ω × r for the link's own, u_parent = u − ω × step − slide q̇,
-        and s = r × z gives ṡ = u × z + r × ż. The parent's v at o is u − ω × r.
+        With r the place of a frame and o moving: ṙ = u, u = ω × r for the link's own, u_parent = u − ω × step
+        − slide q̇, and s = r × z gives ṡ = u × z + r × ż. The parent's v at o is u − ω × r.
         """
         g, turn, end = self.turn.g, self.turn, self.chain[-1]
         u = vec.cross(g, turn.omega[end], places[end])
@@ -173,7 +179,10 @@ class _Path:
     def screws(
         self, axes: Sequence[Spatial], rates: Sequence[Vector], twists: Sequence[Spatial], gravity: Vector
     ) -> tuple[list[Screw], Vector]:
-        """S, Ṡ, S̈ of the path's joints, and the link's acceleration: from −gravity, a ← a + q̇ ṡ + q̈ s."""
+        """Return S, Ṡ, S̈ of the path's joints, and the link's acceleration.
+
+        The acceleration starts from −gravity, with a ← a + q̇ ṡ + q̈ s.
+        """
         g, turn = self.turn.g, self.turn
         a = vec.minus(g, gravity)
         screws = []

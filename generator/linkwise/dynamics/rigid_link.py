@@ -13,15 +13,15 @@ k one wrench (N, f) gives a column of coefficients, c_ijk = z_i · N + s_i · f:
 
     c2_k:  N = h × s_k + I z_k                f = m s_k + z_k × h
     c1_k:  N = h × ṡ_k + I ż_k + B z_k        f = m ṡ_k + ż_k × h + z_k × P
-    τ:     the same two with the acceleration and twist of the link, minus gravity (g: gravity alone); where
-           the coefficients are computed too, their sum is often cheaper (`torque_sums`)
+    τ:     N and f likewise with the acceleration and twist of the link, minus gravity (g: gravity alone);
+           where the coefficients are computed too, their sum is often cheaper (`torque_sums`)
 
 The position gradient follows from how a link's wrench F turns with joint k:
     c0_ijk = S_i · (I S̈_k + 2 B Ṡ_k) + [k at or after i] S_i · (S_k ×* F)
 
 The common frame is free, and two choices pay. With o where axes of the path meet, their s vanish. With o in
 the link's centre of mass, moving along with it, h, v and P vanish; lengths in units of 1/√m make m one too,
-where it is a number. Which is cheaper is found by counting (`frame_search`).
+where it is a number. The cheaper one is found by counting (`frame_search`).
 """
 
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ ROUNDING = 1e-14
 def rigid_forms(
     turn: Orientation, link: RigidLink, chain: Sequence[int], origin: Origin, gradient: bool = True
 ) -> LinkForms:
-    """Closed forms of the link at the end of `chain`, the indices of its path in the tree of `turn`.
+    """Return the closed forms of the link at the end of `chain`, the indices of its path in `turn`'s tree.
 
     Without `gradient` the position gradient is left out.
     """
@@ -79,7 +79,7 @@ def rigid_forms(
 
 @dataclass(frozen=True)
 class _Moments:
-    """m, h, I, P and B of a link about o."""
+    """Moments of a link about o: m, h, I, P and B."""
 
     m: Node
     h: Vector
@@ -88,37 +88,40 @@ class _Moments:
     b: Matrix
 
     def accelerated(self, g: Graph, a: Spatial) -> Spatial:
-        """N = h × s + I z, f = m s + z × h, for an acceleration (z, s)."""
+        """Return N = h × s + I z, f = m s + z × h, for an acceleration (z, s)."""
         z, s = a
         moment = vec.add(g, vec.cross(g, self.h, s), vec.apply(g, self.inertia, z))
         return moment, vec.add(g, vec.scale(g, self.m, s), vec.cross(g, z, self.h))
 
     def by_velocity(self, g: Graph, z: Vector) -> Spatial:
-        """N = B z, f = z × P."""
+        """Return N = B z, f = z × P."""
         return vec.apply(g, self.b, z), vec.cross(g, z, self.momentum)
 
     def wrench(self, g: Graph, motion: LinkMotion) -> Spatial:
-        """Wrench of τ: of the link's acceleration and twist."""
+        """Return the wrench of τ, by the link's acceleration and twist."""
         return spatial_add(g, self.accelerated(g, motion.acceleration), self.by_velocity(g, motion.twist[0]))
 
     def inertial(self, g: Graph, screw: Screw) -> Spatial:
-        """Wrench of c2 for the screw's coordinate."""
+        """Return the wrench of c2 for the screw's coordinate."""
         return _named(g, screw, "c2", self.accelerated(g, screw.s))
 
     def coriolis(self, g: Graph, screw: Screw) -> Spatial:
-        """Wrench of c1 for the screw's coordinate."""
+        """Return the wrench of c1 for the screw's coordinate."""
         turning = self.by_velocity(g, screw.s[0])
         return _named(g, screw, "c1", spatial_add(g, self.accelerated(g, screw.sd), turning))
 
     def turned(self, g: Graph, screw: Screw, wrench: Spatial) -> tuple[Spatial, Spatial]:
-        """Change of the wrench with the screw's coordinate, for joints behind it, and for it and before."""
+        """Return the change of the wrench with the screw's coordinate, as two wrenches.
+
+        The first is for joints behind the screw's, the second for it and those before.
+        """
         turning = self.by_velocity(g, screw.sd[0])
         after = spatial_add(g, self.accelerated(g, screw.sdd), spatial_add(g, turning, turning))
         return after, spatial_add(g, after, force_cross(g, screw.s, wrench))
 
 
 def _moments(turn: Orientation, link: RigidLink, frame: int, motion: LinkMotion) -> _Moments:
-    """h, I, P and B in the common frame, from the inertia J about the centre of mass c."""
+    """Return h, I, P and B in the common frame, from the inertia J about the centre of mass c."""
     g, (omega, v), com = turn.g, motion.twist, motion.com
     # h = m c
     h = vec.scale(g, motion.m, com)
@@ -146,13 +149,16 @@ def _moments(turn: Orientation, link: RigidLink, frame: int, motion: LinkMotion)
 
 
 def _weight(g: Graph, moments: _Moments, motion: LinkMotion) -> Spatial:
-    """Gravity's wrench: f = −m a_g, N = c × f."""
+    """Return gravity's wrench: f = −m a_g, N = c × f."""
     force = vec.minus(g, vec.scale(g, moments.m, motion.gravity))
     return vec.cross(g, motion.com, force), force
 
 
 def _without_rounding(g: Graph, m: Matrix) -> Matrix:
-    """Drop numbers that are nothing but rounding, as turns by right angles leave of products of inertia."""
+    """Return the matrix without numbers that are only rounding.
+
+    Turns by right angles leave such numbers in products of inertia.
+    """
     values = [abs(v) for row in m for e in row if (v := g.value(e)) is not None]
     least = ROUNDING * max(values, default=0.0)
 
@@ -164,7 +170,7 @@ def _without_rounding(g: Graph, m: Matrix) -> Matrix:
 
 
 def _named(g: Graph, screw: Screw, coefficient: str, wrench: Spatial) -> Spatial:
-    """n3_c2 and f3_c2: moment and force of the wrench behind the coefficients c2 of joint 3."""
+    """Return the wrench, named n3_c2 (moment) and f3_c2 (force) where the coefficients are c2 of joint 3."""
     n, f = wrench
     return (
         vec.named(g, f"n{screw.label}_{coefficient}", n),

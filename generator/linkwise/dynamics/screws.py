@@ -14,22 +14,22 @@ Spatial = tuple[Vector, Vector]
 
 
 def motion_cross(g: Graph, a: Spatial, b: Spatial) -> Vector:
-    """Linear part of (ω, v) × (z, s) = (ω × z, ω × s + v × z)."""
+    """Return the linear part of (ω, v) × (z, s) = (ω × z, ω × s + v × z)."""
     return vec.add(g, vec.cross(g, a[0], b[1]), vec.cross(g, a[1], b[0]))
 
 
 def force_cross(g: Graph, a: Spatial, f: Spatial) -> Spatial:
-    """(z, s) ×* (N, f) = (z × N + s × f, z × f)."""
+    """Return (z, s) ×* (N, f) = (z × N + s × f, z × f)."""
     return vec.add(g, vec.cross(g, a[0], f[0]), vec.cross(g, a[1], f[1])), vec.cross(g, a[0], f[1])
 
 
 def spatial_add(g: Graph, a: Spatial, b: Spatial) -> Spatial:
-    """a + b."""
+    """Return a + b."""
     return vec.add(g, a[0], b[0]), vec.add(g, a[1], b[1])
 
 
 def pair_product(g: Graph, s: Spatial, f: Spatial) -> Node:
-    """z · N + s · f."""
+    """Return z · N + s · f."""
     return g.add(vec.dot(g, s[0], f[0]), vec.dot(g, s[1], f[1]))
 
 
@@ -38,7 +38,7 @@ class CommonAxes:
     """The axes that vectors are written in: those of a frame of the tree.
 
     Frame −1 is the base, frame f the one of the f-th link; `before` means just before the turn of its joint,
-    which the joint's own axis does not feel.
+    which does not change the joint's own axis.
     """
 
     frame: int
@@ -84,17 +84,17 @@ class Orientation:
         return a, b, c
 
     def _turn(self, f: int, joint: Joint) -> Matrix:
-        """Rz(ratio · q) of a revolute joint, the identity of a prismatic one."""
+        """Return Rz(ratio · q) of a revolute joint, the identity of a prismatic one."""
         g = self.g
         if joint.kind == "prismatic":
             return vec.identity(g)
         angle = g.mul(g.const(joint.ratio), self.x.q[joint.coordinate])
-        s = g.name(g.call("sin", angle), f"s{self.labels[f]}")
-        c = g.name(g.call("cos", angle), f"c{self.labels[f]}")
+        s = g.name(g.call("sin", angle), f"sin{self.labels[f]}")
+        c = g.name(g.call("cos", angle), f"cos{self.labels[f]}")
         return ((c, g.neg(s), g.zero), (s, c, g.zero), (g.zero, g.zero, g.one))
 
     def _orient(self, axes: CommonAxes) -> dict[int, Matrix]:
-        """Orientation of every frame, walking the tree away from the common one both ways."""
+        """Return the orientation of every frame, walking the tree away from the common one both ways."""
         g, at = self.g, axes.frame
         rotations = {at: self._turns[at] if axes.before else vec.identity(g)}
         unturned = vec.identity(g) if axes.before else None
@@ -131,16 +131,16 @@ class Orientation:
         self.alpha[f] = vec.named(g, f"wd{label}", rate)
 
     def label_before(self, f: int) -> str:
-        """Label of the joint that carries joint f; 0 for the base."""
+        """Return the label of the joint that carries joint f; 0 for the base."""
         parent = self.tree[f][0]
         return self.labels[parent] if parent >= 0 else "0"
 
     def rate(self, f: int) -> Node:
-        """q̇ of joint f's coordinate."""
+        """Return q̇ of joint f's coordinate."""
         return self.x.qd[self.tree[f][1].coordinate]
 
     def offset(self, f: int) -> Vector:
-        """From the parent frame's origin to frame f's, in the parent's axes."""
+        """Return the vector from the parent frame's origin to frame f's, in the parent's axes."""
         g, joint = self.g, self.tree[f][1]
         x, y, z = (self.lower(p) for p in joint.translation)
         if joint.kind == "revolute":
@@ -150,7 +150,7 @@ class Orientation:
 
 
 def _labels(tree: Sequence[tuple[int, Joint]]) -> list[str]:
-    """Number of each joint's coordinate, from 1; joints that follow one coordinate are 3, 3b, 3c, …"""
+    """Return the number of each joint's coordinate, from 1; several joints of one are 3, 3b, 3c, …"""
     labels: list[str] = []
     seen: Counter[int] = Counter()
     for _, joint in tree:
@@ -161,6 +161,6 @@ def _labels(tree: Sequence[tuple[int, Joint]]) -> list[str]:
 
 
 def _letter(number: int) -> str:
-    """2 → b, 3 → c, …, 27 → aa."""
+    """Return the letters of a number: 2 → b, 3 → c, …, 27 → aa."""
     head, last = divmod(number - 1, 26)
     return (_letter(head) if head else "") + chr(ord("a") + last)

@@ -1,8 +1,8 @@
 """Torques from their own coefficients: τ_ij = g_ij + Σ_k (c2_ijk q̈_k + c1_ijk q̇_k).
 
-A decomposition has the coefficients at hand, so that short paths get τ cheaper by this sum, two products for
-each (i, k), than by the link's wrench, which long paths pay for once. It is taken column by column: what is
-known of τ after joint k is one value for each joint i, however many coefficients there are.
+A decomposition has the coefficients at hand, so that on short paths τ is cheaper by this sum, two products
+for each (i, k), than by the link's wrench, which is computed once and pays on long paths. The sum is taken
+column by column: after joint k there is one value of τ for each joint i, however many coefficients there are.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ Pairs = Mapping[tuple[int, int], Node]
 
 
 class TorqueSums:
-    """Growing sums: `tau`[i] is what gravity and the joints added so far ask of joint i.
+    """Growing sums: `tau`[i] is the torque on joint i of gravity and of the columns added so far.
 
     gravity: g_ij, by joint, coordinates ascending
     """
@@ -26,7 +26,7 @@ class TorqueSums:
         self._steps = [(node, f"g_{i + 1}") for i, node in gravity.items()]
 
     def add(self, k: int, c2: Pairs, c1: Pairs) -> None:
-        """Add column k; c2 (i, k) for i ≤ k and c1 (i, k) of it must be whole, and columns come in order."""
+        """Add column k; its c2 (i, k) for i ≤ k and c1 (i, k) must be complete, and columns come in order."""
         for i in self.tau:
             if i <= k:
                 self._add(i, c2[i, k], self.x.qdd[k])
@@ -45,7 +45,7 @@ class TorqueSums:
         return self.tau
 
     def _name(self, c2: Pairs, c1: Pairs) -> None:
-        """Suggest names for the coefficients and for each joint's sums, but the last: c1_3_4, tau3_4."""
+        """Suggest names for the coefficients and for each joint's sums except the last: c1_3_4, tau3_4."""
         for prefix, pairs in (("c2", c2), ("c1", c1)):
             for (i, k), node in pairs.items():
                 self.g.name(node, f"{prefix}_{i + 1}_{k + 1}")

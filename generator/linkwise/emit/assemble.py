@@ -1,4 +1,4 @@
-"""Everything of a generated package that is not one back end: names, loading, shared calls, manifest."""
+"""Parts of a generated package that are of no single back end: names, loading, shared calls, manifest."""
 
 import hashlib
 import keyword
@@ -16,14 +16,6 @@ from linkwise.emit.backend import BackendFiles
 from linkwise.emit.bodies import body_texts, parameter_rules
 from linkwise.emit.c import loop_costs
 from linkwise.emit.c.flash import code_size
-from linkwise.emit.definition import (
-    energies,
-    file_joint_entries,
-    follower_entries,
-    in_radians,
-    joint_entries,
-    rigid_tree,
-)
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.shared_texts import init_text, names_text
 from linkwise.emit.vendored_runtime import with_runtime
@@ -31,22 +23,31 @@ from linkwise.errors import LinkwiseError
 from linkwise.package.manifest import FILE, LinkEntry, Manifest, RuntimeEntry
 from linkwise.package.runtime_imports import RUNTIME
 from linkwise.progress import Progress, silent
+from linkwise.symbolic.definition import (
+    energies,
+    file_joint_entries,
+    follower_entries,
+    in_radians,
+    joint_entries,
+    rigid_tree,
+)
 from linkwise.symbolic.system import RigidSystem
 
 LONGEST_NAME = 60
 DEVICES = {"aux", "con", "nul", "prn", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
-"""What no file of Windows may be called, whatever follows behind a dot."""
+"""Names of devices, which no file of Windows may have, whatever follows after a dot."""
 LINK_HEADER = re.compile(r"link_\d+")
-"""Headers beside that of a package's own name."""
+"""Pattern of headers beside that of a package's own name."""
 HEADERS = {Path(file.name).stem for file in resources.files("linkwise").joinpath("c").iterdir()}
-"""Of every robot: their include guards and functions begin with their names, as a package's own do."""
+"""Headers of every robot: their include guards and functions begin with their names, as a package's own
+do."""
 TAKEN = {"numpy", "torch", "linkwise", RUNTIME, *sys.stdlib_module_names, *DEVICES, *HEADERS}
 
 
 def package_files(
     derivation: Derivation, backends: Sequence[BackendFiles], progress: Progress = silent
 ) -> dict[str, str]:
-    """Files of a package with these back ends: {path inside the package: text}."""
+    """Return the files of a package with these back ends: {path inside the package: text}."""
     files: dict[str, str] = {}
     emitters = list(dict.fromkeys(emitter for backend in backends for emitter in backend.emits))
     for number, emitter in enumerate(emitters):
@@ -61,7 +62,7 @@ def package_files(
 
 
 def identifier(name: str) -> str:
-    """Module name made of a robot's name: letters, digits, underscores; no keyword, no module in use."""
+    """Return a module name made of a robot's name: letters, digits, underscores; not a keyword or in use."""
     text = re.sub(r"[^0-9a-z_]+", "_", name.lower()).strip("_")[:LONGEST_NAME] or "robot"
     if text[0].isdigit() or _is_taken(text):
         text = f"robot_{text}"
@@ -69,7 +70,10 @@ def identifier(name: str) -> str:
 
 
 def checked_identifier(name: str | None, robot: str) -> str:
-    """The package name asked for, or one made of the robot's; raises LinkwiseError for one that cannot be."""
+    """Return the package name asked for, or one made of the robot's name.
+
+    Raises LinkwiseError for one that cannot be.
+    """
     package = name if name is not None else identifier(robot)
     if fault := _fault_of_name(package):
         raise LinkwiseError(
@@ -80,7 +84,7 @@ def checked_identifier(name: str | None, robot: str) -> str:
 
 
 def _fault_of_name(name: str) -> str:
-    """Return why a name is not one of a module: which character, or what else; empty for one that is."""
+    """Return why a name is no module name: which character, or what else; empty for one that is."""
     if wrong := re.search(r"[^0-9A-Za-z_]", name):
         return f"has {wrong[0]!r} at place {wrong.start() + 1}"
     if not name:
@@ -97,13 +101,13 @@ def _fault_of_name(name: str) -> str:
 
 
 def _is_taken(name: str) -> bool:
-    """Whether something else has the name, also where the names of files fold case."""
+    """Return whether something else has the name, also where the names of files fold case."""
     folded = name.lower()
     return keyword.iskeyword(name) or folded in TAKEN or LINK_HEADER.fullmatch(folded) is not None
 
 
 def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iterator[tuple[str, str]]:
-    """Files that serve every back end; `load` is to know those `chosen`."""
+    """Yield the files that serve every back end; `load` is to know those `chosen`."""
     system, bodies = derivation.system, body_texts(derivation.system)
     parameters = {s.name: float(v) for s, v in system.parameters.items()}
     loadable = [backend for backend in chosen if backend.loading]
@@ -131,7 +135,7 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
 
 
 def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
-    """What was generated, from what, what it costs, and the SHA-256 of every file."""
+    """Return the manifest: what was generated, from what, its costs, and the SHA-256 of every file."""
     system = derivation.system
     costs, operations = _costs(derivation)
     return Manifest(
@@ -159,7 +163,10 @@ def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
 
 
 def _costs(derivation: Derivation) -> tuple[list[int], int]:
-    """Operations of each link's decomposition by itself, and of all: loops move the robot once for them."""
+    """Return the operations of each link's decomposition by itself, and of all links.
+
+    Loops move the robot once for all links.
+    """
     system = derivation.system
     if derivation.kernel == "loops" and isinstance(system, RigidSystem):
         return loop_costs.link_costs(system), loop_costs.decomposition_cost(system)

@@ -6,17 +6,17 @@ from linkwise_runtime.version import VERSION
 
 from linkwise.dynamics.kernel import lowering
 from linkwise.emit.printer import PythonPrinter
-from linkwise.emit.render import render
 from linkwise.emit.rigid_energy import rigid_energy
 from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.escape import python_literal
+from linkwise.render import render
 from linkwise.symbolic.system import EnergySystem, System
 
 Lines = tuple[str, ...]
 
 
 def autograd_files(system: System, linear: frozenset[int]) -> Iterator[tuple[str, str]]:
-    """Paths inside the package and texts."""
+    """Yield paths inside the package and texts."""
     for j, name in enumerate(system.link_names):
         view = {
             "number": j + 1,
@@ -37,7 +37,7 @@ def autograd_files(system: System, linear: frozenset[int]) -> Iterator[tuple[str
 
 
 def _written(system: EnergySystem, link: int, view: dict[str, object]) -> str:
-    """Module of a link whose energies a user wrote."""
+    """Return the module of a link whose energies a user wrote."""
     energy = system.links[link]
     bodies = {"kinetic": _body(system, energy.kinetic), "potential": _body(system, energy.potential)}
     uses_torch = any("torch." in line for body in bodies.values() for line in body)
@@ -45,7 +45,7 @@ def _written(system: EnergySystem, link: int, view: dict[str, object]) -> str:
 
 
 def _body(system: EnergySystem, expr: object) -> Lines:
-    """Lines of a function that returns the value of an expression."""
+    """Return the lines of a function that returns the value of an expression."""
     lower = lowering(system)[0]
     code = straight_line(lower.graph, [lower(expr)], PythonPrinter("torch"))
     assigned = (f"{name} = {text}" for name, text in code.assignments)

@@ -1,6 +1,6 @@
 """The registry of back ends: adding one adds an entry here and touches no other list of names.
 
-An entry is read by the command line too, so that this file imports what emits only when it emits.
+An entry is read by the command line too, so this file imports emitters only when it emits.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from linkwise.symbolic.system import System
 
 Emitter = Callable[["Derivation"], Iterator[tuple[str, str]]]
-"""Turns a derivation into files: paths inside the package and texts."""
+"""Function that turns a derivation into files: paths inside the package and texts."""
 
 
 def _no_fault(_: System) -> str:
@@ -44,44 +44,44 @@ def _too_large_for_loops(system: System) -> str:
 
 @dataclass(frozen=True)
 class Loading:
-    """How the package's `load` makes the back end: the class in linkwise_runtime, and what it is made of."""
+    """Way in which a package's `load` makes a back end: the class in linkwise_runtime, and its arguments."""
 
     module: str
     """Module of linkwise_runtime that holds the class."""
     made: str
     """Expression over the imported names, ROBOT, and `values` of the parameters."""
     imports: tuple[str, ...]
-    """Statements before it."""
+    """Import statements before it."""
     speed: int
     """Rank among the back ends that compute, 1 the fastest for a large batch."""
     uses_forms: bool = False
-    """Whether it may be made of LINKS, the closed forms, which are None where the kernel is in loops."""
+    """True if it may be made of LINKS, the closed forms, which are None where the kernel is in loops."""
     uses_rule: bool = False
-    """Whether it may be made of RULE, the vectorised rule of rigid links, which is None for energies."""
+    """True if it may be made of RULE, the vectorised rule of rigid links, which is None for energies."""
     face: str = "Dynamics"
-    """Class of what `load` answers; another than `Dynamics` stands in the module."""
+    """Class of the object that `load` returns; any other than `Dynamics` is in the module."""
     chooses: bool = False
-    """Whether it has kernels to choose from and takes bodies, as `kernel` and `bodies`."""
+    """True if it has kernels to choose from and accepts bodies, as `kernel` and `bodies`."""
     learns: bool = False
-    """Whether its links are torch modules, whose numbers `requires_grad` makes nn.Parameters."""
+    """True if its links are torch modules, whose numbers `requires_grad` makes nn.Parameters."""
 
 
 @dataclass(frozen=True)
 class BackendFiles:
-    """What a back end adds to a package."""
+    """Contribution of a back end to a package."""
 
     name: str
     doc: str
     emits: tuple[Emitter, ...]
-    """What is written for the robot; two back ends with one emitter share its files."""
+    """Emitters of its files for the robot; two back ends with one emitter share its files."""
     loading: Loading | None = None
-    """None where nothing loads."""
+    """Way to load it; None where nothing loads."""
     needs: tuple[str, ...] = ()
-    """Other back ends without which it cannot be."""
+    """Other back ends that it requires."""
     fault: Callable[[System], str] = _no_fault
-    """Why it cannot be for a robot; nothing if it can."""
+    """Function that returns why it cannot be had for a robot; empty if it can."""
     optional: bool = False
-    """Whether a robot that it cannot be for goes without it, unless it was asked for by name."""
+    """True if a robot that cannot have it goes without it, unless it was asked for by name."""
 
 
 def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
@@ -91,8 +91,8 @@ def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
 
 
 def _tree(d: Derivation) -> Iterator[tuple[str, str]]:
-    from linkwise.emit.definition import rigid_tree
     from linkwise.emit.tree_file import tree_text
+    from linkwise.symbolic.definition import rigid_tree
 
     if (tree := rigid_tree(d.system)) is not None:
         yield "tree.py", tree_text(tree, d.system.link_names, [s.name for s in d.system.parameters])
@@ -219,18 +219,18 @@ LOOPS: dict[str, BackendFiles] = {
 
 
 def backends_of(kernel: KernelKind) -> dict[str, BackendFiles]:
-    """Back ends that a package can have, by name."""
+    """Return the back ends that a package can have, by name."""
     return LOOPS if kernel == "loops" else BACKENDS
 
 
 def usual_backends(system: System, kernel: KernelKind) -> tuple[str, ...]:
-    """Names of the back ends that a robot's package has where none was asked for."""
+    """Return the names of the back ends that a robot's package has where none was asked for."""
     there = backends_of(kernel).values()
     return tuple(one.name for one in there if not (one.optional and one.fault(system)))
 
 
 def chosen_backends(names: Iterable[str], kernel: KernelKind = "straight") -> tuple[BackendFiles, ...]:
-    """Back ends by name and those that they need, in this order.
+    """Return back ends by name, and those that they need, in the registry's order.
 
     Raises LinkwiseError for no name, an unknown one, and one that takes closed forms where there are none.
     """

@@ -1,4 +1,4 @@
-"""What a package knows of its parameters: what they mean, and which values no body can have."""
+"""Texts about a package's parameters: their meaning, and the values that no body can have."""
 
 from collections.abc import Sequence
 from textwrap import wrap
@@ -35,9 +35,9 @@ ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 def body_texts(system: System) -> tuple[BodyText, ...]:
-    """Links whose values are checked: all that hang on parameters and can exist as the file has them.
+    """Return the links whose values are checked: all that depend on parameters and are physical in the file.
 
-    None where the robot allows bodies that cannot exist, nor for a user's own energies.
+    There are none where the robot allows bodies that cannot exist, nor for a user's own energies.
     """
     if not isinstance(system, RigidSystem) or system.robot.allow_unphysical:
         return ()
@@ -46,7 +46,7 @@ def body_texts(system: System) -> tuple[BodyText, ...]:
 
 
 def parameter_rules(system: System, checked: Sequence[BodyText]) -> list[str]:
-    """Lines of a docstring: what the parameters' names mean, and which values are refused."""
+    """Return lines of a docstring: the meaning of the parameters' names, and which values are refused."""
     if not system.parameters:
         return []
     if not isinstance(system, RigidSystem):
@@ -68,7 +68,7 @@ def _entries(link: Link) -> tuple[Scalar, ...]:
 
 
 def _parameters(link: Link) -> list[sp.Symbol]:
-    """Parameters in order of appearance."""
+    """Return a link's parameters in order of appearance."""
     exprs = [entry for entry in _entries(link) if isinstance(entry, sp.Expr)]
     return list(dict.fromkeys(s for e in exprs for s in sorted(e.free_symbols, key=str)))
 
@@ -86,7 +86,7 @@ def _text(link: Link) -> BodyText:
 
 
 def _inline(graph: Graph, output: Node) -> str:
-    """One expression for a node, whatever it shares."""
+    """Return one expression for a node, whatever parts of it are shared."""
     printer, texts = PythonPrinter("np"), dict[Node, Text]()
     for node in reachable(graph, [output]):
         entry = graph.nodes[node]

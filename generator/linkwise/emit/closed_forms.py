@@ -8,11 +8,11 @@ from linkwise_runtime.version import VERSION
 from linkwise.dynamics.coefficients import LinkForms
 from linkwise.dynamics.kernel import Kernel
 from linkwise.emit.printer import PythonPrinter
-from linkwise.emit.render import render
 from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.escape import python_literal
 from linkwise.expression.count import count_operations, in_words
 from linkwise.expression.expression_graph import Node
+from linkwise.render import render
 from linkwise.symbolic.system import System
 
 Rows = Sequence[tuple[str, Node]]
@@ -23,22 +23,22 @@ MOTION = ("q", "qd", "qdd")
 
 @dataclass(frozen=True)
 class FormFunction:
-    """One emitted function; each group of its results is a tuple of (expression, label)."""
+    """An emitted function; each group of its results is a tuple of (expression, label)."""
 
     name: str
     arguments: str
-    """The motion that it is given, as its signature has it."""
+    """Motion that it is given, as its signature has it."""
     doc: str
     cost: str
     operations: int
-    """All of them, sines and the like included."""
+    """Number of all operations, sines and the like included."""
     inputs: tuple[str, ...]
     assignments: tuple[tuple[str, str], ...]
     groups: tuple[tuple[tuple[str, str], ...], ...]
 
 
 def closed_form_files(system: System, kernels: Sequence[Kernel]) -> Iterator[tuple[str, str]]:
-    """Paths inside the package and texts."""
+    """Yield paths inside the package and texts."""
     for j, kernel in enumerate(kernels):
         path = kernel.forms[0].path
         view = {
@@ -70,7 +70,7 @@ def _functions(system: System, kernel: Kernel, j: int) -> Iterator[FormFunction]
 
 
 def labelled(kernel: Kernel, forms: LinkForms, j: int) -> dict[str, Rows]:
-    """Outputs of link j, counted from 1, by quantity; h1 is empty without linear energy terms."""
+    """Return the outputs of link j, counted from 1, by quantity; h1 is empty without linear energy terms."""
 
     def triples(name: str, nodes: dict[tuple[int, int], Node]) -> Rows:
         return [(f"{name}({i + 1}, {j}, {k + 1})", node) for (i, k), node in nodes.items()]

@@ -1,4 +1,4 @@
-"""What every back end emits from."""
+"""Input of every back end's emitter."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from linkwise.symbolic.system import System
 
 @dataclass(frozen=True)
 class Derivation:
-    """What every back end emits from: the system, one kernel per link, and the request that led to it.
+    """Input of every back end: the system, one kernel per link, and the request that led to it.
 
     Without kernels, which rigid bodies alone can do, the package's kernel is in loops.
     """
@@ -21,7 +21,7 @@ class Derivation:
     package: str
     request: Mapping[str, Any]
     vendor_runtime: bool = False
-    """Whether the package carries a copy of what it imports of linkwise_runtime."""
+    """True if the package carries a copy of what it imports of linkwise_runtime."""
 
     @property
     def linear(self) -> frozenset[int]:

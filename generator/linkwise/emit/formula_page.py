@@ -1,15 +1,15 @@
-"""The text around formulas that are read: what the symbols stand for, then one line a formula."""
+"""Text around printed formulas: the meaning of the symbols, then one line per formula."""
 
 from collections.abc import Sequence
 
 from linkwise_runtime.version import VERSION
 
-from linkwise.emit.formula_symbols import FormulaSymbol, parameter_symbols
-from linkwise.emit.render import render
 from linkwise.escape import latex_symbol, python_literal
+from linkwise.package.formula_symbols import FormulaSymbol, parameter_symbols
+from linkwise.render import render
 
 KINDS = {"txt": "text", "tex": "latex"}
-"""Which of a symbol's notations each kind of file has."""
+"""Notation of symbols in each kind of file."""
 
 Row = tuple[int, int, str]
 """Joint i and link j, counted from 0, and the formula of τ_ij."""
@@ -18,7 +18,7 @@ Row = tuple[int, int, str]
 def formula_page(
     ending: str, rows: Sequence[Row], joints: Sequence[str], links: Sequence[str], parameters: Sequence[str]
 ) -> str:
-    """Text of formulas.txt or formulas.tex, from the names of a robot's joints, links and parameters."""
+    """Return formulas.txt or formulas.tex, from the names of a robot's joints, links and parameters."""
     symbols = zip(parameters, parameter_symbols(parameters), strict=True)
     view = {
         "version": VERSION,

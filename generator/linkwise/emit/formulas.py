@@ -7,23 +7,26 @@ from sympy.simplify.fu import TR8
 
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.formula_page import formula_page
-from linkwise.emit.formula_symbols import MOTION, FormulaSymbol, motion_symbol, parameter_symbols
 from linkwise.emit.residue import without_residue
 from linkwise.expression.from_sympy import SYMPY_FUNCTIONS
+from linkwise.package.formula_symbols import MOTION, FormulaSymbol, motion_symbol, parameter_symbols
 from linkwise.symbolic.chain_rule import partial_torques
 from linkwise.symbolic.system import RigidSystem, System
 
 MOST_COORDINATES = 3
 DIGITS = 12
-"""Of the numbers shown."""
+"""Digits of the numbers shown."""
 EXACT = 17
 """Digits that hold every float."""
 READABLE = (sp.Rational, sp.Float, type(sp.pi), type(sp.E), sp.Add, sp.Mul, sp.Pow, *SYMPY_FUNCTIONS)
-"""What a number may be made of for readers of Python and of LaTeX to know it."""
+"""Types that a number may be made of for readers of Python and of LaTeX to know it."""
 
 
 def too_many_to_read(system: System) -> str:
-    """Why a robot has no formulas that anybody would read, or nothing: expanded, they explode."""
+    """Return why a robot has no formulas that anybody would read: expanded, they explode.
+
+    The text is empty if it has some.
+    """
     if (count := len(system.coordinates)) > MOST_COORDINATES:
         return (
             f"{count} coordinates are too many for formulas to read, of which there may be {MOST_COORDINATES}"
@@ -32,7 +35,7 @@ def too_many_to_read(system: System) -> str:
 
 
 def formula_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
-    """formulas.txt and formulas.tex of a robot without `too_many_to_read`."""
+    """Yield formulas.txt and formulas.tex of a robot without `too_many_to_read`."""
     system = derivation.system
     names = [symbol.name for symbol in system.parameters]
     parameters = parameter_symbols(names)
@@ -55,7 +58,7 @@ def _rows(system: System) -> Iterator[tuple[int, int, sp.Expr]]:
 
 
 def _shown(system: System, parameters: Iterable[FormulaSymbol], expr: sp.Expr) -> sp.Expr:
-    """The expression expanded, products of sines and cosines as ones of angle sums, numbers short."""
+    """Return the expression expanded, products of sines and cosines as those of angle sums, numbers short."""
     shown = [sp.Symbol(symbol.text) for symbol in parameters]
     names = dict(zip(system.parameters, shown, strict=True))
     sizes = zip(shown, system.parameters.values(), strict=True)
@@ -64,7 +67,7 @@ def _shown(system: System, parameters: Iterable[FormulaSymbol], expr: sp.Expr) -
     for k, c in enumerate(system.coordinates, 1):
         q, qd, qdd = (sp.Symbol(f"{kind}_{k}") for kind in MOTION)
         names |= {c.q: q, c.qd: qd, c.qdd: qdd}
-        # A sliding body's place is added to lengths; a user's coordinate may be of any size.
+        # A slide's position is added to lengths, so it is bounded; a user's coordinate may be of any size.
         bounded |= {q, qd, qdd} if isinstance(system, RigidSystem) else {qd, qdd}
     expanded = sp.expand(TR8(sp.expand(_readable(expr).xreplace(names))))
     kept = sp.Add(*without_residue(sp.Add.make_args(expanded), bounded, values))
@@ -73,7 +76,7 @@ def _shown(system: System, parameters: Iterable[FormulaSymbol], expr: sp.Expr) -
 
 
 def _readable(expr: sp.Expr) -> sp.Expr:
-    """The expression with numbers for constants that have no notation of their own, such as zeta(3)."""
+    """Return the expression with numbers for constants without a notation of their own, such as zeta(3)."""
     constants = {
         part: sp.N(part, EXACT)
         for part in sp.preorder_traversal(expr)
@@ -83,6 +86,6 @@ def _readable(expr: sp.Expr) -> sp.Expr:
 
 
 def _latex_names(system: System, parameters: Iterable[FormulaSymbol]) -> dict[sp.Symbol, str]:
-    """LaTeX of every symbol."""
+    """Return the LaTeX of every symbol."""
     motion = [motion_symbol(kind, k) for kind in MOTION for k in range(1, len(system.coordinates) + 1)]
     return {sp.Symbol(symbol.text): symbol.latex for symbol in (*motion, *parameters)}

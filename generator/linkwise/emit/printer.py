@@ -1,4 +1,4 @@
-"""One node to text, in the syntax of each target language."""
+"""Text of one node, in the syntax of each target language."""
 
 from linkwise.expression.expression_graph import Entry
 
@@ -8,18 +8,18 @@ Text = tuple[str, int]
 
 
 class Printer:
-    """Infix arithmetic, as Python and C share it; a subclass says how constants and functions look."""
+    """Infix arithmetic, shared by Python and C; a subclass says how constants and functions look."""
 
     def constant(self, value: float) -> str:
-        """Text of a number that is not negative; repr keeps every digit."""
+        """Return the text of a number that is not negative; repr keeps every digit."""
         return repr(value)
 
     def function(self, name: str) -> str:
-        """Text of a function's name."""
+        """Return the text of a function's name."""
         raise NotImplementedError
 
     def print(self, entry: Entry, operands: tuple[Text, ...]) -> Text:
-        """Text of one node from its operands' texts; raises ValueError for an unknown kind of node."""
+        """Return the text of one node from its operands' texts; raises ValueError for an unknown kind."""
         match entry[0], operands:
             case "const", _:
                 value: float = entry[1]
@@ -42,25 +42,28 @@ class Printer:
 
 
 class PythonPrinter(Printer):
-    """Calls into an array namespace: `torch`, or `xp`, which stands for NumPy or torch."""
+    """Printer of calls into an array namespace: `torch`, or `xp`, which stands for NumPy or torch."""
 
     def __init__(self, namespace: str) -> None:
         self.namespace = namespace
 
     def function(self, name: str) -> str:
-        """Text of a function of the namespace; NumPy 2 and torch call all of them alike."""
+        """Return the text of a function of the namespace; NumPy 2 and torch name all of them alike."""
         return f"{self.namespace}.{name}"
 
 
 class CPrinter(Printer):
-    """C99 over the type `real`: literals in R(), functions in F(), which the float version redefines."""
+    """Printer of C99 over the type `real`.
+
+    Literals stand in R(), functions in F(), which the float version redefines.
+    """
 
     def constant(self, value: float) -> str:
-        """Text of a number in R()."""
+        """Return the text of a number in R()."""
         return f"R({value!r})"
 
     def function(self, name: str) -> str:
-        """Text of a function in F()."""
+        """Return the text of a function in F()."""
         return f"F({name})"
 
 

@@ -1,22 +1,22 @@
-"""What cancelling leaves of a sum in numbers of so many digits, such as those of sin² + cos² − 1."""
+"""Removal of what cancelling leaves in sums of rounded numbers, such as in sin² + cos² − 1."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import sympy as sp
 
 ROUNDING = 1e-12
-"""Share of the largest coefficient below which one is rounding."""
+"""Share of the largest coefficient below which a coefficient is rounding."""
 
 
 def without_residue(
     terms: Sequence[sp.Expr], bounded: Collection[sp.Symbol], values: Mapping[sp.Symbol, sp.Float]
 ) -> Iterator[sp.Expr]:
-    """Terms but those of next to no size, which is how large their number is beside that of others.
+    """Yield the terms that are not negligible: those whose number is small beside others' are dropped.
 
-    A number says this of sines, cosines and powers of `bounded` symbols alone. Whatever else a term holds,
-    as exp(15 q) or 1/q, may have any size: it is weighed beside terms with the same factor, and stays where
-    it has none. Parameters may get other values than they have: what is dropped is small both without them,
-    as if all of them were one, and with their `values`.
+    A number gives the size of sines, cosines and powers of `bounded` symbols alone. Whatever else a term
+    holds, as exp(15 q) or 1/q, may have any size: the term is compared with others of the same factor, and
+    stays where there are none. Parameters may get other values than they have: what is dropped is small both
+    without them, as if all of them were one, and with their `values`.
     """
     weighed = [(term, *_weighed(term, bounded, values)) for term in terms]
     largest: dict[sp.Expr, tuple[sp.Expr, sp.Expr]] = {}
@@ -32,7 +32,7 @@ def without_residue(
 def _weighed(
     term: sp.Expr, bounded: Collection[sp.Symbol], values: Mapping[sp.Symbol, sp.Float]
 ) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """Factors of any size, the coefficient, and this times the factors that hang on parameters alone."""
+    """Return factors of any size, the coefficient, and this times the factors of parameters alone."""
     number, rest = term.as_coeff_Mul()
     size, apart = number, sp.S.One
     for factor in sp.Mul.make_args(rest):

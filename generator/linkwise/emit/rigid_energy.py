@@ -1,7 +1,7 @@
-"""What the module of a rigid link says: its numbers, and how its frame moves on from the link before.
+"""Contents of a rigid link's module: its numbers, and the motion of its frame from the link before.
 
-Joints with no body between them are stepped through one after the other, as those of a ball joint are. One
-that stands where the joint before it stands, with no body between, has no place of its own.
+Joints with no body between them, as those of a ball joint, are passed one after the other. A joint at the
+place of the joint before it, with no body between, has no place of its own.
 """
 
 from collections.abc import Iterable, Sequence
@@ -22,7 +22,7 @@ Lines = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Constant:
-    """A number, a vector or a matrix that the link's module owns, as Python text in lines, and what it is."""
+    """A number, a vector or a matrix that the link's module owns: Python text in lines, and its meaning."""
 
     name: str
     lines: Lines
@@ -33,7 +33,7 @@ class Constant:
 class Step:
     """A joint: the labels of the frames before and behind it, its axes at q = 0, and what it needs.
 
-    lines: what its place is worked out of; place: the expression, empty for none
+    lines: those that compute its place; place: the expression, empty for none
     """
 
     before: str
@@ -51,7 +51,7 @@ class Step:
 
 @dataclass(frozen=True)
 class RigidEnergy:
-    """One link's text."""
+    """Text of one link."""
 
     parent: int | None
     constants: tuple[Constant, ...]
@@ -59,13 +59,13 @@ class RigidEnergy:
     """Joints, counted from 0 as in tree.py, whose places are constants, and the names of these."""
     steps: tuple[Step, ...]
     gravity: tuple[Lines, str]
-    """Lines, and the expression, of gravity in the axes of the base; for a link that hangs on the ground."""
+    """Lines, and the expression, of gravity in the axes of the base; for a link that the ground carries."""
     body: Lines
-    """Lines of the method that works out mass, centre and inertia of run-time parameters; empty for none."""
+    """Lines of the method that computes mass, centre and inertia from run-time parameters; empty for none."""
 
 
 def rigid_energy(system: RigidSystem, link: int) -> RigidEnergy:
-    """What is written of link `link`, which hangs on links and joints of its own chain alone."""
+    """Return the text of link `link`, which depends on links and joints of its own chain alone."""
     rigid = system.links[link]
     position = {other.chain[-1]: j for j, other in enumerate(system.links[:link])}
     carriers = [at for at in rigid.chain[:-1] if at in position]
@@ -123,7 +123,7 @@ def _step(system: RigidSystem, joint: Joint, labels: tuple[str, str], place: str
 
 
 def _numbers(system: RigidSystem, link: int) -> tuple[list[Constant], Lines]:
-    """Mass, centre and inertia: those that are numbers, and the lines for those that hang on parameters."""
+    """Return mass, centre and inertia: those that are numbers, and lines for those of parameters."""
     rigid = system.links[link]
     matrix = tuple(f"    {_vector(row)}," for row in rigid.inertia) if not _hangs(*rigid.inertia) else ()
     constants = {
@@ -149,12 +149,12 @@ def _numbers(system: RigidSystem, link: int) -> tuple[list[Constant], Lines]:
 
 
 def exact_all(values: Iterable[Scalar]) -> list[Scalar]:
-    """Fractions for floats, as `exact` makes them."""
+    """Return fractions for floats, as `exact` makes them."""
     return [exact((value, 0, 0))[0] for value in values]
 
 
 def _inline(system: RigidSystem, vector: Sequence[Scalar]) -> tuple[Lines, str]:
-    """Lines that a vector's components are worked out by, and the vector."""
+    """Return the lines that compute a vector's components, and the vector."""
     lower = lowering(system)[0]
     code = straight_line(lower.graph, [lower(e) for e in exact_all(vector)], PythonPrinter("torch"))
     assigned = (f"{name} = {text}" for name, text in code.assignments)
@@ -162,7 +162,7 @@ def _inline(system: RigidSystem, vector: Sequence[Scalar]) -> tuple[Lines, str]:
 
 
 def _hangs(*vectors: Sequence[Scalar]) -> bool:
-    """Whether a number among these hangs on run-time parameters."""
+    """Return whether a number among these depends on run-time parameters."""
     return any(isinstance(e, sp.Expr) and bool(e.free_symbols) for vector in vectors for e in vector)
 
 

@@ -1,6 +1,6 @@
 """Texts that do not depend on how links move: a package's __init__.py and names.py.
 
-They are made of what a manifest has too, so that `linkwise check` makes them again and compares.
+They are made only of what a manifest has too, so `linkwise check` makes them again and compares.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,16 +10,16 @@ from linkwise_runtime.structure import JointLimits
 from linkwise_runtime.version import VERSION
 
 from linkwise.emit.backend import BackendFiles, Loading
-from linkwise.emit.render import render
 from linkwise.escape import python_docstring, python_literal
 from linkwise.package.entries import FileJointEntry, JointEntry, KernelKind, PassiveEntry
+from linkwise.render import render
 
 LINE = 100
 
 
 @dataclass(frozen=True)
 class BodyText:
-    """A link, the parameters that its mass and inertia hang on, and these two as Python expressions."""
+    """A link, the parameters that its mass and inertia depend on, and these two as Python expressions."""
 
     link: str
     parameters: str
@@ -41,7 +41,10 @@ class Maker:
 
     @classmethod
     def of(cls, backend: BackendFiles, loading: Loading, rigid: bool, kernel: KernelKind) -> "Maker":
-        """Its class comes from linkwise_runtime, and is the first word of the expression."""
+        """Return the maker of a back end.
+
+        Its class comes from linkwise_runtime, and is the first word of the expression.
+        """
         made = loading.made.partition("(")[0]
         imports = [*loading.imports]
         if loading.uses_forms and kernel == "straight":
@@ -63,7 +66,7 @@ def init_text(
     rigid: bool,
     kernel: KernelKind,
 ) -> str:
-    """__init__.py, whose `load` makes the back ends of those `chosen`.
+    """Return __init__.py, whose `load` makes the back ends of those `chosen`.
 
     about: lines on the parameters; rigid: whether the links are rigid bodies; kernel: the package's
     """
@@ -99,8 +102,11 @@ def names_text(
     passive: Sequence[PassiveEntry],
     file_joints: Sequence[FileJointEntry],
 ) -> str:
-    """names.py: names, units and limits of the joints, what they have of their own, those of the file, names
-    and paths of the links, and what hangs on parameters."""
+    """Return names.py: the joints, the links, and what depends on parameters.
+
+    It has names, units and limits of the joints, their passive properties, the joints of the file, and names
+    and paths of the links.
+    """
     places = [one.pinocchio for one in file_joints]
     view = {
         "version": VERSION,
@@ -122,21 +128,21 @@ def names_text(
 
 
 def _limit_text(what: str, joints: Iterable[JointEntry]) -> str:
-    """One limit of each joint, as a tuple of Python with `inf` in it."""
+    """Return one limit of each joint, as a tuple of Python with `inf` in it."""
     none = "-inf" if what == "lower" else "inf"
     numbers = [none if (limit := getattr(joint, what)) is None else repr(limit) for joint in joints]
     return f"({', '.join(numbers)},)"
 
 
 def _passive_text(entry: PassiveEntry) -> str:
-    """The arguments of a PassiveJoint, which has the fields of the entry; zeros are its defaults."""
+    """Return the arguments of a PassiveJoint, which has the fields of the entry; zeros are its defaults."""
     joint, coordinate, ratio, *own = asdict(entry).items()
     moved = python_literal(joint[1]), repr(coordinate[1]), repr(ratio[1])
     return ", ".join([*moved, *(f"{name}={value!r}" for name, value in own if value)])
 
 
 def _parameter_lines(parameters: Iterable[str]) -> list[str]:
-    """Names of the parameters as lines of a docstring, which none of their characters can end."""
+    """Return the names of the parameters as lines of a docstring, which none of their characters can end."""
     lines: list[str] = []
     for parameter in parameters:
         name = python_docstring(parameter)

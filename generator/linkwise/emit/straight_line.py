@@ -11,7 +11,7 @@ from linkwise.expression.expression_graph import Entry, Graph, Node, operands, r
 from linkwise.symbolic.system import System
 
 MAX_WIDTH = 88
-"""Characters of an expression; parts of a longer one get names."""
+"""Most characters of an expression; parts of a longer one get names."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,10 @@ class Code:
 def straight_line(
     graph: Graph, outputs: Sequence[Node], printer: Printer, given: Mapping[Node, str] | None = None
 ) -> Code:
-    """Code for `outputs`: what is used twice or has its own name becomes a variable, the rest is inlined.
+    """Return code for `outputs`.
 
-    `given` names nodes that the code need not compute.
+    Nodes used twice or with a name of their own become variables, the rest is inlined. `given` names nodes
+    that the code need not compute.
     """
     given = given or {}
     order = reachable(graph, outputs, given)
@@ -48,7 +49,7 @@ def straight_line(
 
 
 class _Writer:
-    """Texts of nodes in turn, operands before users, and the assignments that they rest on."""
+    """Texts of nodes in turn, operands before users, and the assignments that they depend on."""
 
     def __init__(
         self,
@@ -61,7 +62,7 @@ class _Writer:
         self.graph, self.printer, self.given = graph, printer, given
         computed = [node for node in order if node not in given]
         self.uses = Counter(o for node in computed for o in operands(graph.nodes[node])) + Counter(outputs)
-        for node in reversed(computed):  # a sign is no variable: what it stands before is used as often
+        for node in reversed(computed):  # a negation is no variable: its operand is used as often
             if graph.nodes[node][0] == "neg":
                 self.uses[operands(graph.nodes[node])[0]] += self.uses[node] - 1
         leaves = (graph.nodes[node][1] for node in order if graph.nodes[node][0] == "symbol")
@@ -85,7 +86,7 @@ class _Writer:
             self._assign(node)
 
     def _short(self, entry: Entry) -> Text:
-        """Text of an entry; where it would be long, its longest operands become variables first."""
+        """Return the text of an entry; if it would be long, its longest operands become variables first."""
         while True:
             text = self.printer.print(entry, tuple(self.texts[o] for o in operands(entry)))
             longest = max(operands(entry), key=lambda o: len(self.texts[o][0]), default=None)
@@ -100,7 +101,7 @@ class _Writer:
 
 
 def fetched(system: System, code: Code, subscript: str = "[{}]") -> tuple[str, ...]:
-    """Lines that take coordinates, velocities and parameters out of q, qd, qdd and p, in Python."""
+    """Return lines that take coordinates, velocities and parameters out of q, qd, qdd and p, in Python."""
     lines = []
     for prefix in ("q", "qd", "qdd"):
         used = [k for k in range(len(system.coordinates)) if f"{prefix}{k + 1}" in code.symbols]

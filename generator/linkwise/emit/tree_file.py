@@ -4,23 +4,16 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from linkwise_runtime.rule.joint_tree import TreeCoupling, TreeCurve, TreeFrame, TreeTie
 from linkwise_runtime.version import VERSION
 
-from linkwise.emit.formula_symbols import parameter_symbols
-from linkwise.emit.render import render
 from linkwise.escape import python_literal
-from linkwise.package.entries import (
-    PLACE,
-    BodyEntry,
-    CouplingEntry,
-    CurveEntry,
-    FrameEntry,
-    RigidTree,
-    TieEntry,
-)
+from linkwise.package.entries import PLACE, BodyEntry, RigidTree
+from linkwise.package.formula_symbols import parameter_symbols
+from linkwise.render import render
 
 WORD = re.compile(r"\b([A-Za-z_]\w*)(\(?)")
-"""A name in a formula, and the parenthesis behind that of a function."""
+"""Pattern of a name in a formula, and of the parenthesis after that of a function."""
 
 
 @dataclass(frozen=True)
@@ -29,11 +22,11 @@ class TreeText:
 
     name: str
     entries: tuple[str, ...]
-    curve: CurveEntry | None = None
+    curve: TreeCurve | None = None
 
 
 def tree_text(tree: RigidTree, links: Sequence[str], parameters: Sequence[str]) -> str:
-    """The file, for the names of the links that carry mass and of the run-time parameters."""
+    """Return tree.py, for the names of the links that carry mass and of the run-time parameters."""
     at = {body.link: b for b, body in enumerate(tree.bodies)}
     carriers = {at[link]: j for j, link in enumerate(links)}
     expression = _expressions(parameters)
@@ -70,25 +63,25 @@ def _link(b: int, body: BodyEntry) -> TreeText:
     )
 
 
-def _frame(frame: FrameEntry) -> TreeText:
-    entries = f"{frame.body!r}", f"{frame.rotation!r}", f"{frame.translation!r}"
+def _frame(frame: TreeFrame) -> TreeText:
+    entries = f"{frame.joint!r}", f"{frame.rotation!r}", f"{frame.translation!r}"
     return TreeText(python_literal(frame.name), entries)
 
 
-def _tie(tie: TieEntry, tree: RigidTree) -> str:
-    """The arguments of a TreeTie, and which frames it joins as a comment."""
+def _tie(tie: TreeTie, tree: RigidTree) -> str:
+    """Return the arguments of a TreeTie, and which frames it joins as a comment."""
     length = f", {tie.length!r}" if tie.kind == "distance" else ""
     ends = " and ".join(python_literal(tree.frames[frame].name) for frame in (tie.first, tie.second))
     named = python_literal(tie.name)
     return f"TreeTie({named}, {tie.kind!r}, {tie.first}, {tie.second}{length}),  # {ends}"
 
 
-def _coupling(coupling: CouplingEntry) -> str:
+def _coupling(coupling: TreeCoupling) -> str:
     return f"TreeCoupling({python_literal(coupling.name)}, {coupling.terms!r}),"
 
 
 def _records(tree: RigidTree) -> str:
-    """What the file needs of joint_tree.py."""
+    """Return the names that the file needs of joint_tree.py."""
     curves = [body.curve for body in tree.bodies if body.curve]
     optional = {"TreeCoupling": tree.couplings, "TreeTie": tree.ties, "TreeCurve": curves}
     used = [name for name, found in optional.items() if found]
@@ -96,7 +89,10 @@ def _records(tree: RigidTree) -> str:
 
 
 def _place(place: str, carriers: dict[int, int]) -> Iterator[str]:
-    """A place of the manifest's tree, bodies[2].com[0] say, in that file; none for what has no mass."""
+    """Yield a place of the manifest's tree, such as bodies[2].com[0], as tree.py has it.
+
+    There is none for what has no mass.
+    """
     found = PLACE.fullmatch(place)
     body = found and (found["body"] or found["whole"])
     if not body:
@@ -110,7 +106,10 @@ def _place(place: str, carriers: dict[int, int]) -> Iterator[str]:
 
 
 def _expressions(parameters: Sequence[str]) -> Callable[[str], str]:
-    """Formulas of the manifest in Python: functions of the namespace xp, parameters out of p."""
+    """Return a function that writes the manifest's formulas in Python.
+
+    Their functions are of the namespace xp, their parameters out of p.
+    """
     symbols = dict(zip((s.text for s in parameter_symbols(parameters)), parameters, strict=True))
 
     def word(found: re.Match[str]) -> str:

@@ -9,21 +9,21 @@ from linkwise.package.runtime_imports import RUNTIME, of_copy
 
 
 def with_runtime(files: Mapping[str, str]) -> dict[str, str]:
-    """The files of a package, importing the copies that they get of the runtime's files."""
+    """Return the files of a package, importing the copies that they get of the runtime's files."""
     asked = {module for path, text in files.items() if path.endswith(".py") for module in _asked(text)}
     copies = {f"{RUNTIME}/{path}": _text(path) for path in sorted(_closure(asked))}
     return {path: of_copy(path, text) for path, text in files.items()} | copies
 
 
 def _asked(text: str) -> Iterator[str]:
-    """Modules of the runtime that a package's file imports names from."""
+    """Yield the modules of the runtime that a package's file imports names from."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(f"{RUNTIME}."):
             yield (node.module or "").removeprefix(f"{RUNTIME}.")
 
 
 def _closure(modules: set[str]) -> set[str]:
-    """Files of the runtime that these modules need: theirs, those of all that they import, and folders'."""
+    """Return the files of the runtime that these modules need: theirs, all that they import, and folders'."""
     found: set[str] = {"__init__.py"}
     left = list(modules)
     while left:
@@ -43,7 +43,10 @@ def _closure(modules: set[str]) -> set[str]:
 
 @cache
 def _imported(module: str) -> tuple[str, ...]:
-    """Modules that one of the runtime imports, anywhere in it; all its imports of others are relative."""
+    """Return the modules that one of the runtime imports, anywhere in it.
+
+    All its imports of others are relative.
+    """
     found = []
     for node in ast.walk(ast.parse(_text(f"{module.replace('.', '/')}.py"))):
         if isinstance(node, ast.ImportFrom) and node.level:

@@ -1,4 +1,4 @@
-"""How much arithmetic a set of outputs costs."""
+"""Cost of a set of outputs in arithmetic operations."""
 
 from collections import Counter
 from collections.abc import Container, Iterable
@@ -18,7 +18,7 @@ class OperationCount:
 
     @property
     def arithmetic(self) -> int:
-        """Additions, subtractions, multiplications and divisions; sines and the like apart."""
+        """Number of additions, subtractions, multiplications and divisions; sines and the like apart."""
         return self.additions + self.multiplications + self.divisions
 
     def __add__(self, other: "OperationCount") -> "OperationCount":
@@ -31,14 +31,17 @@ class OperationCount:
 
 
 def count_operations(graph: Graph, outputs: Iterable[Node], given: Container[Node] = ()) -> OperationCount:
-    """Count what computing `outputs` takes from what is `given`. A sign in front of a value is free."""
+    """Return the operations that `outputs` take from what is `given`; a sign in front of a value is free."""
     needed = reachable(graph, outputs, given)
     ops = Counter(graph.nodes[node][0] for node in needed if node not in given)
     return OperationCount(ops["add"] + ops["sub"], ops["mul"], ops["div"], ops["call"])
 
 
 def in_words(count: OperationCount) -> str:
-    """What a count says to a reader: "23 additions and multiplications, 1 division, 4 sines and the like"."""
+    """Return a count in words.
+
+    An example is "23 additions and multiplications, 1 division, 4 sines, cosines and the like".
+    """
     parts = [
         _times(
             count.additions + count.multiplications,

@@ -32,7 +32,7 @@ def _tangent(g: Graph, node: Node, tangent: Mapping[Node, Node]) -> Node:
 
 
 def _call_tangent(g: Graph, function: str, node: Node, a: Node, da: Node) -> Node:
-    """d f(a) with node = f(a)."""
+    """Return d f(a) with node = f(a)."""
     if da == g.zero:
         return g.zero
     match function:

@@ -18,7 +18,7 @@ Vector = tuple[Node, Node, Node]
 Matrix = tuple[Vector, Vector, Vector]
 
 DECIMAL = Context(prec=40, traps=[])
-"""Exact for the product of two floats as they print; infinity and NaN come out as such."""
+"""Context that is exact for the product of two floats as they print; infinity and NaN come out as such."""
 
 FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sin": math.sin,
@@ -37,7 +37,7 @@ FUNCTIONS: dict[str, Callable[[float], float]] = {
 
 
 class Graph:
-    """A growing set of shared expressions; every method returns a node."""
+    """A growing set of shared expressions; every operation returns a node."""
 
     def __init__(self) -> None:
         self.nodes: list[Entry] = []
@@ -56,27 +56,27 @@ class Graph:
         return node
 
     def name(self, node: Node, name: str) -> Node:
-        """Suggest the variable that holds `node` in emitted code; leaves stay unnamed."""
+        """Suggest the variable that holds `node` in emitted code; return `node`. Leaves stay unnamed."""
         if self.nodes[node][0] in ("add", "sub", "mul", "div", "call"):
             self.names.setdefault(node, name)
         return node
 
     def const(self, value: float) -> Node:
-        """Node of a number; −0.0 becomes 0.0."""
+        """Return the node of a number; −0.0 becomes 0.0."""
         return self._decimal(Decimal(repr(float(value))))
 
     def _decimal(self, value: Decimal) -> Node:
-        """Node of the float nearest to a decimal; constants fold by the decimals behind them."""
+        """Return the node of the float nearest to a decimal; constants fold by the decimals behind them."""
         node = self._node("const", float(value) + 0.0, None)
         self._decimals.setdefault(node, value)
         return node
 
     def _fold(self, operation: Callable[[Decimal, Decimal], Decimal], a: Node, b: Node) -> Node:
-        """Node of an operation on two constants."""
+        """Return the node of an operation on two constants."""
         return self._decimal(operation(self._decimals[a], self._decimals[b]))
 
     def symbol(self, name: str) -> Node:
-        """Node of an input."""
+        """Return the node of an input."""
         return self._node("symbol", name, None)
 
     def value(self, node: Node) -> float | None:
@@ -85,7 +85,7 @@ class Graph:
         return a if op == "const" else None
 
     def neg(self, a: Node) -> Node:
-        """−a."""
+        """Return −a."""
         op, x, y = self.nodes[a]
         if op == "const":
             return self._decimal(DECIMAL.minus(self._decimals[a]))
@@ -96,7 +96,7 @@ class Graph:
         return self._node("neg", a, None)
 
     def add(self, a: Node, b: Node) -> Node:
-        """a + b."""
+        """Return a + b."""
         if a == self.zero:
             return b
         if b == self.zero:
@@ -118,7 +118,7 @@ class Graph:
         return self._node("add", a, b) if a < b else self._node("add", b, a)
 
     def sub(self, a: Node, b: Node) -> Node:
-        """a − b."""
+        """Return a − b."""
         if a == b:
             return self.zero
         if b == self.zero:
@@ -141,7 +141,7 @@ class Graph:
         return self._node("sub", a, b)
 
     def mul(self, a: Node, b: Node) -> Node:
-        """a · b."""
+        """Return a · b."""
         if a == self.zero or b == self.zero:
             return self.zero
         if a == self.one:
@@ -168,7 +168,7 @@ class Graph:
         return self._node("mul", a, b)
 
     def div(self, a: Node, b: Node) -> Node:
-        """a / b; division by a number becomes a product."""
+        """Return a / b; division by a number becomes a product. Raises ZeroDivisionError for the number 0."""
         divisor = self.value(b)
         if divisor == 0.0:
             raise ZeroDivisionError("an expression divides by zero")
@@ -181,7 +181,7 @@ class Graph:
         return self._node("div", a, b)
 
     def call(self, function: str, a: Node) -> Node:
-        """function(a), one of FUNCTIONS; odd and even functions shed the sign of `a`."""
+        """Return function(a), one of FUNCTIONS; sine and cosine shed the sign of `a`."""
         value = self.value(a)
         if value is not None:
             if function == "sqrt":
@@ -195,7 +195,7 @@ class Graph:
         return self._node("call", function, a)
 
     def power(self, a: Node, exponent: int) -> Node:
-        """a**exponent for a whole exponent, by repeated squaring."""
+        """Return a**exponent for a whole exponent, by repeated squaring."""
         if exponent < 0:
             return self.div(self.one, self.power(a, -exponent))
         result, square = self.one, a
@@ -207,7 +207,7 @@ class Graph:
         return result
 
     def sum(self, terms: Iterable[Node]) -> Node:
-        """Sum of `terms` from left to right."""
+        """Return the sum of `terms` from left to right."""
         total = self.zero
         for term in terms:
             total = self.add(total, term)
@@ -227,7 +227,7 @@ def operands(entry: Entry) -> tuple[Node, ...]:
 
 
 def reachable(graph: Graph, outputs: Iterable[Node], given: Container[Node] = ()) -> list[Node]:
-    """Every node that `outputs` need, operands before users; what only `given` nodes need is left out."""
+    """Return the nodes that `outputs` need, operands before users, without what only `given` nodes need."""
     nodes = graph.nodes
     needed: set[Node] = set()
     stack = list(outputs)

@@ -1,4 +1,4 @@
-"""From SymPy to the expression graph; SymPy goes no further than here."""
+"""Translation from SymPy to the expression graph; SymPy goes no further than here."""
 
 from collections.abc import Iterable, Mapping
 
@@ -13,7 +13,7 @@ SYMPY_FUNCTIONS: dict[type, str] = {getattr(sp, name): name for name in FUNCTION
 
 
 class Lowering:
-    """Translates expressions into one graph, remembering what each symbol stands for."""
+    """Translator of expressions into one graph, which remembers what each symbol stands for."""
 
     def __init__(self, graph: Graph, symbols: Mapping[sp.Symbol, Node]) -> None:
         self.graph = graph
@@ -26,7 +26,7 @@ class Lowering:
             self.symbols[symbol] = self.graph.name(self(expr), symbol.name)
 
     def __call__(self, expr: Scalar) -> Node:
-        """Node of `expr`; raises LinkwiseError for a symbol or function without meaning here."""
+        """Return the node of `expr`; raises LinkwiseError for a symbol or function without meaning here."""
         if isinstance(expr, (int, float)):
             return self.graph.const(float(expr))
         node = self._done.get(expr)
@@ -60,7 +60,7 @@ class Lowering:
         return g.call(function, self(expr.args[0]))
 
     def _product(self, expr: sp.Expr) -> Node:
-        """Numerator over denominator, so that x/y is one division and no reciprocal."""
+        """Return numerator over denominator, so that x/y is one division and no reciprocal."""
         g, above, below = self.graph, self.graph.one, self.graph.one
         for factor in expr.args:
             if factor.is_Pow and factor.exp.is_Rational and factor.exp < 0:

@@ -6,12 +6,12 @@ from linkwise.expression.expression_graph import Graph, Matrix, Node, Vector
 
 
 def dot(g: Graph, a: Sequence[Node], b: Sequence[Node]) -> Node:
-    """a · b."""
+    """Return a · b."""
     return g.sum(g.mul(x, y) for x, y in zip(a, b, strict=True))
 
 
 def cross(g: Graph, a: Vector, b: Vector) -> Vector:
-    """a × b."""
+    """Return a × b."""
     return (
         g.sub(g.mul(a[1], b[2]), g.mul(a[2], b[1])),
         g.sub(g.mul(a[2], b[0]), g.mul(a[0], b[2])),
@@ -20,28 +20,28 @@ def cross(g: Graph, a: Vector, b: Vector) -> Vector:
 
 
 def add(g: Graph, *vectors: Vector) -> Vector:
-    """Sum of vectors, from left to right."""
+    """Return the sum of vectors, from left to right."""
     x, y, z = (g.sum(parts) for parts in zip(*vectors, strict=True))
     return x, y, z
 
 
 def sub(g: Graph, a: Vector, b: Vector) -> Vector:
-    """a − b."""
+    """Return a − b."""
     return g.sub(a[0], b[0]), g.sub(a[1], b[1]), g.sub(a[2], b[2])
 
 
 def minus(g: Graph, a: Vector) -> Vector:
-    """−a."""
+    """Return −a."""
     return g.neg(a[0]), g.neg(a[1]), g.neg(a[2])
 
 
 def scale(g: Graph, factor: Node, a: Vector) -> Vector:
-    """factor · a."""
+    """Return factor · a."""
     return g.mul(factor, a[0]), g.mul(factor, a[1]), g.mul(factor, a[2])
 
 
 def apply(g: Graph, m: Matrix, a: Vector) -> Vector:
-    """m a."""
+    """Return m a."""
     return dot(g, m[0], a), dot(g, m[1], a), dot(g, m[2], a)
 
 
@@ -52,7 +52,7 @@ def transpose(m: Matrix) -> Matrix:
 
 
 def product(g: Graph, a: Matrix, b: Matrix) -> Matrix:
-    """a b."""
+    """Return a b."""
     columns = [apply(g, a, column) for column in transpose(b)]
     return transpose((columns[0], columns[1], columns[2]))
 
@@ -84,7 +84,7 @@ def rotated(g: Graph, rotation: Matrix, m: Matrix) -> Matrix:
 
 
 def named(g: Graph, name: str, a: Vector) -> Vector:
-    """Suggest name_x, name_y, name_z as the variables of `a`."""
+    """Suggest name_x, name_y, name_z as the variables of `a`, and return it."""
     for axis, node in zip("xyz", a, strict=True):
         g.name(node, f"{name}_{axis}")
     return a

@@ -1,7 +1,7 @@
-"""Autograd's graphs of partial torques, laid over each other, as pictures, tables and files.
+"""Autograd's graphs of partial torques, overlaid, as pictures, tables and files.
 
-A generated package records them (`Dynamics.graph`); here they are told: `overlay` joins the graphs of several
-parts, `graph_summary` counts them, `graph_files` writes and draws them.
+A generated package records them (`Dynamics.graph`); here `overlay` joins the graphs of several parts,
+`graph_summary` counts them, `graph_files` writes and draws them.
 """
 
 from linkwise.graphs.dot_text import dot_text

@@ -1,7 +1,7 @@
 """A graph as text for Graphviz: from the motions on the left to the torque on the right.
 
-What one part alone needs has the colour of its motion, strong for an acceleration and light for a velocity;
-what several parts need is grey, gravity dark.
+Operations that one part alone needs have the colour of its motion, strong for an acceleration and light for a
+velocity; operations that several parts need are grey, gravity is dark.
 """
 
 import re
@@ -15,16 +15,16 @@ from linkwise.plotstyle import GRAVITY, INK, PALE, colour
 
 SIGNS = {"mul": "×", "add": "+", "sub": "−", "neg": "−", "div": "÷", "pow": "^"}
 PLACES = {0: "", 1: "∂", 2: "∂²", 3: "∂³"}
-"""Marks of what belongs to a derivative."""
+"""Marks of operations of a derivative, by its order."""
 LIGHT = 0.6
 """Share of white in the colour of a velocity."""
 FONT = "DejaVu Sans"
 LOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-"""Letters of their own: browsers differ in how they set an SVG's text low, and all in how wide."""
+"""Subscript characters: browsers differ in how they lower the text of an SVG, and in how wide they set it."""
 
 
 def dot_text(graph: Overlay, drawing: Drawing) -> str:
-    """The drawing in Graphviz's language; numbers of joints and links count from 1."""
+    """Return the drawing in Graphviz's language; numbers of joints and links count from 1."""
     lines = [
         "digraph torque {",
         f'graph [rankdir=LR, fontname="{FONT}", fontsize=11, labelloc=b, labeljust=l, nodesep=0.12,',
@@ -38,7 +38,7 @@ def dot_text(graph: Overlay, drawing: Drawing) -> str:
     lines.append(f"{{rank=same; {'; '.join(leaves)}}}")
     for a, b, count in drawing.edges():
         second = _subtracted(drawing.nodes[b], drawing, a)
-        # x + x and x · x have an arrow for each operand; of what is folded, one stands for all.
+        # x + x and x · x have an arrow for each operand; in a folded node, one stands for all.
         whole = len(drawing.nodes[b].inner) == 1
         width = [f"penwidth={min(0.7 + 0.1 * (count - 1), 3):.2g}"] * (count > 1 and not whole)
         marks = width + ["arrowhead=tee"] * second
@@ -49,7 +49,7 @@ def dot_text(graph: Overlay, drawing: Drawing) -> str:
 
 
 def part_colour(graph: Overlay, part: int) -> str:
-    """Fill of what only this part needs."""
+    """Return the fill colour of nodes that only this part needs."""
     k, order = graph.coordinate(part), graph.parts[part].order
     return GRAVITY if k is None and order == 0 else _motion_colour(k or 0, 2 if order is None else order)
 
@@ -86,7 +86,7 @@ def _node(graph: Overlay, at: int, node: DrawnNode) -> str:
 
 
 def _purpose(graph: Overlay, node: DrawnNode) -> str:
-    """What folded operations of several lines, or of none, are for."""
+    """Return the purpose of folded operations of several lines, or of none."""
     if node.part is None:
         return "for several parts"
     order, k = graph.parts[node.part].order, graph.coordinate(node.part)
@@ -96,7 +96,7 @@ def _purpose(graph: Overlay, node: DrawnNode) -> str:
 
 
 def _results(graph: Overlay, drawing: Drawing) -> Iterator[str]:
-    """Boxes of the parts, and of the torque that they sum to."""
+    """Yield boxes of the parts, and of the torque that they sum to."""
     for number, part in enumerate(graph.parts):
         fill = part_colour(graph, number)
         text = f"<B>{_written(part_label(graph, number))}</B>"
@@ -150,7 +150,7 @@ def _leaf(graph: Overlay, leaf: Any) -> str:
 
 
 def _operation(operation: Any) -> str:
-    """An operation with the numbers that it computes with."""
+    """Return the text of an operation, with the numbers that it computes with."""
     sign = SIGNS.get(operation.name, html_text(operation.name))
     numbers = [value for value in operation.arguments if isinstance(value, float | int)]
     if operation.name == "add" and numbers and numbers[0] < 0:
@@ -159,7 +159,7 @@ def _operation(operation: Any) -> str:
 
 
 def _subtracted(node: DrawnNode, drawing: Drawing, before: int) -> bool:
-    """Whether a value is what is subtracted, or divided by."""
+    """Return whether the value of the node `before` is subtracted, or a divisor."""
     if len(node.inner) > 1 or node.inner[0].name not in ("sub", "div"):
         return False
     operands = node.inner[0].operands
@@ -167,7 +167,7 @@ def _subtracted(node: DrawnNode, drawing: Drawing, before: int) -> bool:
 
 
 def _written(text: str) -> str:
-    """A formula with its indices set low, and commas between them only where one has two digits."""
+    """Return a formula with its indices as subscripts, and commas between them only if one has two digits."""
 
     def low(found: re.Match[str]) -> str:
         indices = found[1].split(",")
@@ -181,7 +181,7 @@ def _quoted(text: str) -> str:
 
 
 def _ink(fill: str) -> str:
-    """Black or white, whichever is legible on a colour."""
+    """Return black or white, whichever is legible on a colour."""
     if not fill.startswith("#"):
         return INK
     red, green, blue = (int(fill[at : at + 2], 16) for at in (1, 3, 5))

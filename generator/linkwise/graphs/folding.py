@@ -1,8 +1,8 @@
 """Graphs too large to read, folded: the operations of one line, or of one link, drawn as one node.
 
-What one part needs, and no other, never goes into one node with what several parts need, so that a colour is
-never folded away. By line: operations that compute one line, or differentiate it equally often. By link: the
-same of a link's file, and everything that a part has for itself.
+Operations that one part needs, and no other, are never in one node with operations that several parts need,
+so that no colour is lost. By line: operations that compute one line, or differentiate it equally often. By
+link: operations of a link's file, of equal derivative, and everything that a part has for itself.
 """
 
 from collections.abc import Hashable
@@ -12,9 +12,9 @@ from typing import Any
 from linkwise.graphs.overlay import Overlay
 
 FOLDS = ("none", "line", "link")
-"""From nothing to most."""
+"""Ways to fold, from nothing to most."""
 LEGIBLE = 110
-"""Nodes of a picture that one still follows."""
+"""Most nodes of a picture that is still legible."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Drawing:
     place: dict[str, int]
 
     def edges(self) -> list[tuple[int, int, int]]:
-        """From, to, and how many values go there."""
+        """Return edges (from, to, number of values that go there)."""
         counts: dict[tuple[int, int], int] = {}
         for at, node in enumerate(self.nodes):
             for operation in node.inner:
@@ -50,7 +50,10 @@ class Drawing:
 
 
 def folded(graph: Overlay, fold: str | None = None) -> Drawing:
-    """The drawing of an overlay; without a `fold`, the least that makes it legible, or the most there is."""
+    """Return the drawing of an overlay, folded.
+
+    Without a `fold`, it has the least that makes the drawing legible, or the most there is.
+    """
     for choice in FOLDS if fold is None else (fold,):
         drawing = _drawing(graph, choice)
         if len(drawing.nodes) <= LEGIBLE:
@@ -69,7 +72,7 @@ def _drawing(graph: Overlay, fold: str) -> Drawing:
         users = graph.users[first.key]
         source, derivative = getattr(first, "source", ""), getattr(first, "derivative", 0)
         if len({(node.source, node.derivative) for node in inner if len(inner) > 1}) > 1:
-            # Of a link's file, or of all that a part has for itself.
+            # They are those of a link's file, or all that a part has for itself.
             source = "" if len(users) == 1 else source.partition(":")[0]
             derivative = 0 if len(users) == 1 else derivative
         place.update({node.key: len(nodes) for node in inner})
@@ -78,12 +81,12 @@ def _drawing(graph: Overlay, fold: str) -> Drawing:
 
 
 def _group(graph: Overlay, key: str, node: Any, fold: str) -> Hashable:
-    """What the nodes that are drawn as one have in common."""
+    """Return the key that all nodes drawn as one have in common."""
     if fold == "none" or not hasattr(node, "operands"):
         return key
     users = graph.users[key]
     if fold == "line":
-        # A product with a motion belongs to no line: it says what is computed, and stays.
+        # A product with a motion belongs to no line: it shows what is computed, and stays.
         alone = users if len(users) == 1 else None
         return (alone, node.derivative, node.source) if node.source else key
     return users if len(users) == 1 else (None, node.derivative, node.source.partition(":")[0])

@@ -1,4 +1,4 @@
-"""A graph as files: a picture by Graphviz, GraphML for graph programs, JSON for one's own."""
+"""A graph as files: a picture by Graphviz, GraphML for graph programs, JSON for programs of one's own."""
 
 import shutil
 import subprocess
@@ -20,7 +20,9 @@ MOTIONS = {order: name for name, order in KINDS.items()}
 def graph_files(
     graph: Overlay, formats: Iterable[str], fold: str | None = None, progress: Progress = silent
 ) -> dict[str, bytes]:
-    """Files by name, in these formats; `fold` is for pictures, None for the least that makes one legible.
+    """Return files by name, in these formats.
+
+    fold: for pictures; None for the least that makes one legible
 
     Raises LinkwiseError where a program or a library is missing.
     """
@@ -31,7 +33,7 @@ def graph_files(
     for kind in formats:
         match kind:
             case "svg" | "png":
-                # Graphviz says nothing on its way, and needs minutes for thousands of nodes.
+                # Graphviz reports no progress, and needs minutes for thousands of nodes.
                 progress(stage, 0, 1)
                 content = _drawn(dot, kind)
                 progress(stage, 1, 1)
@@ -48,7 +50,10 @@ def graph_files(
 
 
 def file_name(graph: Overlay) -> str:
-    """tau_1_2 for τ_1,2; tau_1_2_qdd_1 for a part of it, tau_1_2_motion_1 and tau_1_2_qdd for several."""
+    """Return tau_1_2 for τ_1,2, tau_1_2_qdd_1 for a part of it.
+
+    Several parts have names such as tau_1_2_motion_1 and tau_1_2_qdd.
+    """
     words = ["tau", str(graph.joint + 1), *([] if graph.link is None else [str(graph.link + 1)])]
     coordinates = {graph.coordinate(number) for number in range(len(graph.parts))}
     orders = {part.order for part in graph.parts}
@@ -62,7 +67,7 @@ def file_name(graph: Overlay) -> str:
 
 
 def graph_json(graph: Overlay) -> dict[str, Any]:
-    """The graph as JSON values, in the node-link format that networkx and D3 read.
+    """Return the graph as JSON values, in the node-link format that networkx and D3 read.
 
     An id is the same in every graph of the robot; `position` numbers an operation's operands from 0.
     """
@@ -109,7 +114,7 @@ def _node(graph: Overlay, node: Any) -> dict[str, Any]:
 
 
 def _argument(value: Any) -> Any:
-    """The key of a value, a number, a list of them, or else the text of what it is."""
+    """Return the key of a value, a number, a list of these, or else the argument's text."""
     if hasattr(value, "key"):
         return value.key
     if isinstance(value, list | tuple):
@@ -118,7 +123,7 @@ def _argument(value: Any) -> Any:
 
 
 def _edges(graph: Overlay) -> list[tuple[str, str, int]]:
-    """From, to, and which of the operands it is."""
+    """Return edges (from, to, position among the operands)."""
     return [
         (a, key, at)
         for key, node in graph.nodes.items()
@@ -127,7 +132,7 @@ def _edges(graph: Overlay) -> list[tuple[str, str, int]]:
 
 
 def _graphml(graph: Overlay) -> bytes:
-    """Attributes that are lists, as the parts and an operation's arguments, are JSON texts."""
+    """Return the graph as GraphML; attributes that are lists, such as parts and arguments, are JSON texts."""
     networkx = extra("networkx")
     found = networkx.MultiDiGraph(**_flat(_about(graph)))
     for node in graph.nodes.values():

@@ -1,4 +1,4 @@
-"""What a graph counts, in a few lines."""
+"""The counts of a graph, in a few lines."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -7,7 +7,7 @@ from linkwise.graphs.overlay import Overlay, part_label
 
 
 def graph_summary(graph: Overlay, whole: Any, elsewhere: Mapping[str, int]) -> Iterator[str]:
-    """Lines of plain text.
+    """Yield lines of plain text.
 
     whole: graph of the torque itself, differentiated as it is defined and not split into parts
     elsewhere: operations that the other links' torques on this joint need too, by link

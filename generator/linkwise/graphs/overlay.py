@@ -1,4 +1,4 @@
-"""Graphs of several parts of one torque in one: what each part has for itself, and what they share."""
+"""Graphs of several parts of one torque, overlaid: what each part has for itself, and what they share."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 DOTS = {0: "q", 1: "q\N{COMBINING DOT ABOVE}", 2: "q\N{COMBINING DIAERESIS}"}
 """Letters of a motion by its order."""
 KINDS = {"q": 0, "qd": 1, "qdd": 2}
-"""Order of a motion by the name that calls give it."""
+"""Order of a motion by its name in calls."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Overlay:
     """Parts of the torque on one joint; indices count from 0.
 
     nodes: leaves and operations by key, operands first
-    users: for each of them the numbers of the parts that need it
+    users: for each node the numbers of the parts that need it
     """
 
     robot: str
@@ -32,14 +32,14 @@ class Overlay:
     """Names of the links through which it is loaded: one, or all."""
     link: int | None
     potential: str
-    """What the part without any motion is called."""
+    """Name of the part without any motion."""
     parts: tuple[TorqueGraph, ...]
     nodes: dict[str, Any]
     users: dict[str, tuple[int, ...]]
 
     @property
     def torque(self) -> str:
-        """The torque as it is written, τ_1,2."""
+        """Formula of the torque, such as τ_1,2."""
         return f"τ_{self.joint + 1}" + ("" if self.link is None else f",{self.link + 1}")
 
     @property
@@ -48,17 +48,17 @@ class Overlay:
         return sum(hasattr(node, "operands") for node in self.nodes.values())
 
     def own(self, part: int) -> int:
-        """Operations that only this part needs."""
+        """Return the number of operations that only this part needs."""
         return sum(self.users[node.key] == (part,) for node in self.parts[part].operations)
 
     def coordinate(self, part: int) -> int | None:
-        """Coordinate k of a part."""
+        """Return coordinate k of a part; None for a part of no single coordinate."""
         name = self.parts[part].coordinate
         return None if name is None else self.joints.index(name)
 
 
 def overlay(robot: Any, joint: int, link: int | None, parts: Sequence[TorqueGraph]) -> Overlay:
-    """Lay graphs over each other; `robot` is the package's, on its autograd back end."""
+    """Overlay graphs; `robot` is the package's robot, on its autograd back end."""
     nodes: dict[str, Any] = {}
     users: dict[str, list[int]] = {}
     for number, part in enumerate(parts):
@@ -79,7 +79,7 @@ def overlay(robot: Any, joint: int, link: int | None, parts: Sequence[TorqueGrap
 
 
 def part_label(graph: Overlay, part: int) -> str:
-    """A part as it is written: c2 q̈_1, or gravity."""
+    """Return the formula of a part, c2 q̈_1, or its name, such as gravity."""
     order, k = graph.parts[part].order, graph.coordinate(part)
     if k is None:
         return {None: graph.torque, 0: graph.potential, 1: "all velocities", 2: "all accelerations"}[order]

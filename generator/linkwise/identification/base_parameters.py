@@ -1,11 +1,11 @@
-"""Which combinations of the links' inertial parameters torques can tell: base parameters.
+"""Base parameters: the combinations of the links' inertial parameters that torques determine.
 
     W. Khalil, J.-F. Bennis, Int. J. Robotics Research 14(2), 1995; M. Gautier, J. Robotic Systems 8(4), 1991
 
 The regressor of many random motions has dependent columns. QR with column pivoting picks independent ones,
 Y P = Q [R1 R2], and the others are their combinations, Y2 = Y1 R1^-1 R2: so with pi1 the picked parameters
-Y pi = Y1 beta, beta = pi1 + R1^-1 R2 pi2, whatever the motion. Links that are built alike have columns of
-equal size, of which rounding would pick one: here the first in order is, so that every back end names the
+Y pi = Y1 beta, beta = pi1 + R1^-1 R2 pi2, whatever the motion. Links of equal design have columns of equal
+size, among which rounding would pick: here the first in order is picked, so that every back end names the
 same combinations.
 
 Where some joints' torques are not measured, their rows are left out: Y1 of the others, in turn, has dependent
@@ -27,13 +27,13 @@ NAMES = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
 
 LATER = 0.01
-"""What columns of masses are scaled by: a sum is named after the first moment that a mass adds to, say."""
+"""Factor for columns of masses, so that a sum is named after, say, the first moment that a mass adds to."""
 RANK = 1e-8
-"""Of the largest: a smaller diagonal entry of R, of columns scaled to one size, is rounding, and no rank."""
+"""Part of the largest diagonal entry of R, for columns of one size, below which an entry is rounding."""
 TIE = 1e-6
-"""Of the larger: what of columns differs by less is equally large."""
+"""Part of the larger column, by which columns may differ and still count as equally large."""
 NOTHING = 1e-9
-"""Of a column's size: a smaller part of another column is rounding too."""
+"""Part of a column's size, below which the share of another column is rounding too."""
 ROWS = 4
 """Rows of random motion for each column."""
 
@@ -46,41 +46,43 @@ class BaseParameters:
     picked: tuple[int, ...]
     """Positions in pi of the parameter that each combination is named after, ascending."""
     combinations: Array
-    """(base, 10 N), the identity in the picked columns."""
+    """Matrix (base, 10 N), the identity in the picked columns."""
     sizes: Array
     """Root mean square of the picked columns of the regressor over random motions, (base,)."""
     condition: float
-    """Condition number of these columns, each divided by its size: that of a good motion."""
+    """Condition number of these columns, each divided by its size: the value for a good motion."""
     hidden: tuple[str, ...]
-    """Combinations, as texts, that torques of all joints would tell, and the measured ones do not alone."""
+    """Combinations, as texts, that torques of all joints determine, and the measured torques alone do not."""
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of base parameters."""
         return len(self.picked)
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Unit of each."""
+        """Unit of each base parameter."""
         return tuple(UNITS[at % len(NAMES)] for at in self.picked)
 
     def texts(self) -> list[str]:
-        """Each as a sum of the links' parameters, such as m(upper) + 2.5 mcx(lower)."""
+        """Return each combination as a sum of the links' parameters, such as m(upper) + 2.5 mcx(lower)."""
         rows = zip(self.combinations, self.picked, strict=True)
         return [combination_text(self.links, row, own) for row, own in rows]
 
 
 def samples_needed(model: Dynamics, torques: int) -> int:
-    """How long random motions of a robot must be that has so many torques."""
+    """Return the number of samples of random motion that a robot with so many torques needs."""
     return -(-ROWS * len(NAMES) * len(model.link_names) // torques) + ROWS
 
 
 def base_parameters(
     model: Dynamics, measured: Sequence[int] | None = None, motion: Motion | None = None
 ) -> BaseParameters:
-    """Base parameters of a robot, by random motions of up to SPEED; raises as its `regressor` does.
+    """Return the base parameters of a robot, by random motions of up to SPEED.
 
-    measured: joints, counted from 0, whose torques there are, in any order; all if not given
+    Raises the errors of the robot's `regressor`.
+
+    measured: joints, counted from 0, whose torques are measured, in any order; all if not given
     motion: random motions of joints that are tied; those of free joints if not given
     """
     links, n = tuple(model.link_names), len(model.joint_names)
@@ -102,9 +104,10 @@ def base_parameters(
 
 
 def _combinations(rows: Array, names: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array]:
-    """Independent columns, ascending, and which combinations of all they stand for, (independent, columns).
+    """Return the independent columns, ascending, and the combinations of all columns that they stand for.
 
-    names: positions in pi of what the columns are named after
+    The combinations have shape (independent, columns). names: positions in pi of the parameters that the
+    columns are named after
     """
     picked, rest, shares = _independent(rows, np.where(names % len(NAMES), 1.0, LATER))
     combinations = np.zeros((len(picked), rows.shape[1]))
@@ -115,9 +118,9 @@ def _combinations(rows: Array, names: NDArray[np.intp]) -> tuple[NDArray[np.intp
 
 
 def _independent(rows: Array, weights: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """Independent columns, the others, and these as combinations of those, (picked, others)."""
+    """Return the independent columns, the others, and these as combinations of those, (picked, others)."""
     sizes = np.sqrt(np.mean(rows**2, axis=0))
-    sizes[sizes <= NOTHING * sizes.max(initial=0.0)] = np.inf  # what no motion shows
+    sizes[sizes <= NOTHING * sizes.max(initial=0.0)] = np.inf  # no motion shows these columns
     sizes = sizes / weights
     q, a, picked = _orthogonal(rows / sizes)
     rest = np.setdiff1d(np.arange(len(sizes)), picked)
@@ -128,7 +131,10 @@ def _independent(rows: Array, weights: Array) -> tuple[NDArray[np.intp], NDArray
 
 
 def _orthogonal(rows: Array) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Q, the columns in as few rows as there are columns, and which of them span all, in the order picked."""
+    """Return Q, a factor R of the columns, and a set of columns that span all, in the order picked.
+
+    R has as few rows as there are columns.
+    """
     a: Array = np.asarray(np.linalg.qr(rows, mode="r"))
     left, q, picked = a.copy(), np.zeros((len(a), 0)), list[int]()
     largest = 0.0
@@ -138,7 +144,7 @@ def _orthogonal(rows: Array) -> tuple[Array, Array, NDArray[np.intp]]:
         largest = max(largest, sizes[at])
         if sizes[at] <= RANK * largest:
             break
-        column = left[:, at] - q @ (q.T @ left[:, at])  # once more, for what rounding has left
+        column = left[:, at] - q @ (q.T @ left[:, at])  # once more, to remove what rounding has left
         column /= np.linalg.norm(column)
         left -= np.outer(column, column @ left)
         left[:, at] = 0.0
@@ -148,7 +154,7 @@ def _orthogonal(rows: Array) -> tuple[Array, Array, NDArray[np.intp]]:
 
 
 def combination_text(links: Sequence[str], row: Array, own: int) -> str:
-    """A combination (10 N,) named after the parameter at `own`."""
+    """Return the text of a combination (10 N,) that is named after the parameter at `own`."""
 
     def name(at: int) -> str:
         link, which = divmod(at, len(NAMES))
@@ -159,6 +165,6 @@ def combination_text(links: Sequence[str], row: Array, own: int) -> str:
 
 
 def _term(factor: float, name: str) -> str:
-    # Rounded twice: exact halves of the last digit shown are not left to what rounding errors there are.
+    # Rounded twice: rounding errors do not decide on exact halves of the last digit shown.
     sign, size = ("-" if factor < 0 else "+"), f"{float(f'{abs(factor):.10g}'):.6g}"
     return f"{sign} {name}" if size == "1" else f"{sign} {size} {name}"

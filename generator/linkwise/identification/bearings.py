@@ -1,8 +1,9 @@
-"""Which joints rub, and which torques that loads.
+"""Friction of the joints: which joints have it, and which torques it loads.
 
-The coordinates of a base that floats have no bearings. Where joints are tied, those that follow rub as well,
-and the independent ones bear it: G^T of their friction. There the motion may not tell one joint's friction
-from that of others: so much of it as needs another column is then fitted, the independent joints' first.
+The coordinates of a floating base have no bearings. Where joints are tied, the joints that follow have
+friction as well, and the independent joints carry it: G^T of their friction. There the motion may not tell
+one joint's friction from that of others: then only friction with independent columns is fitted, first that of
+the independent joints.
 """
 
 from dataclasses import dataclass
@@ -16,25 +17,25 @@ from linkwise.identification.random_motions import SPEED, Motion
 from linkwise.package.load import Array
 
 RANK = 1e-6
-"""Of a column: what is left of it across others is rounding where it is smaller."""
+"""Part of a column, below which its remainder, without its share along other columns, is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bearings:
-    """Joints whose friction counts: those whose torques are measured, and behind them those that follow."""
+    """Joints whose friction counts: first those with measured torques, then those that follow."""
 
     robot: LoadedRobot
     measured: tuple[int, ...]
     joints: tuple[int, ...]
-    """(B,)"""
+    """Numbers of the joints, (B,)."""
     rubs: NDArray[np.bool_]
-    """Whose friction is fitted, (B,)."""
+    """True for joints whose friction is fitted, (B,)."""
     sizes: Array
-    """Root mean square of their columns over random motions, (B, 2)."""
+    """Root mean square of the joints' columns over random motions, (B, 2)."""
 
     @classmethod
     def of(cls, robot: LoadedRobot, measured: tuple[int, ...], motion: Motion, friction: bool) -> "Bearings":
-        """friction: whether any joint's is fitted."""
+        """Return the bearings of a robot; `friction` is whether the friction of any joint is fitted."""
         followers = [i for i in range(len(robot.joints)) if i not in robot.driven]
         joints = (*measured, *followers)
         floats = floating_coordinates(robot)
@@ -48,7 +49,7 @@ class Bearings:
         return cls(robot, measured, joints, told, np.where(sizes > 0.0, sizes, 1.0))
 
     def columns(self, q: Array, qd: Array) -> Array:
-        """What measured joints bear of the viscous and the Coulomb friction of each joint, (S, m, B, 2)."""
+        """Return the load of joints' viscous and Coulomb friction on the measured joints, (S, m, B, 2)."""
         joints, measured = list(self.joints), list(self.measured)
         own = np.stack([qd, np.sign(qd)], -1)[:, None, joints]
         if self.robot.constrained is None:
@@ -60,13 +61,13 @@ class Bearings:
 
 
 def floating_coordinates(robot: LoadedRobot) -> frozenset[int]:
-    """Coordinates of a base that floats, in space or in a plane; none of another."""
+    """Return the coordinates of a floating base, in space or in a plane; an empty set for any other base."""
     tree = robot.model.backend.tree
     return frozenset() if tree is None else frozenset(loose_base(tree))
 
 
 def _independent(columns: Array) -> NDArray[np.bool_]:
-    """Which joints' columns (rows, B, 2) are no combinations of those of the joints before them."""
+    """Return whether a joint's columns (rows, B, 2) are independent of those of joints before it, (B,)."""
     told = np.zeros(columns.shape[1], dtype=np.bool_)
     kept = [np.zeros((len(columns), 0))] * 2
     for at in range(columns.shape[1]):
@@ -80,7 +81,7 @@ def _independent(columns: Array) -> NDArray[np.bool_]:
 
 
 def _across(column: Array, directions: Array) -> Array:
-    """What is left of it across directions of length 1."""
-    for _ in range(2):  # once more, for what rounding has left
+    """Return a column without its components along directions of length 1."""
+    for _ in range(2):  # once more, to remove what rounding has left
         column = column - directions @ (directions.T @ column)
     return column

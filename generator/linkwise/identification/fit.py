@@ -1,7 +1,7 @@
 """Weighted least squares of base parameters and friction, with standard errors.
 
-Every joint has noise of its own: its equations weigh 1/sigma_i, sigma_i being what is left of them. With W
-the weighted equations, the covariance of the estimates is (W^T W)^-1 (M. Gautier, P. Poignet, Control
+Every joint has noise of its own: its equations have weight 1/sigma_i, with sigma_i from their residuals. With
+W the weighted equations, the covariance of the estimates is (W^T W)^-1 (M. Gautier, P. Poignet, Control
 Engineering Practice 9(12), 2001).
 """
 
@@ -16,16 +16,18 @@ from linkwise.identification.normal_factors import JointEquations
 from linkwise.package.load import Array
 
 ROUNDS = 3
-"""From equal weights to the joints' own, and twice again."""
+"""Rounds of reweighting: from equal weights to the joints' own, and twice again."""
 LEAST = 1e-9
-"""Of the largest joint's torque: the noise of a log that has none."""
+"""Least noise, as a part of the largest joint's torque: the noise of a log that has none."""
 POOR, WORST = 30.0, 1000.0
-"""Times the condition number of random motions: there a log tells some combinations badly, or not at all."""
+"""Multiples of the condition number of random motions, above which a log determines some combinations poorly,
+or not at all.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What a log says of base parameters (base,) and friction (B, 2), viscous and Coulomb.
+    """Result of a fit: base parameters (base,) and friction (B, 2), viscous and Coulomb.
 
     Friction is zero where a joint has none. B are the joints of `Bearings`, first the n whose torques are
     measured, in the robot's order: all, where joints are free.
@@ -35,26 +37,26 @@ class Fit:
     friction: Array
     beta_errors: Array
     friction_errors: Array
-    """Standard errors."""
+    """Standard errors of friction, as `beta_errors` are of beta."""
     noise: Array
     """sigma of each joint, (n,), in N m or N."""
     condition: float
-    """Of the equations, each column divided by its size over random motions."""
+    """Condition number of the equations, each column divided by its size over random motions."""
     triangle: Array
     """[W | tau] of all joints, weighted: the unknowns are beta and, joint by joint, its friction."""
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """How well equations tell the unknowns apart: their condition number, and what they tell least."""
+    """Excitation of the unknowns: the equations' condition number, and the unknown determined worst."""
 
     condition: float
-    """Of columns as large as random motions make them."""
+    """Condition number of the columns, each divided by its size over random motions."""
     worst: str
 
 
 def weighted_fit(equations: JointEquations, base: BaseParameters, bearings: Bearings) -> Fit:
-    """Fit all joints together."""
+    """Return the fit of all joints together."""
     rubs, n = bearings.rubs, len(equations.triangles)
     noise = np.ones(n)
     condition = excitation(equations, base, bearings).condition
@@ -72,10 +74,13 @@ def weighted_fit(equations: JointEquations, base: BaseParameters, bearings: Bear
 
 
 def _noise(equations: JointEquations, beta: Array, friction: Array, free: float) -> Array:
-    """sigma of each joint, (n,), of what is left of as many equations as are `free`."""
+    """Return sigma of each joint, (n,), from its residuals.
+
+    free: degrees of freedom of a joint's equations
+    """
     left, sizes = equations.errors(beta, friction) * np.sqrt(equations.rows / free), equations.sizes()
     noise: Array = np.maximum(left, LEAST * (sizes.max() or 1.0))
-    # A torque of zeros is met exactly by bodies without mass: it must not count as free of noise for that.
+    # Bodies without mass meet a torque of zeros exactly: it must not count as free of noise for that.
     still = sizes == 0
     if still.any() and not still.all():
         noise[still] = np.maximum(noise[still], np.median(noise[~still]))
@@ -83,7 +88,7 @@ def _noise(equations: JointEquations, beta: Array, friction: Array, free: float)
 
 
 def stacked(equations: JointEquations, noise: Array, rubs: NDArray[np.bool_]) -> Array:
-    """Triangle of all joints' equations, each divided by its noise."""
+    """Return the triangle of all joints' equations, each divided by its noise."""
     n, size = equations.triangles.shape[:2]
     base = size - 2 * len(rubs) - 1
     kept = np.concatenate([np.ones(base, np.bool_), np.repeat(rubs, 2), [True]])
@@ -93,7 +98,7 @@ def stacked(equations: JointEquations, noise: Array, rubs: NDArray[np.bool_]) ->
 
 
 def _solved(triangle: Array, base: BaseParameters, rubs: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """beta and friction (B, 2)."""
+    """Return beta (base,) and friction (B, 2)."""
     x = np.linalg.solve(triangle[:-1, :-1], triangle[:-1, -1]).astype(float)
     friction = np.zeros((len(rubs), 2))
     friction[rubs] = x[base.count :].reshape(-1, 2)
@@ -101,7 +106,7 @@ def _solved(triangle: Array, base: BaseParameters, rubs: NDArray[np.bool_]) -> t
 
 
 def excitation(equations: JointEquations, base: BaseParameters, bearings: Bearings) -> Excitation:
-    """How well a log's motion tells the unknowns apart, all joints weighing the same."""
+    """Return how well a log's motion tells the unknowns apart, with equal weights for all joints."""
     triangle = stacked(equations, np.ones(len(equations.triangles)), bearings.rubs)
     sizes = np.concatenate([base.sizes, bearings.sizes[bearings.rubs].reshape(-1)])
     _, values, directions = np.linalg.svd(triangle[:-1, :-1] / sizes)

@@ -1,4 +1,4 @@
-"""What `identify` found."""
+"""The result of `identify`."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ from linkwise.package.load import Array
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """What a log says of a robot."""
+    """Result of an identification: a robot's parameters by a log."""
 
     robot: LoadedRobot
     log: TorqueLog
@@ -25,22 +25,22 @@ class Identification:
     fit: Fit
     """Base parameters and friction, by weighted least squares."""
     physical: PhysicalFit
-    """Every link's parameters, such as a body can have."""
+    """Every link's parameters, which a physical body can have."""
     own: Array
-    """Those of the package, (N, 10)."""
+    """Parameters of the links in the package, (N, 10)."""
     seen: JointEquations
     unseen: JointEquations
-    """Equations of the part of the log that was fitted, and of the rest."""
+    """Equations of the part of the log that was not fitted; `seen` are those of the part that was."""
     warnings: tuple[str, ...]
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Joints whose torques are measured, in the robot's order: those of noise and errors."""
+        """Joints whose torques are measured, in the robot's order: the joints of noise and errors."""
         return tuple(self.robot.joints[i] for i in self.log.measured)
 
     @property
     def followers(self) -> tuple[str, ...]:
-        """Joints that follow these, whose friction stands behind theirs."""
+        """Joints that follow these; their friction comes after that of these."""
         return tuple(self.robot.joints[i] for i in self.bearings.joints[len(self.log.measured) :])
 
     @property
@@ -50,13 +50,13 @@ class Identification:
 
     @property
     def floating(self) -> tuple[str, ...]:
-        """Coordinates of a base that floats whose torques are measured: without bearings, and friction."""
+        """Coordinates of a floating base whose torques are measured: without bearings, and friction."""
         floats = floating_coordinates(self.robot)
         return tuple(self.robot.joints[i] for i in self.log.measured if i in floats)
 
     @property
     def shared_friction(self) -> tuple[str, ...]:
-        """Followers whose friction counts in that of the others: no motion tells it from theirs."""
+        """Followers whose friction counts in that of other joints: no motion tells it from theirs."""
         if not self.bearings.rubs.any():
             return ()
         rubs = self.bearings.rubs[len(self.log.measured) :]
@@ -66,7 +66,7 @@ class Identification:
     def frictions(self) -> dict[str, Array]:
         """Viscous and Coulomb friction by joint, (2,) each: 0 where it counts in that of another joint.
 
-        Joints of which none was fitted are not there.
+        Joints whose friction was not fitted are left out.
         """
         fitted = zip((*self.joints, *self.followers), self.bearings.rubs, self.physical.friction, strict=True)
         found = {joint: own for joint, rubs, own in fitted if rubs or joint in self.shared_friction}
@@ -76,7 +76,7 @@ class Identification:
         return found
 
     def errors(self, equations: JointEquations) -> dict[str, Array]:
-        """Root mean square error of each joint's torque: of the fit, of its bodies, and of the package."""
+        """Return the root mean square error of each joint's torque, (n,), by fit, bodies and package."""
         combinations, none = self.base.combinations, np.zeros_like(self.fit.friction)
         bodies = combinations @ self.physical.pi.reshape(-1)
         return {

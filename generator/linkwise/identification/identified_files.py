@@ -12,13 +12,16 @@ from linkwise.identification.pseudo_inertia import central
 from linkwise.package.manifest import Manifest
 
 COEFFICIENTS = {"rad": ("N m s/rad", "N m"), "m": ("N s/m", "N")}
-"""Units of viscous and Coulomb friction, by that of the joint."""
+"""Units of viscous and Coulomb friction, by the unit of the joint."""
 
 
 def identified_files(
     found: Identification, manifest: Manifest, choices: dict[str, Any], lost: Sequence[str]
 ) -> dict[str, bytes]:
-    """The record and the page; `choices` are recorded, `lost` is what the robot's file does not say."""
+    """Return the record and the page by name.
+
+    choices: settings to record; lost: what the robot's file does not say, in words
+    """
     assert manifest.tree is not None
     about = record(found) | {"gravity": list(manifest.tree.gravity), "choices": choices}
     texts = {"identified.json": json_text(about, indent=1) + "\n", "identified.md": page(found, lost)}
@@ -26,7 +29,7 @@ def identified_files(
 
 
 def record(found: Identification) -> dict[str, Any]:
-    """Everything found, as plain data."""
+    """Return everything found, as plain data."""
     fit, robot = found.fit, found.robot
     friction = {
         name: {
@@ -78,7 +81,7 @@ def record(found: Identification) -> dict[str, Any]:
 
 
 def page(found: Identification, without: Sequence[str]) -> str:
-    """The page, in Markdown; `without` is what the robot's file does not say."""
+    """Return the page, in Markdown; `without` is what the robot's file does not say."""
     return "\n".join([*_head(found), *_joints(found), *_base(found), *_links(found), *_lost(without), ""])
 
 

@@ -1,4 +1,4 @@
-"""`identify`: from a log and a robot to what its links carry."""
+"""`identify`: the parameters of a robot's links, from a log."""
 
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -26,11 +26,14 @@ from linkwise.progress import Progress, silent
 
 @dataclass(frozen=True)
 class Fitting:
-    """What is fitted: which columns of the log are torques, as (column, joint) pairs, and how.
+    """Choice of what is fitted: the log's torque columns, as (column, joint) pairs, and how they are fitted.
 
-    factor: what brings torques to N m, and forces to N; unseen: share of the log, at its end, that is left
-    out of the fit and predicted by it; unmeasured: joints whose torques nobody knows, such as the coordinates
-    of a floating base, on which the ground acts. Raises LinkwiseError for values that cannot be.
+    factor: brings torques to N m, and forces to N
+    friction: whether friction is fitted
+    unseen: share of the log, at its end, that is left out of the fit and predicted by it
+    unmeasured: joints with unknown torques, such as coordinates of a floating base, on which the ground acts
+
+    Raises LinkwiseError for values that are not possible.
     """
 
     torques: tuple[tuple[str, str], ...] = ()
@@ -56,10 +59,10 @@ def identify(
 ) -> Identification:
     """Identify a robot's links from a log of motion and torques.
 
-    robot: the directory of its package; of a robot's file `linkwise.kept_package` makes one
+    robot: the directory of its package; `linkwise.kept_package` makes one from a robot's file
 
-    Velocities and accelerations come from positions, as in `analyze`; torques are taken as they are.
-    Raises LinkwiseError, in one line that names the mend, for what cannot be identified.
+    Velocities and accelerations come from positions, as in `analyze`; torques are used as they are.
+    Raises LinkwiseError, in one line that names the fix, for what cannot be identified.
     """
     loaded = robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot))
     own = _own_parameters(loaded)
@@ -122,7 +125,7 @@ def _refuse_few(seen: JointEquations, base: BaseParameters, bearings: Bearings) 
 
 
 def _refuse_unexcited(found: Excitation, base: BaseParameters, noisy: str) -> None:
-    """LinkwiseError for a condition number far too large."""
+    """Raise LinkwiseError for a condition number that is far too large."""
     if found.condition <= WORST * base.condition:
         return
     raise LinkwiseError(

@@ -1,6 +1,6 @@
-"""The robot that was identified: the user's own file written back, or a URDF file of the package.
+"""The identified robot: the user's own file written back, or a new URDF file of the package.
 
-The latter has its loops beside it, as a file of constraints.
+The loops of the package go into a file of constraints beside the URDF file.
 """
 
 from pathlib import Path
@@ -30,11 +30,11 @@ KINDS: dict[Reader, type[OwnFile]] = {
     read_toml: OwnToml,
     read_urdf: OwnUrdf,
 }
-"""Files by what reads them."""
+"""Kinds of files by the function that reads them."""
 
 
 def own_file(robot: Path) -> OwnFile | None:
-    """What `--robot` names, if it is a robot's file; raises LinkwiseError where that cannot be read."""
+    """Return the robot's file that `--robot` names, or None; raise LinkwiseError where it cannot be read."""
     if not robot.is_file():
         return None
     with within(str(robot)):
@@ -45,7 +45,7 @@ def own_file(robot: Path) -> OwnFile | None:
 def identified_robot(
     found: Identification, manifest: Manifest, own: OwnFile | None
 ) -> tuple[dict[str, bytes], tuple[str, ...]]:
-    """Its files by name, and what they do not say, in words; `own` is what the package was made of."""
+    """Return the robot's files by name, and what they do not say, in words; `own` is the package's source."""
     assert manifest.tree is not None
     pi = dict(zip(found.robot.links, found.physical.pi, strict=True))
     lost = []

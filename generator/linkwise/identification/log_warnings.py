@@ -1,7 +1,7 @@
-"""What looks wrong in a log once it is fitted, each in a line that says what to do.
+"""Warnings about a log after the fit, each in one line that says what to do.
 
-The cause comes before what follows from it: noise of positions makes a motion look poor and bodies not fit,
-a wrong sign makes bodies not fit.
+Causes come before their effects: noise of positions makes a motion look poor and bodies not fit, a wrong sign
+makes bodies not fit.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,19 +19,19 @@ from linkwise.identification.torque_log import TorqueLog
 from linkwise.package.load import Array
 
 LARGE = 100.0
-"""Times: torques so much larger, or smaller, than the robot's own are perhaps in another unit."""
+"""Factor by which torques larger, or smaller, than the robot's own are perhaps in another unit."""
 NOISY = 0.2
-"""Of an acceleration: so much noise in it takes some 4 % of what is found of an inertia."""
+"""Share of noise in an acceleration that lowers the inertia found by some 4 %."""
 UNEXPLAINED = 0.7
-"""Of a joint's torque: half of its mean square is left."""
+"""Share of a joint's torque that, left unexplained, is half of its mean square."""
 OPPOSITE = -0.5
 """Correlation of a torque with the robot's own."""
 WORSE, SHARE = 2.0, 0.1
-"""Times the fit's error, and of the torque: so much more is not what bodies that can exist cost."""
+"""Multiple of the fit's error, and share of the torque: feasible bodies alone do not cost larger errors."""
 
 
 def noisy_positions(log: TorqueLog, joints: Sequence[str], units: Sequence[str], how: Processing) -> str:
-    """A warning where noise makes up much of an acceleration; empty where it does not."""
+    """Return a warning where noise makes up much of an acceleration; "" where it does not."""
     stop = min(log.stop, log.start + LONGEST)
     found = np.sqrt(np.mean(derivatives(log.q, log.rate, log.start, stop, how)[2] ** 2, axis=0))
     made = log.noise * noise_gain(log.rate, how)
@@ -52,12 +52,12 @@ def noisy_positions(log: TorqueLog, joints: Sequence[str], units: Sequence[str],
 
 
 def doubts(found: Identification, noisy: str) -> Iterator[str]:
-    """All warnings but the log's own; `noisy` is that of `noisy_positions`."""
+    """Yield all warnings but the log's own; `noisy` is the warning of `noisy_positions`."""
     if noisy:
         yield noisy
         return
     yield from _poor(found)
-    # The first of these makes those after it true.
+    # Each of these can cause those after it.
     for cause in (_still, _units, _opposite, _unexplained, _impossible):
         if told := tuple(cause(found)):
             yield from told
@@ -84,7 +84,7 @@ def _poor(found: Identification) -> Iterator[str]:
 
 
 def _units(found: Identification) -> Iterator[str]:
-    """Where torques are not of the size that the package expects."""
+    """Yield a warning where torques are not of the size that the package expects."""
     expected, sizes = _expected(found)[0], found.seen.sizes()
     at = int(np.argmax(sizes))
     if sizes[at] and expected[at] and not 1 / LARGE < sizes[at] / expected[at] < LARGE:
@@ -142,7 +142,7 @@ def _impossible(found: Identification) -> Iterator[str]:
 
 
 def _expected(found: Identification) -> tuple[Array, Array]:
-    """What the package expects of each joint, (n,): root mean square, and correlation with the log's."""
+    """Return the package's torque for each joint, (n,): root mean square, and correlation with the log's."""
     beta = found.base.combinations @ found.own.reshape(-1)
     count = len(beta)
     # Y beta is the error of the equations without their torque.

@@ -1,8 +1,8 @@
-"""Least squares of a long log in one pass: each joint's equations as the triangle that QR leaves of them.
+"""Least squares of a long log in one pass: each joint's equations reduced by QR to a triangle.
 
-Row s of joint i is  [Y1_i | F_i | tau_i]  with the base columns Y1 and F_i what it bears of every joint's
-friction: qd_i, sign(qd_i) in its own columns where joints are free. Of A = Q R, R alone says all that a fit
-needs: ||A x|| = ||R x||. So blocks of a log are stacked on the triangle so far and made one again.
+Row s of joint i is  [Y1_i | F_i | tau_i]  with the base columns Y1 and F_i the load on it by every joint's
+friction: qd_i, sign(qd_i) in its own columns where joints are free. Of A = Q R, a fit needs R alone:
+||A x|| = ||R x||. So blocks of a log are stacked below the present triangle and reduced again.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 NUMBERS = 1 << 23
-"""Of a block's regressors."""
+"""Numbers in the regressors of one block."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,13 @@ class JointEquations:
     rows: int
 
     def errors(self, beta: Array, friction: Array) -> Array:
-        """Root of the mean square error of each joint, (n,), for beta (base,) and friction (B, 2)."""
+        """Return the root mean square error of each joint, (n,), for beta (base,) and friction (B, 2)."""
         residuals = self.triangles @ np.concatenate([beta, friction.reshape(-1), [-1.0]])
         found: Array = np.linalg.norm(residuals, axis=1) / np.sqrt(max(self.rows, 1))
         return found
 
     def sizes(self) -> Array:
-        """Root of the mean square torque of each joint, (n,)."""
+        """Return the root mean square torque of each joint, (n,)."""
         found: Array = np.linalg.norm(self.triangles[:, :, -1], axis=1) / np.sqrt(max(self.rows, 1))
         return found
 
@@ -52,9 +52,9 @@ def joint_equations(
     processing: Processing,
     progress: Progress,
 ) -> JointEquations:
-    """Equations of samples span[0] to span[1] - 1.
+    """Return the equations of samples span[0] to span[1] - 1.
 
-    What a joint's own spring and armature take is known, and off; friction is found anew.
+    The torques of a joint's own spring and armature are known, and subtracted; friction is identified anew.
     """
     robot = bearings.robot
     n, columns, start = log.q.shape[1], base.combinations.shape[1], span[0]

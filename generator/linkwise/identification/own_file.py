@@ -1,4 +1,4 @@
-"""The user's own file of a robot, with what was identified in it and nothing else changed."""
+"""The user's own file of a robot, with the identified numbers in it and nothing else changed."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
@@ -8,26 +8,30 @@ from typing import NamedTuple, TypeAlias
 from xml.parsers.expat import ExpatError
 
 import numpy as np
+from linkwise_runtime.rule.joint_tree import TreeFrame
 
 from linkwise.errors import LinkwiseError
 from linkwise.identification.pseudo_inertia import central_of, pseudo_inertia, pseudo_inertia_of
 from linkwise.identification.shared_mass import shared_mass
-from linkwise.package.entries import FrameEntry, RigidTree
+from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array
 from linkwise.robot.description import Body, Description
 from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.parameters import numeric
 
 ROUNDING = 1e-14
-"""Of a link's second moments about where its body and it have their origins."""
+"""Part of a link's second moments, about its body's origin and its own, that counts as rounding."""
 
 
 Friction: TypeAlias = Mapping[str, Mapping[str, str]]
-"""Of joints by name: `damping` and `friction`, in N m s/rad and N m, or N s/m and N, where one is not 0."""
+"""Friction by joint: `damping` and `friction`, in N m s/rad and N m, or N s/m and N, where one is not 0."""
 
 
 class NotWrittenBack(LinkwiseError):
-    """Why numbers of a file cannot be replaced in it, and how to mend that; its name comes first."""
+    """Reason why numbers of a file cannot be replaced in it, and how to fix that.
+
+    The message begins with the file's name.
+    """
 
 
 class LinkMass(NamedTuple):
@@ -46,21 +50,21 @@ class OwnFile(ABC):
     data: bytes
     description: Description
     without_friction = ", part of a joint of several axes"
-    """Why a joint has no place for it."""
+    """Reason why a joint has no place for friction."""
 
     @abstractmethod
     def written(self, links: Mapping[str, LinkMass], friction: Friction) -> bytes:
-        """The file with these masses and this friction; what they do not name stays.
+        """Return the file with these masses and this friction; links and joints that are not named stay.
 
-        Raises NotWrittenBack where its own settings are in the way.
+        Raises NotWrittenBack where the file's own settings prevent it.
         """
 
     def has_friction(self, joint: str) -> bool:
-        """Whether a joint of this name has a place for it: one of one axis."""
+        """Return whether the file has a joint of this name with a place for friction: one of one axis."""
         return any(c.name == joint and c.type in SINGLE for c in self.description.connections)
 
     def not_utf8(self) -> NotWrittenBack:
-        """Why a file in another encoding is not written back."""
+        """Return the reason why a file in another encoding is not written back."""
         return NotWrittenBack(f"{self.path.name} is in another encoding than UTF-8; save it as UTF-8")
 
     def refuse_to_overwrite(self, out: Path) -> None:
@@ -71,10 +75,11 @@ class OwnFile(ABC):
             )
 
     def identified(self, tree: RigidTree, pi: Mapping[str, Array], friction: Mapping[str, Array]) -> bytes:
-        """The file, written back; raises NotWrittenBack.
+        """Return the file, written back; raises NotWrittenBack.
 
-        tree: of the package that was made of it; pi: inertial parameters (10,) by its moving links; friction:
-        viscous and Coulomb (2,) by joint
+        tree: the tree of the package that was made of it
+        pi: inertial parameters (10,) by its moving links
+        friction: viscous and Coulomb (2,) by joint
         """
         if b"\0" in self.data:
             raise self.not_utf8()
@@ -96,15 +101,15 @@ class OwnFile(ABC):
             raise NotWrittenBack(f"{self.path.name} is not quite XML ({error}); mend that") from None
 
     def lost(self, friction: Mapping[str, Array]) -> Iterator[str]:
-        """What the file, written back, does not say of what was identified, or asks of its user, in words."""
+        """Yield what was identified and the file written back does not say, or what its user has to do."""
         for joint, own in friction.items():
             if own.any() and not self.has_friction(joint):
                 yield f"{self.path.name} has no place for the friction of {joint}{self.without_friction}"
 
     def _shared(self, tree: RigidTree, number: int, pi: Array) -> dict[str, LinkMass]:
-        """What the file's links that are one rigid body carry each, but those that have no mass."""
+        """Return the mass of each of the file's links that are one rigid body, except links without mass."""
         links = {body.name: body for body in numeric(self.description).bodies if not body.invented}
-        frames = [frame for frame in tree.frames if frame.body == number and frame.name in links]
+        frames = [frame for frame in tree.frames if frame.joint == number and frame.name in links]
         places = [_place(frame) for frame in frames]
         own = [at @ _own(links[f.name]) @ at.T for at, f in zip(places, frames, strict=True)]
         shared = shared_mass(np.array(own), pseudo_inertia(pi))
@@ -112,21 +117,21 @@ class OwnFile(ABC):
         for at, j, frame in zip(places, shared, frames, strict=True):
             back = np.linalg.inv(at)
             moved = back @ j @ back.T
-            # A point of mass stays one: readers refuse moments that rounding leaves below 0.
+            # A point mass stays one: readers refuse moments that rounding leaves below 0.
             rounding = ROUNDING * float(np.trace(j[:3, :3]) + np.trace(moved[:3, :3]))
             if j.any():
                 found[frame.name] = LinkMass(*central_of(moved, rounding))
         return found
 
 
-def _place(frame: FrameEntry) -> Array:
-    """The frame in its body's, (4, 4)."""
+def _place(frame: TreeFrame) -> Array:
+    """Return the pose of a frame in its body's frame, (4, 4)."""
     out = np.eye(4)
     out[:3, :3], out[:3, 3] = frame.rotation, frame.translation
     return out
 
 
 def _own(body: Body) -> Array:
-    """The pseudo-inertia of a link in its frame."""
+    """Return the pseudo-inertia (4, 4) of a link in its frame."""
     com, inertia = (np.array(part, dtype=float) for part in (body.com, body.inertia))
     return pseudo_inertia_of(float(body.mass), com, inertia)

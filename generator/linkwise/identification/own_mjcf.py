@@ -15,17 +15,17 @@ from linkwise.robot.readers.mjcf import body_name, joint_name, read_mjcf
 from linkwise.robot.readers.mjcf_files import mjcf_files
 
 AXES = ("fullinertia", "quat", "axisangle", "euler", "xyaxes", "zaxis")
-"""Attributes of <inertial> for which `diaginertia` and `quat` stand."""
+"""Attributes of <inertial> that `diaginertia` and `quat` replace."""
 FRICTION = {"damping": "damping", "friction": "frictionloss"}
 NEAR = 1e-9
-"""Of a body's mass and moments: so near MuJoCo has to read what was written."""
+"""Part of a body's mass and moments, by which MuJoCo's reading of them may differ from what was written."""
 
 
 class OwnMjcf(OwnFile):
-    """New numbers in <inertial>, which a body gets whose geoms gave its mass, and in <joint>."""
+    """An MJCF file with new numbers in <inertial>, added where geoms gave a body its mass, and in <joint>."""
 
     def written(self, links: Mapping[str, LinkMass], friction: Friction) -> bytes:
-        """See OwnFile."""
+        """Return the edited file, see OwnFile."""
         xml = PlacedXml(self.data)
         edits: list[Edit] = []
         for name, body in self._bodies(xml.root).items():
@@ -40,7 +40,7 @@ class OwnMjcf(OwnFile):
         return text
 
     def lost(self, friction: Mapping[str, Array]) -> Iterator[str]:
-        """See OwnFile; meshes and what a file includes are found by paths from its folder."""
+        """Yield what OwnFile does; meshes and included files are found by paths from the file's folder."""
         yield from super().lost(friction)
         files = mjcf_files(self.path)
         if files.others or len(files.documents) > 1:
@@ -50,7 +50,10 @@ class OwnMjcf(OwnFile):
             )
 
     def _bodies(self, root: Element) -> dict[str, Element]:
-        """Elements by the names of their bodies; raises NotWrittenBack where not every body has its own."""
+        """Return elements by the names of their bodies.
+
+        Raises NotWrittenBack where not every body has an element of its own.
+        """
         found: dict[str, Element] = {}
         for body in _bodies_in(root.findall("worldbody")):
             found[body_name(body.get("name", ""), len(found) + 1)] = body
@@ -63,7 +66,7 @@ class OwnMjcf(OwnFile):
         return found
 
     def _read_again(self, text: bytes, links: Mapping[str, LinkMass], friction: Friction) -> None:
-        """Raise NotWrittenBack where MuJoCo makes something else of the file than was written."""
+        """Raise NotWrittenBack where MuJoCo reads from the file something else than was written."""
         try:
             again = read_mjcf(self.path, text)
         except LinkwiseError as error:
@@ -84,7 +87,7 @@ class OwnMjcf(OwnFile):
 
 
 def _inertial(xml: PlacedXml, body: Element, carried: LinkMass) -> list[Edit]:
-    """By principal axes, as these hold what has no extent in a direction too."""
+    """Return edits of <inertial>, by principal axes: these express bodies flat in a direction too."""
     second = 0.5 * np.trace(carried.inertia) * np.eye(3) - carried.inertia
     sizes, axes = np.linalg.eigh(second)
     x, y, z = np.maximum(sizes, 0.0)
@@ -118,7 +121,7 @@ def _is_near(body: Body, wanted: LinkMass) -> bool:
 
 
 def _inside(holder: Element, what: str) -> Iterator[Element]:
-    """Elements of a body, those in its <frame>s too, in the file's order."""
+    """Yield elements of a body, also those in its <frame>s, in the file's order."""
     for element in holder:
         if element.tag == what:
             yield element
@@ -127,7 +130,7 @@ def _inside(holder: Element, what: str) -> Iterator[Element]:
 
 
 def _bodies_in(holders: Iterable[Element]) -> Iterator[Element]:
-    """Every body, parents first, as MuJoCo counts them."""
+    """Yield every body, parents first, in MuJoCo's order."""
     for holder in holders:
         for body in _inside(holder, "body"):
             yield body

@@ -1,4 +1,4 @@
-"""An OpenSim model with other inertias; friction has no place in it."""
+"""An OpenSim model with other inertias; the format has no place for friction."""
 
 from collections.abc import Iterator, Mapping
 from xml.etree.ElementTree import Element
@@ -11,12 +11,12 @@ from linkwise.robot.readers.osim_elements import name_of
 
 
 class OwnOsim(OwnFile):
-    """New numbers in <mass>, <mass_center> and <inertia>."""
+    """An OpenSim model with new numbers in <mass>, <mass_center> and <inertia>."""
 
     without_friction = ", as no joint of OpenSim has any"
 
     def written(self, links: Mapping[str, LinkMass], friction: Friction) -> bytes:
-        """See OwnFile."""
+        """Return the edited file, see OwnFile."""
         mended = as_xml(self.data)
         if len(mended) != len(self.data):
             raise self.not_utf8()
@@ -28,7 +28,7 @@ class OwnOsim(OwnFile):
         return xml.edited(edits)
 
     def has_friction(self, joint: str) -> bool:
-        """None has."""
+        """Return False: no joint has a place for friction."""
         return False
 
 

@@ -12,10 +12,10 @@ from linkwise.robot.readers.sdf_poses import pose_in
 
 
 class OwnSdf(OwnFile):
-    """New numbers in <inertial>, whose axes stay, and in <dynamics>."""
+    """An SDFormat file with new numbers in <inertial>, whose axes stay, and in <dynamics>."""
 
     def written(self, links: Mapping[str, LinkMass], friction: Friction) -> bytes:
-        """See OwnFile."""
+        """Return the edited file, see OwnFile."""
         xml = PlacedXml(self.data)
         edits: list[Edit] = []
         for link in xml.root.iter("link"):
@@ -39,7 +39,7 @@ def _inertial(xml: PlacedXml, inertial: Element, carried: LinkMass) -> Iterator[
     yield from _numbers(xml, inertial, {"mass": repr(carried.mass)})
     inertia = inertial.find("inertia")
     assert inertia is not None
-    # What is not there is 0.
+    # A moment that is missing is 0.
     there = {key: text for key, text in values.items() if float(text) or inertia.find(key) is not None}
     yield from _numbers(xml, inertia, there)
 
@@ -56,7 +56,7 @@ def _dynamics(xml: PlacedXml, joint: Element, rubs: Mapping[str, str]) -> Iterat
 
 
 def _numbers(xml: PlacedXml, parent: Element, values: Mapping[str, str]) -> Iterator[Edit]:
-    """The texts of an element's own elements, of which some may not be there."""
+    """Yield edits of the texts of an element's own elements; missing elements are added."""
     there = {key: parent.find(key) for key in values}
     for key, element in there.items():
         if element is not None:

@@ -1,4 +1,4 @@
-"""A robot in TOML with other inertias and friction: numbers, where there were formulas too."""
+"""A robot in TOML with other inertias and friction: numbers, also in place of formulas."""
 
 import re
 import tomllib
@@ -19,10 +19,10 @@ BOM = b"\xef\xbb\xbf"
 
 
 class OwnToml(OwnFile):
-    """New numbers in mass, com and inertia of [[link]], damping and friction of [[joint]]."""
+    """A TOML file with new mass, com and inertia of [[link]], and damping and friction of [[joint]]."""
 
     def written(self, links: Mapping[str, LinkMass], friction: Friction) -> bytes:
-        """See OwnFile."""
+        """Return the edited file, see OwnFile."""
         written = b"".join(
             self._part(part, links, friction) for part in _parts(self.data.removeprefix(BOM).decode())
         )
@@ -46,7 +46,7 @@ class OwnToml(OwnFile):
         return str(document.as_string()).encode()
 
     def lost(self, friction: Mapping[str, Array]) -> Iterator[str]:
-        """See OwnFile."""
+        """Yield what OwnFile does, and formulas that numbers have replaced."""
         yield from super().lost(friction)
         formulas = [
             link["name"]
@@ -61,9 +61,10 @@ class OwnToml(OwnFile):
 
 
 def _parts(text: str) -> Iterator[str]:
-    """The file, cut before each [[...]]: as a whole, tomlkit would put all tables of one name together.
+    """Yield the parts of the file, cut before each [[...]].
 
-    A line that begins so inside of a value is none: what stands before it is no TOML by itself.
+    In a whole file tomlkit would put all tables of one name together. A line inside a value that begins so
+    is no cut: the text before it is no TOML by itself.
     """
     part = ""
     for piece in TABLE.split(text):

@@ -13,14 +13,14 @@ from linkwise.robot.readers.xml_file import numbers
 from linkwise.robot.transforms import from_rpy
 
 KEYS = tuple(f"i{'xyz'[a]}{'xyz'[b]}" for a, b in MOMENTS)
-"""Of an inertia's numbers, in the order of MOMENTS, in SDFormat as well."""
+"""Keys of an inertia's numbers, in the order of MOMENTS, in SDFormat as well."""
 
 
 class OwnUrdf(OwnFile):
-    """New numbers in <inertial>, whose axes stay, and in <dynamics>."""
+    """A URDF file with new numbers in <inertial>, whose axes stay, and in <dynamics>."""
 
     def written(self, links: Mapping[str, LinkMass], friction: Friction) -> bytes:
-        """See OwnFile."""
+        """Return the edited file, see OwnFile."""
         xml = PlacedXml(self.data)
         edits: list[Edit] = []
         for link in xml.root.findall("link"):
@@ -34,7 +34,7 @@ class OwnUrdf(OwnFile):
 
 
 def moments(carried: LinkMass, turn: Array) -> dict[str, str]:
-    """Moments by their keys, in axes that `turn` (3, 3) brings to the link's."""
+    """Return the moments by key, in axes that `turn` (3, 3) rotates to the link's."""
     inertia = turn.T @ carried.inertia @ turn
     return {key: repr(float(inertia[at])) for key, at in zip(KEYS, MOMENTS, strict=True)}
 
@@ -55,7 +55,7 @@ def _inertial(xml: PlacedXml, inertial: Element, carried: LinkMass) -> Iterator[
 
 
 def _dynamics(xml: PlacedXml, joint: Element, rubs: Mapping[str, str]) -> list[Edit]:
-    """Of several <dynamics> the last counts."""
+    """Return edits of a joint's friction; of several <dynamics>, the last one counts."""
     there = joint.findall("dynamics")
     if there:
         return xml.with_attributes(there[-1], rubs)

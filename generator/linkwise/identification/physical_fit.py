@@ -1,12 +1,13 @@
-"""The parameters of every link, such as bodies can have, that fit the log: a semidefinite program.
+"""Parameters of every link that fit the log and that a physical body can have: a semidefinite program.
 
     minimise   || W (B pi, f) - tau ||^2  +  || (pi - pi0) / size ||^2
     over       J(pi_j) >= a speck, f >= 0
 
 W and tau are the weighted equations of `fit`, B the base parameters' combinations, J the pseudo-inertia, f
-the friction. The second term settles what torques do not show: there the links keep the robot's own
-parameters pi0, each known, as it were, to within its own size; where the log says anything it outweighs that
-by far. Solved by Clarabel (P. Goulart, Y. Chen, arXiv:2405.12762), an interior-point method.
+the friction. The second term determines what torques do not show: there the links keep the robot's own
+parameters pi0, as if each were known to within its own size; where the log has any information, that
+outweighs the second term by far. Solved by Clarabel (P. Goulart, Y. Chen, arXiv:2405.12762), an
+interior-point method.
 """
 
 from dataclasses import dataclass
@@ -22,25 +23,24 @@ from linkwise.identification.pseudo_inertia import pseudo_inertia
 from linkwise.package.load import Array
 
 SPECK = 1e-6
-"""Of a link's size: how far inside of what can exist a body stays, so that rounding keeps it there."""
+"""Part of a link's size by which a body stays inside the feasible set, so that rounding keeps it there."""
 SMALLEST = 0.05
-"""Of the largest mass, or length: the least size that a link's parameters are taken to have."""
+"""Least size of a link's parameters, as a part of the largest mass, or length."""
 SLIGHT = 0.01
-"""Of its standard error: less friction is what the solver leaves of none."""
+"""Part of its standard error, below which friction is what the solver leaves of zero."""
 SOLVED = ("Solved", "AlmostSolved")
 
 
 @dataclass(frozen=True, eq=False)
 class PhysicalFit:
-    """Parameters of links (N, 10), each of a body that can exist, and friction (B, 2) as in `Fit`, nowhere
-    below 0."""
+    """Parameters of links (N, 10), of bodies that can exist, and friction (B, 2) as in `Fit`, at least 0."""
 
     pi: Array
     friction: Array
 
 
 def physical_fit(fit: Fit, base: BaseParameters, own: Array, rubs: NDArray[np.bool_]) -> PhysicalFit:
-    """Fit bodies near the robot's `own` parameters (N, 10), and friction where a joint rubs, (B,).
+    """Return bodies near the robot's `own` parameters (N, 10), and friction where a joint rubs, (B,).
 
     Raises LinkwiseError where the solver fails.
     """
@@ -64,10 +64,10 @@ def physical_fit(fit: Fit, base: BaseParameters, own: Array, rubs: NDArray[np.bo
 
 
 def _within_cones(left: Array, right: Array, sizes: Array, frictions: int) -> Array:
-    """x that is least ||left x - right|| where the links' pseudo-inertias and the frictions allow it.
+    """Return the x of least ||left x - right|| that the links' pseudo-inertias and the frictions allow.
 
-    With left = Q R and y = R x - Q^T right, the way from where it is least anyhow, it is 1/2 y^T y but for a
-    constant: as round as can be.
+    With left = Q R and y = R x - Q^T right, the distance from the unconstrained minimum, the objective is
+    1/2 y^T y but for a constant: perfectly conditioned.
     """
     clarabel, sparse = extra("clarabel"), extra("scipy.sparse")
     q, r = np.linalg.qr(left)
@@ -108,7 +108,7 @@ def _within_cones(left: Array, right: Array, sizes: Array, frictions: int) -> Ar
 
 
 def _triangle(matrix: Array) -> Array:
-    """Upper triangle, column by column, what is off the diagonal times the root of 2: the cone's order."""
+    """Return the upper triangle by columns, off-diagonal entries times the root of 2: the cone's order."""
     entries: list[float] = [
         matrix[a, b] * (1.0 if a == b else np.sqrt(2.0)) for b in range(4) for a in range(b + 1)
     ]
@@ -116,7 +116,7 @@ def _triangle(matrix: Array) -> Array:
 
 
 def _sizes(own: Array) -> Array:
-    """How large each parameter of a link is by its mass and its reach, (N, 10): m, m l, m l^2."""
+    """Return the size of each link's parameters, (N, 10): m, m l, m l^2 of its mass m and its reach l."""
     masses, moments = own[:, 0], np.trace(pseudo_inertia(own)[:, :3, :3], axis1=-2, axis2=-1)
     mass = np.maximum(masses, SMALLEST * (masses.max() or 1.0))
     reach = np.sqrt(np.maximum(moments, 0.0) / mass)
@@ -126,7 +126,7 @@ def _sizes(own: Array) -> Array:
 
 
 def _friction_sizes(fit: Fit, rubs: NDArray[np.bool_]) -> Array:
-    """One unit for each friction: what it was found to be, or its standard error."""
+    """Return a unit for each friction: the larger of its value and its standard error; 1 where both are 0."""
     found = np.maximum(np.abs(fit.friction), fit.friction_errors)[rubs].reshape(-1)
     sizes: Array = np.where(found > 0, found, 1.0)
     return sizes

@@ -14,7 +14,7 @@ TAG_END = re.compile(rb"\s*(/?)>")
 
 
 class Edit(NamedTuple):
-    """What stands in the place of the bytes from `start` to `stop`."""
+    """New text for the bytes from `start` to `stop`."""
 
     start: int
     stop: int
@@ -22,9 +22,10 @@ class Edit(NamedTuple):
 
 
 class ElementBytes(NamedTuple):
-    """Bytes of an element: its tag begins and ends, what is in it ends, and it ends.
+    """Places in an element's bytes: where its tag begins, its tag ends, its content ends, and it ends.
 
-    Of one that is closed at once, as <a/>, the tag ends behind its attributes, and so does what is in it.
+    For an element that is closed at once, such as <a/>, the tag ends behind its attributes, and its content
+    ends there too.
     """
 
     start: int
@@ -34,17 +35,21 @@ class ElementBytes(NamedTuple):
 
 
 class PlacedXml:
-    """A file that has been read as XML already, its `root`, and where its elements stand."""
+    """A file that has already been read as XML, its `root`, and the places of its elements."""
 
     def __init__(self, data: bytes, as_xml: bytes | None = None) -> None:
-        """as_xml: the same byte for byte at its place, where a reader takes what is not quite XML."""
+        """Read the elements of `data` and their places.
+
+        as_xml: valid XML, byte for byte in the same places, where a reader accepts data that are not quite
+        XML
+        """
         self.data = data if as_xml is None else as_xml
         reader = _Reader(self.data)
         self.root, self._places = reader.root, reader.places
         self._own = data
 
     def with_attributes(self, element: Element, values: Mapping[str, str | None]) -> list[Edit]:
-        """Give an element these attributes, in their places or behind the others; None takes one away."""
+        """Give an element these attributes, in their places or behind the others; None removes one."""
         at = _behind(NAME, self.data, self._places[element].start)
         edits, left = [], dict(values)
         while found := ATTRIBUTE.match(self.data, at):
@@ -57,14 +62,14 @@ class PlacedXml:
         return [*edits, Edit(at, at, more.encode())] if more else edits
 
     def with_text(self, element: Element, text: str) -> Edit:
-        """Give an element that has no others in it this text; blanks and comments around it stay."""
+        """Give an element without child elements this text; blanks and comments around it stay."""
         place = self._places[element]
         if place.inside == place.inside_stop:
             return self.with_children(element, [], text)
         inside = self.data[place.inside : place.inside_stop]
         bare = COMMENT.sub(lambda comment: b" " * len(comment[0]), inside)
         start, stop = len(bare) - len(bare.lstrip()), len(bare.rstrip())
-        comments = b" ".join(COMMENT.findall(inside, start, stop))  # of those amid the text
+        comments = b" ".join(COMMENT.findall(inside, start, stop))  # comments amid the text
         return Edit(
             place.inside + start,
             place.inside + max(start, stop),
@@ -72,7 +77,7 @@ class PlacedXml:
         )
 
     def with_children(self, parent: Element, tags: Iterable[str], text: str = "") -> Edit:
-        """Put elements, as they are written, behind those of a parent, as far in as these are."""
+        """Add elements, given as text, behind the children of a parent, with the same indentation."""
         place, last = self._places[parent], next(reversed(parent), None)
         if last is not None:
             own = self._places[last]
@@ -85,7 +90,7 @@ class PlacedXml:
         return Edit(place.inside, place.stop, b">" + inside + f"</{parent.tag}>".encode())
 
     def edited(self, edits: Iterable[Edit]) -> bytes:
-        """The file with edits that do not overlap."""
+        """Return the file with edits that do not overlap."""
         data = self._own
         for edit in sorted(edits, reverse=True):
             data = data[: edit.start] + edit.text + data[edit.stop :]
@@ -93,7 +98,7 @@ class PlacedXml:
 
 
 class _Reader:
-    """Builds the elements, and gathers where they stand."""
+    """Builds the elements, and collects their places."""
 
     def __init__(self, data: bytes) -> None:
         self.data, self.places = data, dict[Element, ElementBytes]()
@@ -132,5 +137,5 @@ def _behind(pattern: re.Pattern[bytes], data: bytes, start: int) -> int:
 
 
 def tag(name: str, values: Mapping[str, str]) -> str:
-    """An element as it is written, with attributes only."""
+    """Return an element as text, with attributes only."""
     return f"<{name}{''.join(f' {key}={quoteattr(value)}' for key, value in values.items())}/>"

@@ -1,6 +1,6 @@
-"""Noise of positions, and what differentiating makes of it.
+"""Noise of positions, and the noise of accelerations that comes from it.
 
-Positions move so little between samples that their sixth differences are noise alone: independent noise of
+Positions change so little between samples that their sixth differences are noise alone: independent noise of
 standard deviation sigma makes differences of sigma sqrt(924), 924 being the sum of the squares of their
 weights.
 A second derivative multiplies noise by the square of the sampling rate: 1e-4 rad at 200 Hz are 12 rad/s^2.
@@ -17,13 +17,13 @@ from linkwise.package.load import Array
 
 ORDER = 6
 LONGEST = 1 << 16
-"""Samples that noise is told from."""
+"""Largest number of samples from which noise is estimated."""
 TRIED = 1 << 13
-"""Samples of made-up noise."""
+"""Number of samples of simulated noise."""
 
 
 def position_noise(q: Array) -> Array:
-    """Standard deviation of the noise of evenly spaced positions (S, n), (n,)."""
+    """Return the standard deviation of the noise of evenly spaced positions (S, n), shape (n,)."""
     differences = np.diff(q[:LONGEST], n=ORDER, axis=0)
     if not len(differences):
         return np.zeros(q.shape[1])
@@ -32,7 +32,7 @@ def position_noise(q: Array) -> Array:
 
 
 def noise_gain(rate: float, processing: Processing) -> float:
-    """rad/s^2 (r.m.s.) of acceleration for each rad of noise, by differentiating made-up noise likewise."""
+    """Return rad/s^2 (r.m.s.) of acceleration for each rad of noise, by differentiating simulated noise."""
     noise = np.random.default_rng(0).standard_normal((TRIED, 1))
     if processing.lowpass is not None:
         lowpass(noise, rate, processing.lowpass)

@@ -1,4 +1,4 @@
-"""Inertial parameters as pseudo-inertia, by which a body that can exist is known.
+"""Inertial parameters as pseudo-inertia, which shows whether a body can exist.
 
     P. Wensing, S. Kim, J.-J. Slotine, IEEE Robotics and Automation Letters 3(1), 2018
 
@@ -15,11 +15,11 @@ import numpy as np
 from linkwise.package.load import Array
 
 MOMENTS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-"""Where the last six stand in the inertia."""
+"""Places of the last six parameters in the inertia."""
 
 
 def pseudo_inertia(pi: Array) -> Array:
-    """J of parameters (..., 10), (..., 4, 4)."""
+    """Return J (..., 4, 4) of parameters (..., 10)."""
     inertia = np.zeros((*pi.shape[:-1], 3, 3))
     for at, (a, b) in enumerate(MOMENTS, 4):
         inertia[..., a, b] = inertia[..., b, a] = pi[..., at]
@@ -32,7 +32,7 @@ def pseudo_inertia(pi: Array) -> Array:
 
 
 def pseudo_inertia_of(mass: float, com: Array, inertia: Array) -> Array:
-    """J (4, 4) of a mass, its centre (3,) and its inertia about that (3, 3)."""
+    """Return J (4, 4) of a mass, its centre (3,) and its inertia about that (3, 3)."""
     j = np.zeros((4, 4))
     j[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia + mass * np.outer(com, com)
     j[:3, 3] = j[3, :3] = mass * com
@@ -41,12 +41,14 @@ def pseudo_inertia_of(mass: float, com: Array, inertia: Array) -> Array:
 
 
 def central(pi: Array) -> tuple[float, Array, Array]:
-    """Mass, centre of mass (3,) and inertia about it (3, 3) of parameters (10,); a mass above 0."""
+    """Return mass, centre of mass (3,) and inertia about it (3, 3) of parameters (10,) with mass above 0."""
     return central_of(pseudo_inertia(pi))
 
 
 def central_of(j: Array, rounding: float = 0.0) -> tuple[float, Array, Array]:
-    """The same of J (4, 4); what has inertia and no mass is at the origin.
+    """Return mass, centre of mass (3,) and inertia about it (3, 3) of J (4, 4).
+
+    The centre of a body that has inertia and no mass is the origin.
 
     rounding: below such a sum of second moments about the centre, kg m², a body is a point
     """

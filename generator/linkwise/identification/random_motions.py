@@ -1,7 +1,7 @@
-"""Random motions of a robot, by which base parameters are told.
+"""Random motions of a robot, from which base parameters are found.
 
-Joints that are tied cannot be anywhere: from positions of a log they walk at random, by steps along which
-loops stay closed in the way in which they do there.
+Joints that are tied cannot have any positions: they walk at random from positions of a log, by steps along
+which loops stay closed in the same way.
 """
 
 import numpy as np
@@ -12,27 +12,27 @@ from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.package.load import Array
 
 SPEED = 3.0
-"""rad/s and rad/s^2, m/s and m/s^2."""
+"""Largest random velocity and acceleration in rad/s and rad/s^2, m/s and m/s^2."""
 STEPS = 24
-"""Of a walk."""
+"""Number of steps of a walk."""
 LONGEST = 0.5
-"""Of a step in rad and m; the shortest are a tenth of it."""
+"""Longest step in rad and m; the shortest are a tenth of it."""
 STRAIGHT = 0.5
-"""Of a step: what is more than this beside it may have come to another way to close."""
+"""Part of a step: if closing the ties moves joints by more, they may close in another way."""
 ROUNDS = 12
-"""Of Newton's method in a step."""
+"""Number of iterations of Newton's method in a step."""
 CLOSED = 1e-9
-"""m, rad or a coupling's unit."""
+"""Violation in m, rad or a coupling's unit, up to which ties count as closed."""
 RANK = 1e-5
 """Singular values below this part of the largest are zero: numbers of files are rounded."""
 LEVER = 10.0
-"""Times what joints that follow turn faster than where the walk began: next to a dead centre."""
+"""Factor by which followers may turn faster than where the walk began: more is close to a dead centre."""
 
 Motion = tuple[Array, Array, Array]
 
 
 def random_motion(model: Dynamics, samples: int) -> Motion:
-    """q, qd and qdd (samples, n) of joints that are free."""
+    """Return q, qd and qdd (samples, n) of joints that are free."""
     generator, n = np.random.default_rng(0), len(model.joint_names)
     q = generator.uniform(-np.pi, np.pi, (samples, n))
     qd, qdd = generator.uniform(-SPEED, SPEED, (2, samples, n))
@@ -40,7 +40,10 @@ def random_motion(model: Dynamics, samples: int) -> Motion:
 
 
 def random_closed_motion(model: ConstrainedModel, closed: Array, samples: int) -> Motion:
-    """The same of joints that are tied; closed: positions (S, n) in which ties close."""
+    """Return q, qd and qdd (samples, n) of joints that are tied.
+
+    closed: positions (S, n) in which ties close
+    """
     generator, own = np.random.default_rng(0), list(model.following.independent)
     q = closed[generator.integers(len(closed), size=samples)]
     tolerance = CLOSED + 2.0 * np.abs(_violation(model, q)).max(initial=0.0)
@@ -59,7 +62,7 @@ def random_closed_motion(model: ConstrainedModel, closed: Array, samples: int) -
 
 
 def _along(model: ConstrainedModel, q: Array, step: Array) -> Array:
-    """What ties let of a step."""
+    """Return the part of a step that the ties allow."""
     rows = _rows(model, q)
     against = np.linalg.pinv(rows, rcond=RANK) @ (rows @ step[..., None])
     left: Array = step - against[..., 0]
@@ -67,7 +70,7 @@ def _along(model: ConstrainedModel, q: Array, step: Array) -> Array:
 
 
 def _closed(model: ConstrainedModel, q: Array) -> Array:
-    """Positions nearby in which ties close, as far as least steps lead there."""
+    """Return positions nearby in which ties close, as far as least steps lead there."""
     for _ in range(ROUNDS):
         open_by = _violation(model, q)[..., None]
         step = (np.linalg.pinv(_rows(model, q), rcond=RANK) @ open_by)[..., 0]
@@ -77,7 +80,7 @@ def _closed(model: ConstrainedModel, q: Array) -> Array:
 
 
 def _levers(model: ConstrainedModel, q: Array) -> Array:
-    """How much faster than the independent joints others move at most, (S,)."""
+    """Return the largest speed of a follower for a unit speed of an independent joint, (S,), at least 1."""
     own, rows = list(model.following.independent), _rows(model, q)
     rest = [k for k in range(q.shape[1]) if k not in own]
     found: Array = np.abs(np.linalg.pinv(rows[..., rest], rcond=RANK) @ rows[..., own]).max(
@@ -87,10 +90,10 @@ def _levers(model: ConstrainedModel, q: Array) -> Array:
 
 
 def _rows(model: ConstrainedModel, q: Array) -> Array:
-    """A, (S, C, n)."""
+    """Return the constraints' Jacobian A, (S, C, n)."""
     return np.asarray(model.constraints.jacobian(q))
 
 
 def _violation(model: ConstrainedModel, q: Array) -> Array:
-    """phi, (S, C)."""
+    """Return the constraints' violation phi, (S, C)."""
     return np.asarray(model.constraints.violation(q))

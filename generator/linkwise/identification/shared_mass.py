@@ -1,7 +1,7 @@
-"""What several links that are one rigid body carry each, where only the body as a whole is known.
+"""The share of each of several links that are one rigid body, where only the whole body is known.
 
-Every link is stretched, shifted and made heavier alike. With the mass m and centre c of what the links make
-together, its second moments S about c for each kilogram, and m', c', S' of what they are to make,
+Every link is stretched, shifted and made heavier alike. With the mass m and centre c of the links together,
+its second moments S about c for each kilogram, and the wanted m', c', S',
 
     x -> M (x - c) + c',    M = S^-1/2 (S^1/2 S' S^1/2)^1/2 S^-1/2,    m'/m times as heavy
 
@@ -15,24 +15,24 @@ import numpy as np
 from linkwise.package.load import Array
 
 FLAT = 1e-9
-"""Of the largest moment: what a body without extent in a direction is taken to have there."""
+"""Second moment, as a part of the largest, of a body in a direction without extent."""
 
 
 def shared_mass(own: Array, wanted: Array) -> Array:
-    """Pseudo-inertias (k, 4, 4) that sum to `wanted` (4, 4), of links that had `own` (k, 4, 4)."""
+    """Return pseudo-inertias (k, 4, 4) that sum to `wanted` (4, 4), of links that had `own` (k, 4, 4)."""
     links = _that_can_exist(own)
     whole = links.sum(0)
     shared = np.zeros_like(links)
     if whole[3, 3] > 0.0:
         stretch = _least_map(whole, wanted)
         shared = _that_can_exist(stretch @ links @ stretch.T)
-    # What flat bodies leave, and rounding.
+    # The remainder of flat bodies and of rounding.
     shared[int(own[:, 3, 3].argmax())] += wanted - shared.sum(0)
     return shared
 
 
 def _least_map(whole: Array, wanted: Array) -> Array:
-    """A with A J Aᵀ = J', (4, 4)."""
+    """Return A with A J Aᵀ = J', (4, 4)."""
     (centre, second), (centre_wanted, second_wanted) = map(_about_centre, (whole, wanted))
     second = second + FLAT * max(np.trace(second), np.trace(second_wanted)) * np.eye(3)
     root = _root(second)
@@ -45,13 +45,13 @@ def _least_map(whole: Array, wanted: Array) -> Array:
 
 
 def _about_centre(j: Array) -> tuple[Array, Array]:
-    """Centre of mass, and second moments about it of each kilogram."""
+    """Return the centre of mass, and the second moments about it for each kilogram."""
     centre = j[:3, 3] / j[3, 3]
     return centre, j[:3, :3] / j[3, 3] - np.outer(centre, centre)
 
 
 def _that_can_exist(own: Array) -> Array:
-    """The links, without second moments below zero, to which flat bodies are rounded."""
+    """Return the links, without second moments below zero, which rounding gives flat bodies."""
     links = own.copy()
     for j in links:
         mass = j[3, 3]

@@ -1,4 +1,4 @@
-"""A log of motion and torques: which columns are the torques, and all of it in SI units."""
+"""A log of motion and torques in SI units, with its torque columns found."""
 
 import math
 from collections.abc import Sequence
@@ -23,13 +23,13 @@ from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 SPELLINGS = ("tau/{}", "tau_{}", "{}_moment", "{}_force", "{}_torque", "{}/effort", "{}_effort")
-"""How logs name the torque of a joint: `analyze`, scripts, OpenSim's inverse dynamics, ROS."""
+"""Names of a joint's torque in logs: of `analyze`, scripts, OpenSim's inverse dynamics, ROS."""
 PERIODS = 1.5
-"""Of the cutoff, for each order: the filter's response to what is beyond an end has died down by then."""
+"""Periods of the cutoff, for each order, in which the filter's response to the log's ends dies down."""
 ENDLESS = 1e100
-"""N m, N, rad or m: no number of a robot, and its square still is a number."""
+"""Value in N m, N, rad or m that no robot reaches; its square is still a finite number."""
 STILL = 0.01
-"""rad or m: within less, a joint's motion shows nothing but noise."""
+"""Range of motion in rad or m, below which a joint shows nothing but noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,16 +42,16 @@ class TorqueLog:
     noise: Array
     """Standard deviation of the positions' noise, unfiltered, (n,)."""
     measured: tuple[int, ...]
-    """Joints, counted from 0 and ascending, whose torques there are."""
+    """Joints, counted from 0 and ascending, whose torques are measured."""
     torque: Array
-    """(S, measured)."""
+    """Torques of the measured joints, (S, measured)."""
     start: int
     stop: int
-    """First sample to use, and the one after the last: derivatives may need those beyond."""
+    """First sample to use, `start`, and the one after the last: derivatives may need those beyond."""
     warnings: tuple[str, ...]
     ignored: tuple[str, ...]
     closed: ClosedLog | None = None
-    """How far positions of the log were off, where joints are tied; those of `q` close."""
+    """Distance of the log's positions from closed ties, where joints are tied; in `q` the ties close."""
 
 
 def read_torque_log(
@@ -64,7 +64,7 @@ def read_torque_log(
     factor: float,
     progress: Progress,
 ) -> TorqueLog:
-    """Read a log; `torques` are (column, joint) pairs, and `factor` brings these columns to N m (N).
+    """Return a log; `torques` are (column, joint) pairs, and `factor` brings these columns to N m (N).
 
     Raises LinkwiseError for a joint without a torque that is not `unmeasured`, and for one with a torque that
     stands still.
@@ -105,14 +105,17 @@ def read_torque_log(
 
 
 def followers(robot: LoadedRobot) -> tuple[str, ...]:
-    """Joints that follow others, which have no torque; none where joints are free."""
+    """Return the joints that follow others, and have no torque; () where joints are free."""
     return () if robot.constrained is None else tuple(robot.constrained.constraints.dependent)
 
 
 def _positions(
     samples: Samples, moving: Sequence[int], robot: LoadedRobot, reading: Reading, progress: Progress
 ) -> tuple[Array, ClosedLog | None]:
-    """Positions of all joints, of those of `moving`; ties close in them, where joints are tied."""
+    """Return positions of all joints, from those of `moving`.
+
+    Tied joints get positions in which ties close.
+    """
     if robot.constrained is None:
         return samples.q.copy(), None
     told = reading.loop_tolerance
@@ -123,7 +126,7 @@ def _positions(
 def _measured(
     robot: LoadedRobot, torques: Sequence[tuple[str, str]], unmeasured: Sequence[str]
 ) -> tuple[int, ...]:
-    """Joints that must have a torque, from 0; LinkwiseError where what is asked for cannot be."""
+    """Return the joints that must have a torque, from 0; raise LinkwiseError for impossible choices."""
     joints = robot.driven_joints
     for joint in (*unmeasured, *(joint for _, joint in torques)):
         if joint in followers(robot):
@@ -149,7 +152,10 @@ def _measured(
 
 
 def _settled(start: int, stop: int, rate: float, filtered: Lowpass) -> tuple[int, int]:
-    """Samples that the filter does not reach from beyond the log's ends; LinkwiseError if none are left."""
+    """Return the range of samples that the filter does not affect from the log's ends.
+
+    Raises LinkwiseError where none are left.
+    """
     margin = round(PERIODS * filtered.order * rate / filtered.cutoff)
     if stop - start <= 2 * margin:
         raise LinkwiseError(
@@ -162,7 +168,7 @@ def _settled(start: int, stop: int, rate: float, filtered: Lowpass) -> tuple[int
 def _torque_columns(
     columns: Sequence[str], joints: Sequence[str], measured: Sequence[str], torques: Sequence[tuple[str, str]]
 ) -> list[str]:
-    """Name of the torque column of each joint that is measured, in order."""
+    """Return the name of the torque column of each measured joint, in order."""
     given: dict[str, str] = {}
     for column, joint in torques:
         if given.setdefault(joint, column) != column:
@@ -197,7 +203,7 @@ def _torque_columns(
 def _refuse_more_torques(
     columns: Sequence[str], robot: LoadedRobot, used: Sequence[str], measured: Sequence[int]
 ) -> None:
-    """LinkwiseError for a torque's column left over: its joint has another, is unmeasured or follows."""
+    """Raise LinkwiseError for an unused torque column: its joint has another, is unmeasured or follows."""
     for i, joint in enumerate(robot.joints):
         for column in (spelling.format(joint) for spelling in SPELLINGS):
             if column not in columns or column in (*used, *robot.joints):

@@ -1,4 +1,4 @@
-"""A package's robot as a URDF file, for which `generate` makes the same torques.
+"""A package's robot as a URDF file, from which `generate` makes the same torques.
 
 Links and joints have their own names and the frames of the package: z on the joint's axis. Joints have the
 limits of the robot's file, and its other named frames are links without mass.
@@ -10,20 +10,21 @@ from dataclasses import asdict
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from linkwise_runtime.rule.joint_tree import TreeFrame
 
 from linkwise.escape import printable
 from linkwise.identification.pseudo_inertia import central
-from linkwise.package.entries import BodyEntry, FrameEntry, JointEntry, PassiveEntry, RigidTree
+from linkwise.package.entries import BodyEntry, JointEntry, PassiveEntry, RigidTree
 from linkwise.package.load import Array
 
 ENDLESS = 1e9
-"""What URDF has to have for a limit, where there is none."""
+"""Limit that is written where there is none, as URDF requires one."""
 STANDARD = 9.81
-"""m/s^2 along -z: a URDF file says nothing of gravity, and this is what it is read with."""
+"""Gravity in m/s^2 along -z with which a URDF file, which says nothing of gravity, is read."""
 
 
 def lost_gravity(tree: RigidTree) -> str:
-    """What is lost where gravity is stronger or weaker than a URDF file is read with; else nothing."""
+    """Return what is lost where gravity is stronger or weaker than a URDF file is read with; else ""."""
     size = float(np.linalg.norm(tree.gravity))
     if math.isclose(size, STANDARD, rel_tol=1e-9):
         return ""
@@ -41,9 +42,10 @@ def urdf_text(
     pi: Mapping[str, Array],
     friction: Mapping[str, Array],
 ) -> str:
-    """The file; pi: inertial parameters (10,) by link, friction: viscous and Coulomb (2,) by joint.
+    """Return the file.
 
-    Joints that have none there keep the package's own.
+    pi: inertial parameters (10,) by link
+    friction: viscous and Coulomb (2,) by joint; joints that are not in it keep the package's own
     """
     root, turn = root_link(tree), _upright(tree)
     lines = [
@@ -78,27 +80,30 @@ def urdf_text(
 
 
 def root_link(tree: RigidTree) -> str:
-    """The file's link on the ground, in the axes of the package's base: as the robot's file calls it."""
+    """Return the name of the file's link on the ground, in the axes of the package's base.
+
+    It is the name in the robot's file, where that has one.
+    """
     upright = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     for frame in tree.frames:
-        if frame.body is None and frame.rotation == upright and not any(frame.translation):
+        if frame.joint is None and frame.rotation == upright and not any(frame.translation):
             return frame.name
     return _unused("base", _links(tree))
 
 
 def _links(tree: RigidTree) -> list[str]:
-    """Names that links of the file have."""
+    """Return the names of the file's links."""
     return [*(body.link for body in tree.bodies), *(frame.name for frame in tree.frames)]
 
 
-def _frames(tree: RigidTree) -> list[FrameEntry]:
-    """Those of the robot's file that no link here is called."""
+def _frames(tree: RigidTree) -> list[TreeFrame]:
+    """Return the frames of the robot's file whose names no link here has."""
     taken = [root_link(tree), *(body.link for body in tree.bodies)]
     return [frame for frame in tree.frames if frame.name not in taken]
 
 
-def _frame(frame: FrameEntry, tree: RigidTree) -> list[str]:
-    parent = root_link(tree) if frame.body is None else tree.bodies[frame.body].link
+def _frame(frame: TreeFrame, tree: RigidTree) -> list[str]:
+    parent = root_link(tree) if frame.joint is None else tree.bodies[frame.joint].link
     joint = _unused(f"{frame.name}_fixed", [body.joint for body in tree.bodies])
     turn = np.array(frame.rotation)
     return [
@@ -108,7 +113,7 @@ def _frame(frame: FrameEntry, tree: RigidTree) -> list[str]:
 
 
 def _limits(body: BodyEntry, joint: JointEntry) -> tuple[str, list[str]]:
-    """The type of a body's joint, and its limits; of one that follows another nothing is known."""
+    """Return the type of a body's joint, and its limits; those of a joint that follows are not known."""
     given = asdict(joint) if joint.name == body.joint else {}
     ends = [given.get(end) for end in ("lower", "upper")]
     kind = "prismatic" if body.kind == "prismatic" else "continuous" if ends == [None, None] else "revolute"
@@ -121,7 +126,7 @@ def _limits(body: BodyEntry, joint: JointEntry) -> tuple[str, list[str]]:
 
 
 def _passive(entry: PassiveEntry) -> list[str]:
-    """Spring and armature of a joint, as extensions of simulators say them."""
+    """Return spring and armature of a joint, in extensions of URDF by simulators."""
     joint = _attribute(entry.joint)
     lines = []
     if entry.stiffness:
@@ -188,7 +193,7 @@ def _follows(body: BodyEntry, masters: Sequence[str]) -> list[str]:
 
 
 def _upright(tree: RigidTree) -> Array | None:
-    """Axes of the package's base in those where gravity is along -z; None where they are the same."""
+    """Return the axes of the package's base in axes where gravity is along -z; None where they are equal."""
     g = np.array(tree.gravity)
     size = float(np.linalg.norm(g))
     if size == 0 or ((g[:2] == 0).all() and g[2] < 0):
@@ -201,7 +206,7 @@ def _upright(tree: RigidTree) -> Array | None:
 
 
 def rpy(turn: Array) -> Array:
-    """Angles with Rz(yaw) Ry(pitch) Rx(roll) = turn."""
+    """Return the angles (roll, pitch, yaw), (3,), with Rz(yaw) Ry(pitch) Rx(roll) = turn."""
     pitch = math.atan2(-turn[2, 0], math.hypot(turn[0, 0], turn[1, 0]))
     if abs(math.cos(pitch)) < 1e-9:  # roll and yaw turn about one axis: all of it is roll
         return np.array([math.atan2(-turn[1, 2], turn[1, 1]), pitch, 0.0])
@@ -213,7 +218,7 @@ def _row(values: Array) -> str:
 
 
 def _attribute(text: str) -> str:
-    """A name in quotes, without what XML cannot hold."""
+    """Return a name in quotes, without characters that XML cannot hold."""
     return quoteattr(printable(text))
 
 

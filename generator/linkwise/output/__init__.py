@@ -1,8 +1,8 @@
 """Files and folders that appear whole or not at all: the one writer of packages, reports and analyses.
 
-A writer works in a hidden folder beside its target, `workplace`, which it holds locked while it lives; what
-it made is put in place by one step of the file system, `exchange`. After a kill at any moment the old target
-or the new one is there whole, and the next linkwise that comes by removes what the dead one left.
+A writer works in a hidden folder beside its target, `workplace`, which it holds locked while it lives; the
+result is put in place by one step of the file system, `exchange`. After a kill at any moment the old target
+or the new one is there whole, and the next run of linkwise there removes what the dead one left.
 """
 
 from linkwise.output.workplace import passing_folder, sweep

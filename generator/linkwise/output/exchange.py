@@ -1,4 +1,4 @@
-"""A finished folder takes the place of another, in one step where the system can."""
+"""Exchange of a finished folder for another, in one step where the system can."""
 
 import ctypes
 import errno
@@ -20,9 +20,9 @@ TAKEN = (errno.ENOTEMPTY, errno.EEXIST)
 
 
 def put(draft: Path, target: Path) -> bool:
-    """Rename the folder `draft`, of a workplace beside `target`, to that name.
+    """Rename folder `draft`, of a workplace beside `target`, to that name; return whether one was there.
 
-    Returns whether a folder was there, which then is at `draft`. Raises OSError; nothing has changed then.
+    The former folder is then at `draft`. Raises OSError; nothing has changed then.
     """
     for _ in range(TRIES):  # another writer may put its own there, or be between its two renames
         with _tried(*TAKEN):
@@ -37,8 +37,8 @@ def put(draft: Path, target: Path) -> bool:
 def exchange(draft: Path, target: Path) -> None:
     """Exchange two folders; raises OSError, and then nothing has changed.
 
-    Without the system's help there are two renames, and a kill between them leaves the former target in the
-    workplace, from where `workplace.sweep` brings it back.
+    Without the system's help they are renamed one by one, and a kill in between leaves the former target in
+    the workplace, from where `workplace.sweep` brings it back.
     """
     if _swapped(draft, target):
         return
@@ -60,7 +60,7 @@ def _undo(done: list[tuple[Path, Path]], former: Path) -> None:
         try:
             there.rename(here)
         except OSError as error:
-            # Another writer's is in the place of `former`, or was a moment ago, which is of no use any more.
+            # Another writer's folder is, or just was, in the place of `former`, which is then of no more use.
             # Where all fails, `former` is where `workplace.sweep` looks for it.
             if there == former and (error.errno in TAKEN or os.path.lexists(here)):
                 rest = former.parents[1] / REST
@@ -69,7 +69,7 @@ def _undo(done: list[tuple[Path, Path]], former: Path) -> None:
 
 
 def flush(folder: Path) -> None:
-    """Have the disk hold all that is in `folder`, so that a power cut after the exchange loses neither."""
+    """Write all that is in `folder` to the disk, so that a power cut after the exchange loses neither."""
     for place, _, names in os.walk(folder):
         for name in names:
             system_here().flush(Path(place, name))
@@ -77,14 +77,14 @@ def flush(folder: Path) -> None:
 
 
 def _swapped(one: Path, other: Path) -> bool:
-    """Exchange two names in one step; False where that cannot be, for whatever reason."""
+    """Exchange two names in one step; return False where that cannot be, for whatever reason."""
     call = _swap()
     return call is not None and call(os.fsencode(one), os.fsencode(other)) == 0
 
 
 @cache
 def _swap() -> Callable[[bytes, bytes], int] | None:
-    """The system's call for it, if it has one."""
+    """Return the system's call for an exchange, if it has one."""
     try:
         library = ctypes.CDLL(None)
     except (OSError, TypeError):

@@ -1,13 +1,13 @@
 """A writer's own folder beside its target: `.linkwise-XXXXXXXX`, locked for as long as the writer lives.
 
-    lock        held locked, which the system lets go with the process, on whatever machine it ran
+    lock        held locked; the system releases it with the process, on whatever machine it ran
     new         what is being written
-    old/NAME    the target, where the file system cannot exchange two folders in one step, between the two
+    old/NAME    the former target, during an exchange that the file system cannot do in one step
     rest        what is about to be removed
 
-Whoever finds one of their own whose lock is free knows that its writer is dead: NAME goes back to where it
-was unless something is there again, and the folder goes. One that holds anything else was not made by
-linkwise and stays.
+A free lock on a folder of one's own shows that its writer is dead: NAME goes back to where it was unless
+something is there again, and the folder is removed. One that holds anything else was not made by linkwise
+and stays.
 """
 
 import os
@@ -23,7 +23,7 @@ from linkwise_runtime.native.native_system import system_here
 
 PREFIX = ".linkwise-"
 RANDOM = 8
-"""Letters that `mkdtemp` appends."""
+"""Number of letters that `mkdtemp` appends."""
 LOCK, NEW, OLD, REST = "lock", "new", "old", "rest"
 ENDING = [int(getattr(signal, name)) for name in ("SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 """Signals that end a program, beside that of Ctrl-C; each system has some of them."""
@@ -31,7 +31,7 @@ ENDING = [int(getattr(signal, name)) for name in ("SIGTERM", "SIGHUP", "SIGBREAK
 
 @contextmanager
 def workplace(parent: Path) -> Iterator[Path]:
-    """Yield a new folder in `parent`, which goes at the end with all that is in it; raises OSError."""
+    """Yield a new folder in `parent`, which is removed at the end with all that is in it; raises OSError."""
     held = ExitStack()
     held.enter_context(signals_held())
     try:
@@ -54,9 +54,9 @@ def workplace(parent: Path) -> Iterator[Path]:
 
 @contextmanager
 def passing_folder() -> Iterator[Path]:
-    """Yield a new folder where the system keeps what passes, for what nobody is to find; it goes at the end.
+    """Yield a new folder in the system's place for temporary files; it is removed at the end.
 
-    After a kill it goes with the next sweep of that place.
+    After a kill it is removed by the next sweep of that place.
     """
     with workplace(Path(tempfile.gettempdir())) as work:
         (work / NEW).mkdir()
@@ -65,10 +65,10 @@ def passing_folder() -> Iterator[Path]:
 
 @contextmanager
 def signals_held() -> Iterator[None]:
-    """Let signals wait till the end of a few steps that must not be parted.
+    """Delay signals to the end of a few steps that must not be separated.
 
-    Blocked, for processes that begin meanwhile, and in the main thread put off as well: of one that another
-    thread takes Python calls the handler there all the same.
+    They are blocked, for processes that begin meanwhile, and in the main thread put off as well: Python calls
+    the handler there even for a signal that another thread takes.
     """
     in_main = threading.current_thread() is threading.main_thread()
     kinds = (signal.SIGINT, *ENDING) if in_main else ()
@@ -93,7 +93,8 @@ def signals_held() -> Iterator[None]:
 def sweep(parent: Path) -> None:
     """Remove what dead writers left in `parent`, and put back what they had taken away.
 
-    Nothing is raised: what cannot be done now, for want of a permission say, is left to the next.
+    Nothing is raised: what cannot be done now, for example for want of a permission, is left to the next
+    sweep.
     """
     with suppress(OSError), os.scandir(parent) as entries:
         found = [
@@ -113,12 +114,12 @@ def sweep(parent: Path) -> None:
 
 
 def _own(entry: "os.DirEntry[str]") -> bool:
-    """Whether this user made it: in a folder that many write to, another's could be a trap."""
+    """Return whether this user made it: in a folder that many write to, another's could be a trap."""
     return entry.stat(follow_symlinks=False).st_uid == system_here().user()
 
 
 def _made(parent: Path) -> tuple[Path, int]:
-    """Make a workplace and lock it; another one if somebody swept it away before the lock was held."""
+    """Make and lock a workplace; another one if somebody swept it away before the lock was held."""
     while True:
         work = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
         try:
@@ -132,9 +133,9 @@ def _made(parent: Path) -> tuple[Path, int]:
 
 
 def _held(work: Path, flags: int) -> int | None:
-    """Open and lock a workplace; None where somebody else holds it, or it is gone.
+    """Open and lock a workplace, and return the lock; None where somebody else holds it, or it is gone.
 
-    Where locks are not to be had, a writer goes without (its workplace then is never swept).
+    Where locks are not available, a writer goes without (its workplace is then never swept).
     """
     making = bool(flags & os.O_CREAT)
     try:
@@ -152,7 +153,7 @@ def _held(work: Path, flags: int) -> int | None:
 
 
 def _locked(lock: int, otherwise: bool) -> bool:
-    """Lock an open file; False where another has it, `otherwise` where the file system knows no locks."""
+    """Lock an open file, and return True; False where another has it, `otherwise` without locks of files."""
     try:
         return system_here().lock(lock)
     except (ImportError, OSError):
@@ -160,7 +161,7 @@ def _locked(lock: int, otherwise: bool) -> bool:
 
 
 def _is_at(lock: int, path: Path) -> bool:
-    """Whether the open file is still the one of that name."""
+    """Return whether the open file is still the one of that name."""
     try:
         return os.path.samestat(os.fstat(lock), path.stat())
     except OSError:
@@ -187,7 +188,7 @@ def _cleared(work: Path) -> None:
 
 
 def _left(work: Path, lock: int) -> None:
-    """Let go of the lock, and of a workplace that stands for its sake, where what is open keeps its name."""
+    """Release the lock, and remove a workplace left for its sake, where open files keep their names."""
     os.close(lock)
     with suppress(OSError):
         if os.listdir(work) == [LOCK]:

@@ -1,4 +1,4 @@
-"""Whole folders, and sets of files in folders that hold others too."""
+"""Writing of whole folders, and of sets of files in folders that hold others too."""
 
 import errno
 import os
@@ -21,12 +21,12 @@ from linkwise.output.exchange import exchange, flush, put
 from linkwise.output.workplace import ENDING, NEW, REST, sweep, workplace
 
 ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:(?=/|$)")
-"""s3://bucket as a path has it; a drive of Windows is one letter."""
+"""Pattern of an address, s3://bucket as a path has it; a drive of Windows is one letter."""
 
 
 @contextmanager
 def whole_directory(target: Path, refuse: Callable[[Path], None]) -> Iterator[Path]:
-    """Yield a folder to write into; it becomes `target` at the end, and goes after an error.
+    """Yield a folder to write into; it becomes `target` at the end, and is removed after an error.
 
     `refuse` raises LinkwiseError where its argument is there and may not be replaced. LinkwiseError is raised
     too where `target` cannot be written; what was there then stays.
@@ -45,9 +45,10 @@ def whole_directory(target: Path, refuse: Callable[[Path], None]) -> Iterator[Pa
 
 
 def write_files(directory: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
-    """Write files, by name, into a folder that may hold others: all, or none and LinkwiseError.
+    """Write files, by name, into a folder that may hold others, and return their paths.
 
-    Each is there whole, old or new, at any moment; a kill between two leaves both kinds side by side.
+    All are written, or none and LinkwiseError is raised. Each is there whole, old or new, at any moment; a
+    kill between two leaves both kinds side by side.
     """
     targets = tuple(directory / name for name in files)
     with _ended_by_signal(), _told(directory):
@@ -108,7 +109,7 @@ def _replace_files(work: Path, targets: tuple[Path, ...], former: set[Path]) -> 
 
 
 def _refuse_unless_replaceable(target: Path) -> None:
-    """Raise FileExistsError where something else than a file or a link is: a copy of it may never end."""
+    """Raise FileExistsError for anything but a file or a link: a copy of it may never end."""
     if not os.path.lexists(target):
         return
     mode = target.lstat().st_mode
@@ -119,7 +120,7 @@ def _refuse_unless_replaceable(target: Path) -> None:
 
 @contextmanager
 def _folder(directory: Path) -> Iterator[None]:
-    """Make a folder and those above it; those made go after an error, if they are empty."""
+    """Make a folder and those above it; after an error the new ones are removed, if they are empty."""
     missing = [place for place in (directory, *directory.parents) if not os.path.lexists(place)]
     try:
         if not directory.is_dir():
@@ -134,7 +135,7 @@ def _folder(directory: Path) -> Iterator[None]:
 
 @contextmanager
 def _told(place: Path) -> Iterator[None]:
-    """Make LinkwiseError of an OSError on the way to `place`: a full disk, above all."""
+    """Raise LinkwiseError for an OSError on the way to `place`: a full disk, above all."""
     if ADDRESS.match(place.as_posix()):
         raise LinkwiseError(f"{place}: that is an address, and results are written to folders; choose one")
     try:
@@ -151,14 +152,14 @@ def _told(place: Path) -> Iterator[None]:
 
 
 def _blocker(place: Path) -> Path | None:
-    """What stands where a folder is needed: the uppermost part of a path that is there and is none."""
+    """Return the uppermost part of a path that is there and is no folder, where one is needed; else None."""
     parts = (*reversed(place.parents), place)
     return next((part for part in parts if os.path.lexists(part) and not part.is_dir()), None)
 
 
 @contextmanager
 def _ended_by_signal() -> Iterator[None]:
-    """Let signals that end a program end the work as an error does: what is half written goes."""
+    """Let signals that end a program end the work as an error does: what is half written is removed."""
     numbers = ENDING
     if threading.current_thread() is not threading.main_thread():
         numbers = []  # only the main thread may set handlers

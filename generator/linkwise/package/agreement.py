@@ -1,4 +1,4 @@
-"""A manifest held against the package beside it: names, units, paths, parameters, back ends, operations."""
+"""Comparison of a manifest with its package: names, units, paths, parameters, back ends, operations."""
 
 import ast
 import re
@@ -15,7 +15,7 @@ LONGEST = 60
 
 
 def disagreements(manifest: Manifest, module: ModuleType) -> list[str]:
-    """Entries of a manifest that the package itself has otherwise, each in words; empty if none."""
+    """Return the entries of a manifest that differ in the package itself, each in words; empty if none."""
     said, there = dict(_said(manifest)), dict(_there(manifest, module))
     return [
         f"manifest.json has {place} {_shown(said, place)}, the package {_shown(there, place)}"
@@ -48,7 +48,7 @@ def _said(manifest: Manifest) -> Iterator[tuple[str, Any]]:
 def _there(manifest: Manifest, module: ModuleType) -> Iterator[tuple[str, Any]]:
     robot, request = module.ROBOT, manifest.request
     yield "name", robot.name
-    # From the file, for `python -OO` leaves docstrings out.
+    # From the file, since `python -OO` leaves docstrings out.
     text = Path(str(module.__file__)).read_text(encoding="utf-8")
     found = GENERATED_BY.search(text)
     yield "generator.linkwise", found[1] if found else None
@@ -63,7 +63,7 @@ def _there(manifest: Manifest, module: ModuleType) -> Iterator[tuple[str, Any]]:
     for name, value in robot.parameters.items():
         yield f"parameters.{name}", value
     if "backends" in request:
-        # C alone and formulas are files: no part of what can be loaded.
+        # The back ends c and formulas are files only, which nothing loads.
         yield "request.backends", {*module.BACKENDS, *_not_loaded(request["backends"], module)}
     if "parameters" in request:
         wanted = request["parameters"]
@@ -77,7 +77,7 @@ def _not_loaded(backends: Iterable[str], module: ModuleType) -> Iterator[str]:
 
 
 def miscounted(directory: Path, manifest: Manifest) -> list[str]:
-    """Links whose decomposition has other operations in its text than the manifest says, each in words."""
+    """Return the links whose decomposition has other operations than the manifest says, each in words."""
     wrong = []
     for j, link in enumerate(manifest.links):
         if (path := f"forms/link_{j + 1}.py") in manifest.files:

@@ -24,12 +24,12 @@ RUN = sorted(
     for name, what in vars(CodeType).items()
     if name.startswith("co_") and name not in PLACE and inspect.isdatadescriptor(what)
 )
-"""What code does, but for its constants; not from which lines of which file it is."""
+"""Attributes of code that say what it does; not its constants, nor from which lines of which file it is."""
 
 
 @dataclass(frozen=True)
 class Cache:
-    """A compiled module: of which source, by which Python ("cpython-311"), and how far optimized."""
+    """A compiled module: its source, its Python ("cpython-311"), and how far it is optimized."""
 
     file: Path
     source: Path
@@ -39,13 +39,13 @@ class Cache:
 
     @property
     def readable(self) -> bool:
-        """Whether this Python made it, and would run it."""
+        """True if this Python made it, and would run it."""
         plain = self.optimization in ("", "1", "2")
         return self.finished and plain and self.python == sys.implementation.cache_tag
 
 
 def cache_of(file: Path) -> Cache | None:
-    """What the name of a file in `__pycache__` says; None for a name that Python gives to none."""
+    """Return the cache that a file's name in `__pycache__` describes; None for a name that Python has not."""
     found = NAME.fullmatch(file.name)
     if found is None:
         return None
@@ -54,7 +54,7 @@ def cache_of(file: Path) -> Cache | None:
 
 
 def caches(directory: Path, files: Iterable[str]) -> list[Cache]:
-    """The caches of a package's modules; those elsewhere too that PYTHONPYCACHEPREFIX names."""
+    """Return the caches of a package's modules, also those elsewhere that PYTHONPYCACHEPREFIX names."""
     sources = [directory / file for file in files if file.endswith(".py")]
     places = {source.parent / CACHE for source in sources}
     found = {file for place in places if place.is_dir() for file in place.iterdir()}
@@ -68,7 +68,7 @@ def caches(directory: Path, files: Iterable[str]) -> list[Cache]:
 
 
 def is_compiled_from_source(cache: Cache) -> bool:
-    """Whether the cache of a module does what its source says; compiles that and runs neither.
+    """Return whether the cache of a module does what its source says; compiles that and runs neither.
 
     The cache is read as Python would read it, which like Python trusts it to be well-formed.
     """
@@ -87,7 +87,7 @@ def is_compiled_from_source(cache: Cache) -> bool:
 
 
 def _plain(value: object) -> object:
-    """A constant or code as nested tuples of text: 0, 0.0 and False differ, and a set has no order."""
+    """Return a constant or code as nested tuples of text: 0, 0.0 and False differ, and a set has no order."""
     if isinstance(value, CodeType):
         return (*(repr(getattr(value, name)) for name in RUN), _plain(value.co_consts))
     if isinstance(value, tuple):

@@ -1,11 +1,12 @@
-"""What must hold among the joints, links and rigid bodies of a manifest."""
+"""Checks that joints, links and rigid bodies of a manifest agree with each other."""
 
 from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
+from linkwise_runtime.rule.joint_tree import TreeCurve
 
-from linkwise.package.entries import PLACE, CurveEntry, JointEntry, LinkEntry, RigidTree, Row
+from linkwise.package.entries import PLACE, JointEntry, LinkEntry, RigidTree, Row
 
 ROUNDING = 1e-6
 """Largest error of an entry of a rotation times its transpose."""
@@ -55,23 +56,23 @@ def _is_rotation(rows: tuple[Row, Row, Row]) -> bool:
 
 
 def _check_frames(tree: RigidTree, links: Sequence[LinkEntry]) -> None:
-    """Raise ValueError for a frame that nothing carries, or that is none, and for a link without one."""
+    """Raise ValueError for frames on missing bodies, there twice or no rotation, and links without one."""
     carriers: dict[str, int | None] = {}
     for index, frame in enumerate(tree.frames):
-        if frame.body is not None and not frame.body < len(tree.bodies):
+        if frame.joint is not None and not frame.joint < len(tree.bodies):
             raise ValueError(f"frame {index} of the tree is on a body that is not there")
         if frame.name in carriers:
             raise ValueError(f"tree.frames has {frame.name[:80]!a} twice")
         if not _is_rotation(frame.rotation):
             raise ValueError(f"the rotation of frame {index} of the tree is not a rotation")
-        carriers[frame.name] = frame.body
+        carriers[frame.name] = frame.joint
     at = {body.link: b for b, body in enumerate(tree.bodies)}
     for link in links:
         if carriers.get(link.name) != at[link.name]:
             raise ValueError(f"tree.frames has no frame {link.name[:80]!a} on the body of that link")
 
 
-def check_curve(place: str, curve: CurveEntry) -> None:
+def check_curve(place: str, curve: TreeCurve) -> None:
     """Raise ValueError for a curve without pieces, or whose pieces are not in order."""
     if not (len(curve.starts) == len(curve.pieces) > 0 and all(curve.pieces)):
         raise ValueError(f"{place}.curve needs a start for each piece, and powers in each")
@@ -80,7 +81,7 @@ def check_curve(place: str, curve: CurveEntry) -> None:
 
 
 def _check_passive(tree: RigidTree) -> None:
-    """Raise ValueError for what is of no joint of the tree, or of one that moves otherwise."""
+    """Raise ValueError for a passive entry of no joint of the tree, or of one that moves otherwise."""
     moved = {body.joint: (body.coordinate, body.ratio) for body in tree.bodies}
     for index, entry in enumerate(tree.passive):
         if moved.get(entry.joint) != (entry.coordinate, entry.ratio):
@@ -88,7 +89,7 @@ def _check_passive(tree: RigidTree) -> None:
 
 
 def _check_constraints(tree: RigidTree, count: int) -> None:
-    """Raise ValueError for what ties no frames or joints, and for independent joints that cannot be."""
+    """Raise ValueError for ties and couplings that join nothing, and for impossible independent joints."""
     names = Counter([tie.name for tie in tree.ties] + [coupling.name for coupling in tree.couplings])
     for name, times in names.items():
         if times > 1:

@@ -1,4 +1,4 @@
-"""What lies in the folder of a generated package, held against the files that its manifest lists."""
+"""Comparison of the folder of a generated package with the files that its manifest lists."""
 
 import hashlib
 import os
@@ -10,17 +10,23 @@ from linkwise.package.manifest import FILE, LARGEST, is_too_large
 
 
 def changed(directory: Path, files: Mapping[str, str]) -> list[str]:
-    """What is wrong with the listed files, in words, "forms/link_1.py was changed" say; empty if nothing."""
+    """Return what is wrong with the listed files, in words, such as "forms/link_1.py was changed".
+
+    The list is empty if nothing is wrong.
+    """
     return [f"{path} {fault}" for path, fault in faults(directory, files).items()]
 
 
 def faults(directory: Path, files: Mapping[str, str]) -> dict[str, str]:
-    """What is wrong with each of the listed files of which anything is: "was changed", "is missing"."""
+    """Return the faults of the listed files that have one, by path: "was changed", "is missing"."""
     return {path: fault for path, digest in files.items() if (fault := _fault(directory, path, digest))}
 
 
 def added(directory: Path, files: Mapping[str, str]) -> list[str]:
-    """Paths of what the manifest doesn't list, caches of the listed modules aside; raises OSError."""
+    """Return the paths of what the manifest doesn't list, caches of the listed modules aside.
+
+    Raises OSError.
+    """
     known = {FILE, *files}
     found = (path.relative_to(directory) for path in entries(directory))
     return [
@@ -31,7 +37,7 @@ def added(directory: Path, files: Mapping[str, str]) -> list[str]:
 
 
 def entries(directory: Path) -> Iterator[Path]:
-    """Everything below a folder but folders; links to folders are not followed. Raises OSError."""
+    """Yield everything below a folder but folders; links to folders are not followed. Raises OSError."""
 
     def fail(error: OSError) -> None:
         raise error
@@ -42,7 +48,7 @@ def entries(directory: Path) -> Iterator[Path]:
 
 
 def link_on_the_way(directory: Path, path: str) -> str | None:
-    """First part of a path in a package that is a symbolic link."""
+    """Return the first part of a path in a package that is a symbolic link; None if there is none."""
     parts = (Path(path), *Path(path).parents)[:-1]
     return next((part.as_posix() for part in reversed(parts) if (directory / part).is_symlink()), None)
 
@@ -64,7 +70,7 @@ def _fault(directory: Path, path: str, digest: str) -> str:
 
 
 def _is_cache(file: Path, path: Path, known: set[str]) -> bool:
-    """Whether this is what Python leaves beside a listed module when it compiles it."""
+    """Return whether this is the cache that Python leaves beside a listed module when it compiles it."""
     if path.parent.name != CACHE or file.is_symlink() or file.parent.is_symlink() or not file.is_file():
         return False
     cache = cache_of(path)

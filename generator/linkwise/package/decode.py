@@ -1,4 +1,7 @@
-"""JSON as dataclasses: every entry of its annotated type, none missing, none unknown; a fault is named."""
+"""Decoding of JSON as dataclasses: each entry of its annotated type, none missing, none unknown.
+
+A fault is named.
+"""
 
 import json
 import math
@@ -8,16 +11,19 @@ from types import UnionType
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 DIGITS = 16
-"""Of a whole number; no count or index has more, and Python takes long over many."""
+"""Most digits of a whole number; no count or index has more, and Python takes long over many."""
 
 
 def parsed(text: str) -> Any:
-    """JSON as Python has it; raises ValueError for what is not JSON, and for an entry that is there twice."""
+    """Return JSON as Python has it.
+
+    Raises ValueError for what is not JSON, and for an entry that is there twice.
+    """
     return json.loads(text, object_pairs_hook=_once, parse_int=_whole)
 
 
 def require(met: bool, place: str, expected: str) -> None:
-    """Raise ValueError, which names the place, unless something is met."""
+    """Raise ValueError, which names the place, unless `met` is true."""
     if not met:
         raise ValueError(f"{place.lstrip('.') or 'the whole'} is not {expected}")
 
@@ -82,7 +88,10 @@ def _scalar(kind: Any, data: Any, place: str) -> Any:
 
 
 def _option(data: Any, place: str, nested: bool = True) -> Any:
-    """What an option of a command can be: null, true, false, a number, text, or a list or object of such."""
+    """Return the option of a command: null, true, false, a number, text, or a list or object of such.
+
+    Raises ValueError, which names the place, for anything else.
+    """
     if data is None or isinstance(data, bool):
         return data
     if isinstance(data, (int, float)):
@@ -97,7 +106,7 @@ def _option(data: Any, place: str, nested: bool = True) -> Any:
 
 
 def _key(name: str) -> str:
-    """An entry's name in a message, on one line and short."""
+    """Return an entry's name for a message, on one line and short."""
     return name if name.isprintable() and len(name) <= 80 else ascii(name[:80])
 
 
@@ -111,5 +120,5 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _whole(digits: str) -> float:
-    """A whole number; infinity, which the place refuses that it is for, if it has too many digits."""
+    """Return a whole number; infinity, which is refused at its place, if it has too many digits."""
     return int(digits) if len(digits) <= DIGITS else math.inf

@@ -1,8 +1,9 @@
-"""What the C of a package may say, read as text before it is compiled.
+"""Check of the C of a package, read as text before it is compiled.
 
-Beside numbers that a file declares itself it has the words of linkwise's own C, and calls what that calls.
-Macros could give words another meaning, and files another text than what is read here: so each directive is
-one of those that linkwise writes, and what a compiler would join or replace before it reads is refused.
+Beside numbers that a file declares itself, it may have the words of linkwise's own C, and call what that
+calls. Macros could give words another meaning, and files another text than what is read here: so each
+directive must be one of those that linkwise writes, and what a compiler would join or replace before it reads
+is refused.
 """
 
 import re
@@ -15,9 +16,10 @@ ORDINARY = "arithmetic, sines and the like, and names"
 FUNCTIONS = frozenset(
     ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "sign")
 )
-"""Of closed forms; C has fabs in place of abs."""
+"""Functions of closed forms; C has fabs in place of abs."""
 SPLICED = re.compile(r"\?\?|\\[ \t\f\v\r]*\n|\r(?!\n)|[^\t\n\r -~]")
-"""Trigraphs and lines that go on or end otherwise: a compiler reads another text than this; and no ASCII."""
+"""Pattern of trigraphs, of lines that go on or end otherwise, which compilers read as another text than this,
+and of what is not ASCII."""
 DIGRAPH = re.compile(r"<:|:>|<%|%>|%:")
 QUOTED = re.compile(
     r"""(?P<comment>/\*.*?\*/|//[^\n]*)|(?P<string>"(?:[^"\\\n]|\\.)*")|(?P<quote>["'])""", re.DOTALL
@@ -30,7 +32,7 @@ TOKEN = re.compile(
 DECLARED = re.compile(r"\b(?:real|int|short|char|size_t|double|float)\s+\**\s*(?:RESTRICT\s+)?(\w+)")
 ENUMERATED = re.compile(r"\benum\s*\{([^{}]*)\}")
 MADE = re.compile(r"\b(KERNEL|API|F|SIZED)\((\w+)$")
-"""Before the bracket that ends it: a name that a macro makes, which may be called."""
+"""Pattern, up to the bracket that ends it, of a name that a macro makes, which may be called."""
 OF_LINK = re.compile(r"links?_\d+(?:_\w+)?|at_p_\w+")
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include\b[ \t]*([<"]?)([^>"\n]*)[>"]?', re.MULTILINE)
 HEADERS = frozenset(("float.h", "math.h", "stddef.h"))
@@ -47,13 +49,13 @@ DIRECTIVE = re.compile(
     r"|SIZED\(name\) name##_(?:one|block)|KERNEL\(name\) (?:static|APART) void SIZED\(name\)"
     r"|API\(function\) F\((?P<robot>\w+)_##function\)))"
 )
-"""Each that stands in the templates of C, with what is put into them."""
+"""Pattern of each directive in the templates of C, with what is put into them."""
 JINJA = re.compile(r"\{[{%#].*?[}%#]\}", re.DOTALL)
 TAKEN = frozenset(("asm", "goto"))
 
 
 def foreign_includes(text: str, folder: str, listed: frozenset[str]) -> Iterator[str]:
-    """What a C file in a folder of a package includes beside listed files and headers of the standard."""
+    """Yield what a C file in a folder of a package includes beside listed files and standard headers."""
     for found in INCLUDE.finditer(_blanked(text, "comment")[0]):
         quote, file = found[1], found[2].strip()
         own = file.endswith((".h", ".c")) and f"{folder}/{file}" in listed
@@ -62,9 +64,9 @@ def foreign_includes(text: str, folder: str, listed: frozenset[str]) -> Iterator
 
 
 def foreign_c(text: str, name: str) -> Iterator[str]:
-    """What a C file of a package says beside the vocabulary of linkwise's own C and local numbers.
+    """Yield what a C file of a package says beside the vocabulary of linkwise's own C and local numbers.
 
-    Words that neither that nor the robot's name has are numbers declared in the file, and never called.
+    Words that neither that nor the robot's name has must be numbers declared in the file, and never called.
     """
     for place, told in _read(text, name):
         yield f"line {_line(text, place)} {told}, where linkwise writes {ORDINARY} alone"
@@ -95,7 +97,7 @@ def _read(text: str, name: str) -> Iterator[tuple[int, str]]:
 
 
 def _blanked(text: str, *kinds: str) -> tuple[str, list[tuple[int, str]]]:
-    """The text with blanks in place of comments, of strings too if asked; and strings that do not end."""
+    """Return the text with blanks for comments, and for strings if asked; and the strings that do not end."""
     wrong: list[tuple[int, str]] = []
 
     def blank(found: re.Match[str]) -> str:
@@ -107,7 +109,7 @@ def _blanked(text: str, *kinds: str) -> tuple[str, list[tuple[int, str]]]:
 
 
 def _directive(line: str, local: frozenset[str], name: str) -> str:
-    """What is wrong with a line for the preprocessor; what it includes is looked at by itself."""
+    """Return what is wrong with a preprocessor line; what it includes is checked separately."""
     found = DIRECTIVE.fullmatch(line)
     if found is None or found["robot"] not in (None, name):
         return f"has {line}"
@@ -117,7 +119,7 @@ def _directive(line: str, local: frozenset[str], name: str) -> str:
 
 @lru_cache(maxsize=4096)
 def _word(what: str, called: bool, local: frozenset[str], name: str) -> str:
-    """What is wrong with a word, in words; empty if nothing."""
+    """Return what is wrong with a word; empty if nothing."""
     known = _vocabulary()
     if OF_LINK.fullmatch(what):
         return ""
@@ -132,14 +134,14 @@ def _word(what: str, called: bool, local: frozenset[str], name: str) -> str:
 
 
 def _is_of_robot(ending: str) -> bool:
-    """Whether linkwise has a function that is called as the robot with this behind it."""
+    """Return whether linkwise has a function whose name is the robot's name with this ending."""
     ends, calls = (ending, ending.removesuffix("f")), _vocabulary().calls
     return any(f"_{end}" in calls or OF_LINK.fullmatch(end) for end in ends)
 
 
 def _is_made(macro: str, word: str) -> bool:
-    """Whether a macro makes a name of linkwise's own C of this word."""
-    if macro == "F":  # behind which single precision has an f
+    """Return whether a macro makes a name of linkwise's own C from this word."""
+    if macro == "F":  # single precision appends an f
         return word in FUNCTIONS | {"fabs"}
     return macro != "API" or word in _vocabulary().made or OF_LINK.fullmatch(word) is not None
 

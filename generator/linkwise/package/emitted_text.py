@@ -1,7 +1,7 @@
-"""What a package's own files may say, read as text before anything of them runs.
+"""Check of a package's own files, read as text before anything of them runs.
 
-A hash tells that a file is as its manifest lists it, not that it came from here: whoever sends a package can
-write both anew. What linkwise emits says little: arithmetic, sines and the like, and records of its runtime.
+A hash shows that a file is as its manifest lists it, not that it came from here: whoever sends a package can
+write both anew. What linkwise emits is limited to arithmetic, sines and the like, and records of its runtime.
 So these files are read by that small grammar, and refused with the line where they say anything else. Files
 that are the same in every package are compared with those of this version, byte for byte.
 """
@@ -23,18 +23,18 @@ from linkwise.package.runtime_imports import RUNTIME, is_copied
 
 
 def _table(lines: str) -> Mapping[str, frozenset[str]]:
-    """Modules, each followed by the names that may be imported from it."""
+    """Return modules, each with the names that may be imported from it."""
     pairs = (line.replace("RUN.", f"{RUNTIME}.").split(": ") for line in lines.split(";"))
     return {module: frozenset(names.split()) for module, names in pairs}
 
 
 @dataclass(frozen=True)
 class Grammar:
-    """What a Python file of a package may hold beside names that it gives something to itself.
+    """Grammar of a Python file of a package, beside names that the file itself assigns.
 
-    imports: names by module, RUN before those of linkwise_runtime; whole: libraries, under which name
-    builtins, attributes: which may be named and asked for; calls: of the builtins those that may be called,
-    for types make others; nodes: of the syntax
+    imports: names by module, RUN before those of linkwise_runtime; whole: libraries, with the name of each
+    builtins, attributes: those that may be named and asked for; calls: builtins that may be called, since
+    types make others; nodes: of the syntax
     """
 
     imports: Mapping[str, frozenset[str]]
@@ -74,7 +74,7 @@ ARITHMETIC = Grammar(
     ),
     nodes=(*PLAIN, ast.ClassDef, ast.Lambda, ast.Slice),
 )
-"""Of closed forms, energies, names and the tree."""
+"""Grammar of closed forms, energies, names and the tree."""
 LOADING = Grammar(
     imports=_table(
         "typing: TYPE_CHECKING Any Literal overload;collections.abc: Callable Iterable Mapping"
@@ -98,22 +98,22 @@ LOADING = Grammar(
         *(ast.BoolOp, ast.boolop),
     ),
 )
-"""Of the package's __init__.py."""
+"""Grammar of the package's __init__.py."""
 OWN_C = "Path(__file__).parent / 'c'"
-"""Where the C is that it has compiled."""
+"""Expression for the folder of the C that it compiles."""
 MAKING = ("_MAKERS[backend]", "(made.face or Dynamics)", "made.face or Dynamics")
-"""What else it calls: each of them is named in it."""
+"""Further expressions that it calls: each of them is named in it."""
 BUILTINS = frozenset(dir(builtins))
 READ = frozenset(("formulas.txt", "formulas.tex", "py.typed"))
 """Files that nothing runs."""
 OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.BitOr)
-"""Of numbers, and of types."""
+"""Operators of numbers, and of types."""
 
 
 def foreign(directory: Path, manifest: Manifest) -> list[str]:
-    """What in a package's files linkwise does not write, each with its file and line; empty if nothing.
+    """Return what in a package's files linkwise does not write, each with its file and line.
 
-    Raises OSError for a file that cannot be read.
+    The list is empty if there is nothing. Raises OSError for a file that cannot be read.
     """
     source = Source.of(manifest)
     found = []
@@ -125,7 +125,7 @@ def foreign(directory: Path, manifest: Manifest) -> list[str]:
 
 @dataclass(frozen=True)
 class Source:
-    """What a manifest says of the package that a file is of.
+    """A manifest's description of the package that a file belongs to.
 
     version: the linkwise that wrote it; files of another's runtime are not at hand to compare with
     files: paths of all that are listed
@@ -137,13 +137,13 @@ class Source:
 
     @classmethod
     def of(cls, manifest: Manifest) -> "Source":
-        """That of a package's manifest."""
+        """Return the description in a package's manifest."""
         return cls(manifest.name, manifest.generator.get("linkwise"), frozenset(manifest.files))
 
 
 @lru_cache(maxsize=1024)
 def foreign_text(path: str, text: bytes, source: Source) -> str | None:
-    """The same of one file, what is wrong with it alone; None if nothing."""
+    """Return what in one file of a package linkwise does not write, without the path; None if nothing."""
     own, ending = own_text(path), path.rpartition(".")[2]
     try:
         if own is not None or is_copied(path):
@@ -155,7 +155,7 @@ def foreign_text(path: str, text: bytes, source: Source) -> str | None:
             return None if path in READ else "is no file that linkwise writes"
         elif told := next(foreign_c(text.decode(), source.name), None):
             return told
-        # That of the runtime is compiled with Python's headers.
+        # C of the runtime is compiled with Python's headers.
         in_c = ending in ("h", "c") and not is_copied(path)
         folder = path.rpartition("/")[0]
         return next(foreign_includes(text.decode(), folder, source.files), None) if in_c else None
@@ -164,9 +164,9 @@ def foreign_text(path: str, text: bytes, source: Source) -> str | None:
 
 
 def _python(grammar: Grammar, text: bytes) -> Iterator[str]:
-    """What a module of a package says beside what its grammar allows.
+    """Yield what a module of a package says beside what its grammar allows.
 
-    Of the bytes, as Python reads them: a comment in them may say in what encoding.
+    It is parsed from bytes, as by Python: a comment in them may say in what encoding they are.
     """
     tree = ast.parse(text)
     known = ModuleNames.of(tree, grammar)
@@ -182,7 +182,7 @@ def _is_own_c(node: ast.AST) -> bool:
 
 @dataclass(frozen=True)
 class ModuleNames:
-    """Names of a module: all that it may use, its functions and classes, those of numbers and text alone."""
+    """Names of a module: all that it may use, functions and classes, and those of numbers and text alone."""
 
     names: set[str]
     functions: set[str]
@@ -190,7 +190,7 @@ class ModuleNames:
 
     @classmethod
     def of(cls, tree: ast.Module, grammar: Grammar) -> "ModuleNames":
-        """Those of a module, whose statements are walked before those of its functions."""
+        """Return the names of a module, whose statements are walked before those of its functions."""
         functions, fixed = set(), set[str]()
         for node in ast.walk(tree):
             match node:
@@ -202,7 +202,10 @@ class ModuleNames:
         return cls(_bound(tree) | grammar.builtins, functions, fixed)
 
     def is_fixed(self, operand: ast.AST) -> bool:
-        """Whether it is of numbers and text alone; False for what is computed: its own parts tell."""
+        """Return whether an operand has numbers and text alone.
+
+        False for what is computed, whose own parts are checked.
+        """
         return not isinstance(operand, ast.BinOp) and _named(operand) <= self.fixed
 
 
@@ -211,7 +214,7 @@ def _named(node: ast.AST, how: type[ast.expr_context] = ast.expr_context) -> set
 
 
 def _bound(tree: ast.Module) -> set[str]:
-    """Names that the module itself gives something to."""
+    """Return the names that the module itself defines."""
     found = set()
     for node in ast.walk(tree):
         match node:
@@ -225,7 +228,7 @@ def _bound(tree: ast.Module) -> set[str]:
 
 
 def _beside(node: ast.AST, grammar: Grammar, known: ModuleNames) -> str:
-    """What is wrong with a node, in words; empty if nothing."""
+    """Return what is wrong with a node, in words; empty if nothing."""
     if not isinstance(node, grammar.nodes):
         return f"has {type(node).__name__}"
     match node:
@@ -255,12 +258,12 @@ def _beside(node: ast.AST, grammar: Grammar, known: ModuleNames) -> str:
         case ast.Attribute(attr=attribute):
             return "" if attribute in grammar.attributes else f"asks for .{attribute}"
         case ast.BinOp(op=ast.Div()) if grammar is LOADING:
-            return "does what is no arithmetic"  # but for OWN_C: of a path, that leads elsewhere
+            return "does what is no arithmetic"  # except in OWN_C: a division of a path leads to other files
         case ast.BinOp(op=operator):
             several = not isinstance(operator, ast.Div) and any(map(_is_several, (node.left, node.right)))
             if several or not isinstance(operator, OPERATORS):
                 return "does what is no arithmetic"
-            # Of numbers alone a power may be as long as memory; so may products of products, or text.
+            # A power of numbers alone may fill the memory; so may products of products, or of text.
             if isinstance(operator, ast.Pow) and _named(node.left) <= known.fixed:
                 return "has a power of numbers"
             of_numbers = all(known.is_fixed(part) for part in (node.left, node.right))
@@ -277,7 +280,7 @@ def _beside(node: ast.AST, grammar: Grammar, known: ModuleNames) -> str:
 
 
 def _is_several(node: ast.AST) -> bool:
-    """Whether it is text or a list, of which a product with a number may be as long as memory."""
+    """Return whether a node is text or a list, whose product with a number may be as long as memory."""
     if isinstance(node, ast.Constant):
         return isinstance(node.value, str | bytes)
     return isinstance(node, ast.Tuple | ast.List | ast.Dict | ast.JoinedStr)

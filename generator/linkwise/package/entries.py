@@ -5,17 +5,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from linkwise_runtime.rule.joint_tree import TreeCoupling, TreeCurve, TreeFrame, TreeTie
+
 Row = tuple[float, float, float]
 
 KernelKind = Literal["straight", "loops"]
-"""Closed forms in straight lines, or loops over links and joints."""
+"""Kind of kernel: closed forms in straight lines, or loops over links and joints."""
 
 PLACE = re.compile(
     r"(?:gravity|bodies\[(?P<body>\d+)\]\.(?:translation|com))\[[0-2]\]"
     r"|frames\[(?P<frame>\d+)\]\.translation\[[0-2]\]"
     r"|bodies\[(?P<whole>\d+)\]\.(?:mass|inertia\[[0-2]\]\[[0-2]\])"
 )
-"""Numbers of a tree that may hang on parameters."""
+"""Places of the numbers of a tree that may depend on parameters."""
 
 
 @dataclass(frozen=True)
@@ -56,29 +58,21 @@ class CodeSize:
 
 
 @dataclass(frozen=True)
-class CurveEntry:
-    """Polynomials in q − start, each from its start on, as `Curve` in robot.curve says."""
-
-    starts: tuple[float, ...]
-    pieces: tuple[tuple[float, ...], ...]
-
-
-@dataclass(frozen=True)
 class FollowerEntry:
-    """A joint of the robot's file that is no joint here: a curve of one, by its index, or a number.
+    """A joint of the robot's file that is none here: it follows one, by index, on a curve, or is constant.
 
-    In rad or m, as its unit says.
+    Positions are in rad or m, as its unit says.
     """
 
     name: str
     unit: Literal["rad", "m"]
     joint: int | None
-    curve: CurveEntry
+    curve: TreeCurve
 
 
 @dataclass(frozen=True)
 class FileJointEntry:
-    """A joint of the robot's file that moves, its joints here by their indices, and its place in Pinocchio.
+    """A moving joint of the robot's file, its joints here by their indices, and its place in Pinocchio.
 
     kind: as `FileJoint` in runtime.file_joints has it
     """
@@ -108,27 +102,14 @@ class BodyEntry:
     mass: float
     com: Row
     inertia: tuple[Row, Row, Row]
-    curve: CurveEntry | None = None
-
-
-@dataclass(frozen=True)
-class FrameEntry:
-    """A named frame that a body carries, or the ground where `body` is None: a body of the file, or a site.
-
-    rotation, translation (in m): from its coordinates to those of the body's frame, or of the world
-    """
-
-    name: str
-    body: int | None
-    rotation: tuple[Row, Row, Row]
-    translation: Row
+    curve: TreeCurve | None = None
 
 
 @dataclass(frozen=True)
 class PassiveEntry:
-    """What a body's joint has of its own, p = ratio · q of a coordinate being its position, in rad or m.
+    """Passive properties of a body's joint, at the position p = ratio · q of a coordinate, in rad or m.
 
-    It takes stiffness (p − rest) + damping ṗ + friction sign(ṗ) + armature p̈ to move it, in N·m or N.
+    To move it takes stiffness (p − rest) + damping ṗ + friction sign(ṗ) + armature p̈, in N·m or N.
     """
 
     joint: str
@@ -142,51 +123,32 @@ class PassiveEntry:
 
 
 @dataclass(frozen=True)
-class TieEntry:
-    """Two frames, by their indices, that are held together as `Tie` in robot.robot says; length in m."""
-
-    name: str
-    kind: Literal["point", "hinge", "frame", "distance"]
-    first: int
-    second: int
-    length: float
-
-
-@dataclass(frozen=True)
-class CouplingEntry:
-    """Joints of the manifest, by their indices, whose sum of c_0 + c_1 q + c_2 q² + … is 0."""
-
-    name: str
-    terms: tuple[tuple[int, tuple[float, ...]], ...]
-
-
-@dataclass(frozen=True)
 class RigidTree:
     """The rigid bodies, parents before children, the frames, and gravity in m/s² in the base's axes.
 
-    passive: what joints have of their own, those that have anything
+    passive: passive properties of the joints that have any
 
-    ties, couplings: what holds beside the tree; independent: the joints whose motion gives that of all others
-    then, by their indices in ascending order; closed_position: of all joints, in rad and m, one in which all
-    of it holds; none of both where nothing holds
+    ties, couplings: constraints beside the tree; independent: the joints whose motion then gives that of all
+    others, by their indices in ascending order; closed_position: of all joints, in rad and m, one in which
+    all constraints hold; the latter two are empty without constraints
 
-    formulas: by its place, such as bodies[2].com[0], each number that hangs on run-time parameters, as text
+    formulas: by its place, such as bodies[2].com[0], each number that depends on run-time parameters, as text
     in their symbols; the numbers themselves are those of the parameters' own values
     """
 
     gravity: Row
     bodies: tuple[BodyEntry, ...]
-    frames: tuple[FrameEntry, ...]
+    frames: tuple[TreeFrame, ...]
     passive: tuple[PassiveEntry, ...]
-    ties: tuple[TieEntry, ...]
-    couplings: tuple[CouplingEntry, ...]
+    ties: tuple[TreeTie, ...]
+    couplings: tuple[TreeCoupling, ...]
     independent: tuple[int, ...]
     closed_position: tuple[float, ...]
     formulas: Mapping[str, str]
 
     @property
     def tied(self) -> bool:
-        """Whether anything holds beside the joints."""
+        """True if there are ties or couplings beside the joints."""
         return bool(self.ties or self.couplings)
 
 

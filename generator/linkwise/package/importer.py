@@ -1,4 +1,4 @@
-"""Importing a generated package from its sources alone: what runs is what its manifest lists."""
+"""Import of a generated package from its sources alone: what runs is what its manifest lists."""
 
 import hashlib
 import importlib
@@ -27,7 +27,7 @@ def import_listed(directory: Path, manifest: Manifest) -> ModuleType:
     differs from its SHA-256 or says what linkwise doesn't write, and passes on whatever the package raises.
     """
     path = Path(os.path.realpath(directory))
-    # Of place and content, so that a package generated anew is imported anew.
+    # A hash of place and content, so that a package generated anew is imported anew.
     digest = hashlib.sha256(str(path).encode() + (path / FILE).read_bytes()).hexdigest()[:16]
     name = f"_linkwise_{digest}"
     if name in sys.modules:
@@ -43,7 +43,7 @@ def import_listed(directory: Path, manifest: Manifest) -> ModuleType:
 
 @dataclass(frozen=True, eq=False)
 class _Listed(MetaPathFinder):
-    """Finds the modules of one package."""
+    """Finder of the modules of one package."""
 
     name: str
     directory: Path
@@ -52,13 +52,13 @@ class _Listed(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Where a module of the package is; None for one of somebody else."""
+        """Return the spec of a module of the package; None for a module of any other."""
         package, *inner = fullname.split(".")
         if package != self.name:
             return None
         for parts in ([*inner, "__init__.py"], [*inner[:-1], f"{inner[-1]}.py"] if inner else []):
             if (file := "/".join(parts)) in self.manifest.files:
-                # No folder to search: there would be caches and libraries in it.
+                # No folder is searched, as there could be caches and libraries in it.
                 search: list[str] | None = [] if parts[-1] == "__init__.py" else None
                 loader = _Verified(self.directory, file, self.manifest)
                 return importlib.util.spec_from_file_location(
@@ -69,19 +69,24 @@ class _Listed(MetaPathFinder):
 
 @dataclass(frozen=True)
 class _Verified(SourceLoader):
-    """Compiles one source, if it is as listed and as linkwise writes; without a time of change Python looks
-    for no cache."""
+    """Loader that compiles one source, if it is as listed and as linkwise writes.
+
+    Without a time of change Python looks for no cache.
+    """
 
     directory: Path
     file: str
     manifest: Manifest
 
     def get_filename(self, fullname: str) -> str:
-        """Path of the source."""
+        """Return the path of the source."""
         return str(self.directory / self.file)
 
     def get_data(self, path: str | bytes) -> bytes:
-        """The source; raises ImportError if it isn't as listed, or says anything else than linkwise."""
+        """Return the source.
+
+        Raises ImportError if it isn't as listed, or says anything that linkwise does not write.
+        """
         told: str | None = "was changed"
         source = self.directory / self.file
         if link_on_the_way(self.directory, self.file) is None and not is_too_large(source):
@@ -89,7 +94,7 @@ class _Verified(SourceLoader):
             if hashlib.sha256(data).hexdigest() == manifest.files[self.file]:
                 told = foreign_text(self.file, data, Source.of(manifest))
                 if told is None:
-                    # A copy of this very runtime stands for it, so that of each class there is one.
+                    # The library stands in for a copy of this very runtime, so that each class exists once.
                     same = manifest.runtime == RuntimeEntry(VERSION, vendored=True)
                     return of_library(self.file, data.decode()).encode() if same else data
         raise ImportError(f"{self.file} {told}", path=str(source))

@@ -39,7 +39,7 @@ class Package:
 
     @property
     def fastest_first(self) -> tuple[str, ...]:
-        """The same, the fastest for large batches first."""
+        """Names of the back ends that can be loaded, the fastest for large batches first."""
         return tuple(self.module.FASTEST_FIRST)
 
     def load(
@@ -49,8 +49,8 @@ class Package:
         kernel: str = "auto",
         bodies: Any = None,
     ) -> Dynamics:
-        """Model on a back end, for any parameters and bodies; passes on what the package raises."""
-        # A package made before there were kernels to choose from loads as it always did.
+        """Return the model on a back end, for any parameters and bodies; passes on what a package raises."""
+        # The argument is left out for packages made before there were kernels to choose from.
         chosen: dict[str, Any] = {} if kernel == "auto" else {"kernel": kernel}
         chosen |= {} if bodies is None else {"bodies": bodies}
         with staying():
@@ -75,7 +75,7 @@ def staying() -> Iterator[None]:
 def open_package(directory: Path) -> Package:
     """Read and import the package in `directory`, all files of which must be as generated.
 
-    Raises LinkwiseError for one that cannot be, with the first file or entry of the manifest that differs.
+    Raises LinkwiseError otherwise, with the first file or entry of the manifest that differs.
     """
     manifest = Manifest.read(directory)
     for fault in (*altered_entries(directory), *changed(directory, manifest.files)):
@@ -106,13 +106,15 @@ def load_package(directory: Path, manifest: Manifest) -> Package:
 
 
 def import_package(directory: Path) -> ModuleType:
-    """Import a package from its folder; raises LinkwiseError for a damaged manifest, ImportError for files
-    other than that lists."""
+    """Import a package from its folder.
+
+    Raises LinkwiseError for a damaged manifest, ImportError for files that differ from those that it lists.
+    """
     return import_listed(directory, Manifest.read(directory))
 
 
 class TensorModel:
-    """A model whose back end takes torch tensors, asked with and answering in NumPy arrays."""
+    """A model whose back end takes torch tensors, with NumPy arrays in and out."""
 
     def __init__(self, dynamics: Any) -> None:
         self._dynamics = dynamics

@@ -1,4 +1,4 @@
-"""`manifest.json` of a generated package: what it is of, from what it was made, and how to make it again."""
+"""`manifest.json` of a generated package: its robot, what it was made from, and how to make it again."""
 
 import hashlib
 import json
@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from linkwise_runtime.rule.joint_tree import TreeCoupling, TreeFrame, TreeTie
+
 from linkwise.errors import LinkwiseError
 from linkwise.output import sweep
 from linkwise.package.checked_tree import check_curve, check_tree
@@ -16,37 +18,35 @@ from linkwise.package.decode import decoded, parsed, require
 from linkwise.package.entries import (
     BodyEntry,
     CodeSize,
-    CouplingEntry,
     EnergyEntry,
     FileJointEntry,
     FollowerEntry,
-    FrameEntry,
     JointEntry,
     KernelKind,
     LinkEntry,
     PassiveEntry,
     RigidTree,
     RuntimeEntry,
-    TieEntry,
 )
 
-SCHEMA = 13
+SCHEMA = 14
 LARGEST = 1 << 28
-"""Bytes of a manifest, or of any file of a package; of a robot of 1000 joints a manifest takes some 2 MB."""
+"""Most bytes of a manifest, or of any file of a package; a manifest of a robot of 1000 joints takes some 2
+MB."""
 __all__ = [
     "FILE",
     "BodyEntry",
     "CodeSize",
-    "CouplingEntry",
     "EnergyEntry",
-    "FrameEntry",
     "JointEntry",
     "LinkEntry",
     "Manifest",
     "PassiveEntry",
     "RigidTree",
     "RuntimeEntry",
-    "TieEntry",
+    "TreeCoupling",
+    "TreeFrame",
+    "TreeTie",
     "altered_entries",
     "is_inside",
     "is_too_large",
@@ -57,7 +57,7 @@ UNITS = {"angle": "rad", "length": "m", "mass": "kg", "time": "s", "torque": "N 
 CONVENTIONS = {
     "decomposition": "tau_ij = sum_k c2_ijk qdd_k + sum_k c1_ijk qd_k + g_ij: joint i, link j, coordinate k",
     "velocity": "closing: c1 = 1/2 d(tau)/d(qd) of the part quadratic in the velocities",
-    "indices": "in this file they count from 0; parent, and body of a frame, is an index of tree.bodies, "
+    "indices": "in this file they count from 0; parent, and joint of a frame, is an index of tree.bodies, "
     "None for the ground; first and second of a tie are of tree.frames, those of couplings' terms and "
     "independent of joints",
     "limits": "of joints: lower and upper of the position, velocity and effort either way, as the robot's "
@@ -70,10 +70,10 @@ CONVENTIONS = {
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a package is of: a `tree` of rigid bodies, or `energies` that a user wrote, link by link.
+    """Contents of a package: a `tree` of rigid bodies, or `energies` that a user wrote, link by link.
 
-    request: the options of `generate`; kernel: which kind its C is
-    followers: joints of the robot's file that are none here: they follow others, or are held
+    request: the options of `generate`; kernel: the kind of its C
+    followers: joints of the robot's file that are none here: they follow others, or are fixed
     file_joints: the file's joints that move, where some are several here, or Pinocchio has another order
     in_radians: joints and followers that logs have in radians, also where others are in degrees
     files: the SHA-256 of every other file, by its path in the package
@@ -132,14 +132,17 @@ class Manifest:
             raise ValueError("energies is not of the links, one for each, in their order")
 
     def text(self) -> str:
-        """JSON, one entry of a list a line; `checksums` tell which entry was changed by hand."""
+        """Return the manifest as JSON, one entry of a list per line.
+
+        Its `checksums` show which entry was changed by hand.
+        """
         data = {"schema": SCHEMA, **asdict(self), "units": UNITS, "conventions": CONVENTIONS}
         data["checksums"] = {key: _checksum(value) for key, value in data.items() if key != "files"}
         return "{\n" + ",\n".join(f' "{key}": {_lines(value)}' for key, value in data.items()) + "\n}\n"
 
     @classmethod
     def read(cls, directory: Path) -> "Manifest":
-        """Manifest of the package in `directory`; raises LinkwiseError for none, or for a damaged one."""
+        """Return the manifest of the package in `directory`; raises LinkwiseError if missing or damaged."""
         path = directory / FILE
         data = _read(path)
         schema = data.get("schema")
@@ -165,7 +168,7 @@ def _check_file_joints(entries: Sequence[FileJointEntry], count: int) -> None:
 
 
 def altered_entries(directory: Path) -> list[str]:
-    """What is wrong with the entries that no file of a package tells, each in words; empty if nothing.
+    """Return faults of the entries that no file of a package determines, each in words; empty if none.
 
     Raises LinkwiseError where the manifest cannot be read.
     """
@@ -181,18 +184,21 @@ def altered_entries(directory: Path) -> list[str]:
 
 
 def is_too_large(file: Path) -> bool:
-    """Whether a file is larger than any of a package is: nobody reads it to its end. Raises OSError."""
+    """Return whether a file is larger than any of a package is: nobody reads it to its end.
+
+    Raises OSError.
+    """
     return file.stat().st_size > LARGEST
 
 
 def is_inside(path: str) -> bool:
-    """Whether a path, of / and names, stays in the folder that it is relative to."""
+    """Return whether a path, of / and names, stays in the folder that it is relative to."""
     parts = path.split("/")
     return path.isprintable() and "\\" not in path and not {"", ".", ".."}.intersection(parts)
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Return the JSON object of a manifest; raises LinkwiseError for none, or what is not JSON."""
+    """Return the JSON object of a manifest; raises LinkwiseError if there is none, or it is not JSON."""
     if not path.is_file():
         sweep(path.parent.absolute().parent)  # a writer may have died while it took the package away
     if not path.is_file():
@@ -214,12 +220,12 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _checksum(value: Any) -> str:
-    """Hash of an entry, however its JSON is laid out."""
+    """Return the hash of an entry, however its JSON is laid out."""
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
 def _lines(value: Any) -> str:
-    """JSON of one entry; the items of a list or an object that holds some stand on lines of their own."""
+    """Return the JSON of one entry; the items of a list or object that is not empty have their own lines."""
     if isinstance(value, Mapping) and value:
         return "{\n" + ",\n".join(f"  {json.dumps(k)}: {_items(v)}" for k, v in value.items()) + "\n }"
     return _items(value)

@@ -1,20 +1,20 @@
-"""The files that packages have alike: copies of the runtime, and headers that serve every robot."""
+"""Files that all packages share: copies of the runtime, and headers that serve every robot."""
 
 from functools import cache
 from importlib.resources import files
 
 FOLDERS = ("linkwise_runtime/", "c/linkwise/")
-"""Where in a package they are."""
+"""Folders of these files in a package."""
 
 
 def own_folder(path: str) -> str | None:
-    """Which of these folders a path is in; None for a file of the robot's."""
+    """Return which of these folders a path is in; None for a file of the robot's."""
     return next((folder for folder in FOLDERS if path.startswith(folder)), None)
 
 
 @cache
 def own_text(path: str) -> bytes | None:
-    """The file of linkwise that a package has a copy of at this path; None where that is no copy."""
+    """Return the file of linkwise that a package has a copy of at this path; None if that is no copy."""
     start = own_folder(path)
     if start is None:
         return None

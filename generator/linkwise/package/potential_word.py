@@ -1,9 +1,9 @@
-"""What people read the shares g_ij as: the one place that says it, for figures, pages, reports and C."""
+"""The common word for the shares g_ij, in one place for figures, pages, reports and C."""
 
 
 def potential_word(is_rigid: bool) -> str:
-    """Of rigid links gravity; of energies that a user wrote whatever their potentials are, springs too.
+    """Return the word for g_ij: gravity of rigid links, else potential energy, which may include springs.
 
-    What joints of rigid robots have of their own, springs among it, stands beside g_ij.
+    Passive torques of the joints of rigid robots, springs among them, stand beside g_ij.
     """
     return "gravity" if is_rigid else "potential energy"

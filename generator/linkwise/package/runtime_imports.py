@@ -1,4 +1,4 @@
-"""Where a package's files import the runtime from: the library, or a copy that the package carries."""
+"""Imports of the runtime in a package's files: from the library, or from a copy that the package carries."""
 
 import re
 
@@ -8,12 +8,12 @@ OF_COPY = re.compile(rf"^( *)from \.+{RUNTIME}\.", re.MULTILINE)
 
 
 def is_copied(path: str) -> bool:
-    """Whether a file of a package is one of its copy of the runtime."""
+    """Return whether a file of a package is one of its copy of the runtime."""
     return path.startswith(f"{RUNTIME}/")
 
 
 def of_copy(path: str, text: str) -> str:
-    """A package's file, importing the package's own copy."""
+    """Return a package's file with imports from the package's own copy."""
     if not path.endswith(".py") or is_copied(path):
         return text
     dots = "." * (path.count("/") + 1)
@@ -21,5 +21,5 @@ def of_copy(path: str, text: str) -> str:
 
 
 def of_library(path: str, text: str) -> str:
-    """The same file, importing the library."""
+    """Return a package's file with imports from the library."""
     return text if is_copied(path) else OF_COPY.sub(rf"\1from {RUNTIME}.", text)

@@ -1,6 +1,6 @@
-"""Writing a package: all of it or nothing, over an earlier package of the same robot only.
+"""Writing of a package: all of it or nothing, over an earlier package of the same robot only.
 
-Build tools compare times: a file that says what it said keeps its time, and a package of which nothing
+Build tools compare times: a file whose content is unchanged keeps its time, and a package of which nothing
 differs is not touched.
 """
 
@@ -21,9 +21,9 @@ from linkwise.package.manifest import FILE, is_too_large
 def check_target(directory: Path, robot: str | None) -> None:
     """Raise LinkwiseError unless a package of the robot named `robot` may be written to `directory`.
 
-    That is so where nothing is, and where an earlier package of the same robot is and nothing else, of any
-    robot if None is given; in no case inside another package. Empty folders, which build tools make for what
-    is to come, are nothing.
+    It may where nothing is, and where an earlier package of the same robot is and nothing else, of any robot
+    if None is given; in no case inside another package. Empty folders, which build tools make for what is to
+    come, count as nothing.
     """
     refuse_inside_package(directory.parent)
     if not os.path.lexists(directory):
@@ -56,7 +56,7 @@ def check_target(directory: Path, robot: str | None) -> None:
 
 
 def refuse_inside_package(place: Path) -> None:
-    """Raise LinkwiseError for a generated package, or a place inside one: what is written there spoils it."""
+    """Raise LinkwiseError for a generated package, or a place inside one, which writing there would spoil."""
     here = Path(os.path.realpath(place))
     for parent in (here, *here.parents):
         if earlier_package(parent):
@@ -66,7 +66,7 @@ def refuse_inside_package(place: Path) -> None:
 
 
 def earlier_package(directory: Path) -> dict[str, Any]:
-    """What the manifest of a generated package of any version says, or an empty dictionary."""
+    """Return the manifest's content of a generated package of any version, or an empty dictionary."""
     path = directory / FILE
     try:
         is_one = path.is_file() and not is_too_large(path)
@@ -81,7 +81,7 @@ def earlier_package(directory: Path) -> dict[str, Any]:
 
 
 def differences(files: Mapping[str, str], directory: Path) -> dict[str, str]:
-    """How a package in `directory` differs from `files`, by path, in words; empty if it is the same."""
+    """Return how a package in `directory` differs from `files`, by path, in words; empty if not at all."""
     wanted = {path: hashlib.sha256(text.encode()).hexdigest() for path, text in files.items()}
     found = {
         path: fault.replace("was changed", "differs") for path, fault in faults(directory, wanted).items()
@@ -94,8 +94,8 @@ def differences(files: Mapping[str, str], directory: Path) -> dict[str, str]:
 def write_package(files: Mapping[str, str], directory: str | Path, replace: bool = False) -> bool:
     """Write files below `directory`, replacing an earlier package there, which a failure leaves as it was.
 
-    With `replace` that may be of another robot. Returns whether anything differed. Raises LinkwiseError when
-    the place is not writable or holds something else, see `check_target`.
+    With `replace` that package may be of another robot. Returns whether anything differed. Raises
+    LinkwiseError when the place is not writable or holds something else, see `check_target`.
     """
     directory = Path(directory)
     robot = None if replace else json.loads(files[FILE])["robot"]

@@ -1,7 +1,8 @@
 """Term counts, operation counts and the cost-reduction curve.
 
-A report is counted (`terms_report`, `study`, `measure`), then told: as JSON values (`terms_json`, …), as a
-page (`terms_markdown`, …), or as all files that go into a directory (`terms_files`, `study_files`).
+A report is first counted (`terms_report`, `study`, `measure`), then written: as JSON values (`terms_json`,
+…), as a page (`terms_markdown`, …), or as all files that go into a directory (`terms_files`,
+`study_files`).
 """
 
 from linkwise.report.curve_fit import CountPolynomial, Saturation, count_polynomial, fit, held_against

@@ -1,4 +1,4 @@
-"""What lies behind counted points: the paper's exponential, fitted, and an exact polynomial."""
+"""Curves through counted points: the paper's exponential, fitted, and an exact polynomial."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from linkwise.extras import extra
 PAPER_A, PAPER_RATE = 0.95, 0.44
 """A and λ that the paper reports for n = 1..10."""
 CHECKED_AT_LEAST = 2
-"""Counts beyond the fitted ones without which no polynomial is claimed."""
+"""Least number of counts beyond the fitted ones for which a polynomial is claimed."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Saturation:
 
     @property
     def is_share(self) -> bool:
-        """Whether it ends at a share, as a saving must."""
+        """True if the limit is a share, at most 1, as a saving must be."""
         return self.a <= 1.0
 
     @property
@@ -38,7 +38,7 @@ class Saturation:
         return max(map(abs, self.residuals))
 
     def __call__(self, n: float) -> float:
-        """y(n)."""
+        """Return y(n)."""
         return _saturating(self.a, self.rate, n)
 
 
@@ -48,7 +48,7 @@ def held_against(a: float, rate: float, dof: Sequence[int], y: Sequence[float]) 
 
 
 def fit(dof: Sequence[int], y: Sequence[float]) -> Saturation | None:
-    """Least-squares fit of A and λ; None for fewer than three points, which it would meet."""
+    """Return the least-squares fit of A and λ; None for fewer than three points, which it would meet."""
     if len(dof) < 3:
         return None
     solution = extra("scipy.optimize").least_squares(
@@ -70,7 +70,7 @@ def _saturating(a: float, rate: float, n: float) -> float:
 class CountPolynomial:
     """count(n) = Σ_d coefficients[d] · C(n − 1, d) for n = 1, 2, …
 
-    fitted: it follows from the counts at 1..fitted      checked: it also gives those up to here
+    fitted: the counts at 1..fitted determine it      checked: it also gives the counts up to here
     """
 
     coefficients: tuple[int, ...]
@@ -88,7 +88,7 @@ class CountPolynomial:
         return Fraction(self.coefficients[-1], math.factorial(self.degree))
 
     def __call__(self, n: int) -> int:
-        """count(n)."""
+        """Return count(n)."""
         return sum(c * math.comb(n - 1, d) for d, c in enumerate(self.coefficients))
 
     def __str__(self) -> str:

@@ -1,9 +1,10 @@
-"""Measured time of deriving an arm with one link more: the whole Lagrangian anew, or that link's alone.
+"""Measured time of deriving an arm with one more link: the whole Lagrangian anew, or only that link's.
 
     D_i = Σ_s (q̇_s ∂²/∂q̇_i∂q_s + q̈_s ∂²/∂q̇_i∂q̇_s) − ∂/∂q_i,      L = Σ_j L_j
 
-SymPy derives D_i L, or D_i L_n of the last link n alone, for all joints i, and expands it: only then do terms
-tell which motion they contain. Each derivation has a process of its own, which is ended at its limit of time.
+SymPy derives D_i L, or D_i L_n of the last link n alone, for all joints i, and expands it: only expanded
+terms show which motion they contain. Each derivation runs in a process of its own, which is ended at its
+time limit.
 """
 
 import multiprocessing
@@ -22,9 +23,9 @@ from linkwise.robot import Coordinate
 from linkwise.symbolic.system import EnergySystem, System
 
 LIMIT = 20.0
-"""s for one derivation by SymPy."""
+"""Time limit in s for one derivation by SymPy."""
 BUDGET = 10_000
-"""Terms of a component of a velocity: SymPy would not derive in time what has more."""
+"""Most terms of a velocity component: SymPy could not derive larger ones in time."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,10 @@ class DerivationTime:
 def measure_derivations(
     system: System, dof: Sequence[int], progress: Progress, limit: float = LIMIT
 ) -> tuple[DerivationTime, ...]:
-    """Time a serial arm for each n of `dof`, ascending; SymPy stops at the first n beyond the limit."""
+    """Return the times of a serial arm for each n of `dof`, ascending.
+
+    SymPy stops at the first n beyond the limit.
+    """
     lagrangians = _lagrangians(system, dof[-1])
     whole: float | None = 0.0
     link: float | None = 0.0
@@ -64,7 +68,7 @@ def measure_derivations(
 
 
 def _lagrangians(system: System, links: int) -> list[sp.Expr]:
-    """L_j of the first links, of rigid ones as in textbooks: by velocities in the world's axes."""
+    """Return L_j of the first links; of rigid links as in textbooks, by velocities in the world's axes."""
     if isinstance(system, EnergySystem):
         return [link.kinetic - link.potential for link in system.links[:links]]
     arm = expanded_arm(system, links, BUDGET)
@@ -82,14 +86,14 @@ def _lagrangians(system: System, links: int) -> list[sp.Expr]:
 
 
 def _bounded(lagrangian: sp.Expr, moving: Sequence[Coordinate], limit: float) -> float | None:
-    """Seconds that SymPy takes in a process of its own, None where it is not done within the limit."""
+    """Return the seconds that SymPy takes in a separate process; None where it exceeds the limit."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
     process = context.Process(target=_derive, args=(lagrangian, tuple(moving), there), daemon=True)
     process.start()
     there.close()
     try:
-        here.recv()  # it is up: importing SymPy is not counted
+        here.recv()  # the process is ready: importing SymPy is not counted
         return float(here.recv()) if here.poll(limit) else None
     finally:
         process.kill()
@@ -97,7 +101,7 @@ def _bounded(lagrangian: sp.Expr, moving: Sequence[Coordinate], limit: float) ->
 
 
 def _derive(lagrangian: sp.Expr, moving: Sequence[Coordinate], answer: Connection) -> None:
-    """Send a word when ready, then the seconds that all D_i L took."""
+    """Send a message when ready, then the seconds that all D_i L took."""
     answer.send("ready")
     started = time.process_time()
     for joint in moving:
@@ -106,7 +110,7 @@ def _derive(lagrangian: sp.Expr, moving: Sequence[Coordinate], answer: Connectio
 
 
 def _torque(lagrangian: sp.Expr, joint: Coordinate, moving: Sequence[Coordinate]) -> sp.Expr:
-    """D_i L."""
+    """Return D_i L."""
     momentum = sp.diff(lagrangian, joint.qd)
     rates = (sp.diff(momentum, c.q) * c.qd + sp.diff(momentum, c.qd) * c.qdd for c in moving)
     return sp.Add(*rates) - sp.diff(lagrangian, joint.q)

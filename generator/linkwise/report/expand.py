@@ -1,8 +1,8 @@
-"""From a link's symbolic energy to a fully expanded polynomial.
+"""Expansion of a link's symbolic energy to a polynomial.
 
-Digits of a monomial: the power of i, then z_k, u̇_k and ü_k of the n coordinates, then parameters
-(and u_k itself, for slides and springs) as they turn up. Here u_k = q_k/d_k and z_k = exp(i u_k); d_k is 1
-unless a gear turns a link by a fraction of q_k, which is a whole multiple of u_k.
+Digits of a monomial: the power of i, then z_k, u̇_k and ü_k of the n coordinates, then parameters (and u_k
+itself, for prismatic joints and springs) in the order in which they occur. Here u_k = q_k/d_k and
+z_k = exp(i u_k); d_k is 1 unless a gear turns a link by a fraction of q_k, which is a whole multiple of u_k.
 """
 
 import math
@@ -27,11 +27,11 @@ from linkwise.robot import Coordinate
 from linkwise.symbolic.link_energy import Definition
 
 ROUNDING = 1e-9
-"""Where a fixed angle is not a right angle, smaller shares of the largest coefficient are rounding."""
+"""Part of the largest coefficient, below which others are rounding, where a fixed angle is no right angle."""
 
 
 class Variables:
-    """Which digit of a monomial belongs to which variable; `units` are the d_k."""
+    """Digits of a monomial by variable; `units` are the d_k."""
 
     def __init__(self, units: Sequence[int]) -> None:
         self.units = tuple(units)
@@ -39,28 +39,28 @@ class Variables:
         self._other: dict[sp.Symbol, int] = {}
 
     def z(self, k: int) -> int:
-        """Monomial z_k."""
+        """Return the monomial z_k."""
         return at_digit(1 + k)
 
     def qd(self, k: int) -> int:
-        """Monomial u̇_k."""
+        """Return the monomial u̇_k."""
         return at_digit(1 + self.n + k)
 
     def qdd(self, k: int) -> int:
-        """Monomial ü_k."""
+        """Return the monomial ü_k."""
         return at_digit(1 + 2 * self.n + k)
 
     def other(self, symbol: sp.Symbol) -> int:
-        """Monomial of a parameter or a bare coordinate; a new one gets the next digit."""
+        """Return the monomial of a parameter or a bare coordinate; a new one gets the next digit."""
         return at_digit(self._other.setdefault(symbol, 1 + 3 * self.n + len(self._other)))
 
     def digit_of(self, symbol: sp.Symbol) -> int | None:
-        """Digit of a parameter or bare coordinate, None if it never turned up."""
+        """Return the digit of a parameter or bare coordinate; None if it never occurred."""
         return self._other.get(symbol)
 
     @property
     def others(self) -> tuple[sp.Symbol, ...]:
-        """Symbols of the digits behind the ü, in order."""
+        """Symbols of the digits after the ü, in order."""
         return tuple(self._other)
 
     @property
@@ -89,7 +89,7 @@ class Expansion:
             self._known[symbol] = self(expr).pruned(self.rounding)
 
     def __call__(self, expr: sp.Expr) -> Laurent:
-        """Expand `expr`; raises LinkwiseError for what no polynomial can express."""
+        """Return `expr` expanded; raise LinkwiseError for what no polynomial can express."""
         known = self._known.get(expr)
         if known is not None:
             return known
@@ -114,7 +114,7 @@ class Expansion:
         )
 
     def _product(self, factors: list[Laurent]) -> Laurent:
-        # Long factors first: their product merges, and the short ones then cost one pass each.
+        # Long factors first: like terms of their product merge, and the short ones then cost one pass each.
         factors.sort(key=len, reverse=True)
         result = factors[0]
         for factor in factors[1:]:
@@ -131,7 +131,7 @@ class Expansion:
         return power(base, int(exponent), self.budget)
 
     def _wave(self, expr: sp.Expr) -> Laurent:
-        """Sine or cosine of a whole combination of the u_k: (z^a ± z^−a)/2, the sine over i."""
+        """Return sine or cosine of a whole combination of the u_k: (z^a ± z^−a)/2, the sine over i."""
         key, phase = 0, 0.0
         bound = 0
         for term in sp.Add.make_args(sp.expand(expr.args[0])):
@@ -162,7 +162,7 @@ class Expansion:
 
 
 def angle_units(coordinates: Sequence[Coordinate], energies: Iterable[sp.Expr]) -> tuple[int, ...]:
-    """d_k: the least whole numbers for which all sines and cosines are of whole multiples of q_k/d_k."""
+    """Return d_k: the least whole numbers for which all sines and cosines are of multiples of q_k/d_k."""
     units = {c.q: 1 for c in coordinates}
     for energy in energies:
         for wave in energy.atoms(sp.sin, sp.cos):
@@ -174,7 +174,7 @@ def angle_units(coordinates: Sequence[Coordinate], energies: Iterable[sp.Expr]) 
 
 
 def exact(number: sp.Expr) -> Fraction:
-    """Return the number as a fraction; a float is taken for the decimal that it prints as."""
+    """Return the number as a fraction; a float stands for the decimal that it prints as."""
     if number.is_Rational:
         return Fraction(int(number.p), int(number.q))
     return Fraction(repr(float(number)))

@@ -1,4 +1,4 @@
-"""A serial arm's links, expanded: centres of mass in the world's axes, angular velocities in their own.
+"""A serial arm's links, expanded: centres of mass in the world's axes, angular velocities in the links' own.
 
 p_j = p_j−1 + R_j−1 t_j      R_j = R_j−1 E_j Rz(q_j)      r_j = p_j + R_j c_j      ω_j = R_jᵀ Σ_k z_k q̇_k
 """
@@ -34,7 +34,7 @@ class ExpandedArm:
 
 @dataclass(frozen=True)
 class ExpandedBody:
-    """A link: where its centre of mass is and how it turns, and what it carries; in m, rad/s, kg, kg·m²."""
+    """A link: its centre of mass, angular velocity, mass and inertia, in m, rad/s, kg, kg·m²."""
 
     place: Vector
     turning: Vector
@@ -43,7 +43,7 @@ class ExpandedBody:
 
 
 def expanded_arm(system: RigidSystem, links: int, budget: int) -> ExpandedArm:
-    """Expand the first `links` links of a serial arm, or those that the budget of terms suffices for."""
+    """Expand the first `links` links of a serial arm, or as many as the budget of terms allows."""
     turns = [joint for joint in system.links[links - 1].joints if joint.kind == "revolute"]
     waves = [sp.cos(exact((j.ratio, 0, 0))[0] * system.coordinates[j.coordinate].q) for j in turns]
     rounding = 0.0 if is_exact(system, link_energies(system)) else ROUNDING
@@ -53,7 +53,7 @@ def expanded_arm(system: RigidSystem, links: int, budget: int) -> ExpandedArm:
 
 
 def affordable(found: Iterator[Item]) -> Iterator[Item]:
-    """What comes before a budget of terms is exceeded."""
+    """Yield the items that come before a budget of terms is exceeded."""
     with suppress(BudgetExceededError):
         yield from found
 
@@ -81,7 +81,7 @@ def _moved(
     origin: Vector,
     spin: Vector,
 ) -> tuple[Columns, Vector, Vector]:
-    """Axes, origin and angular velocity behind a joint."""
+    """Return axes, origin and angular velocity behind a joint."""
     ratio = exact((joint.ratio, 0, 0))[0]
     coordinate = coordinates[joint.coordinate]
     angle, rate = ratio * coordinate.q, expansion(ratio * coordinate.qd)
@@ -103,7 +103,7 @@ def _moved(
 
 
 def _combined(expansion: Expansion, columns: Columns, weights: Vector) -> Vector:
-    """A matrix, by columns, times a vector."""
+    """Return a matrix, given by columns, times a vector."""
     parts = [_scaled(expansion, column, weight) for column, weight in zip(columns, weights, strict=True)]
     return _sum(*parts)
 

@@ -1,7 +1,7 @@
 """Fully expanded partial torques, one link at a time within a budget of terms.
 
     τ_ij = d/dt ∂L_j/∂q̇_i − ∂L_j/∂q_i,   d/dt p = Σ_s ∂p/∂q_s q̇_s + ∂p/∂q̇_s q̈_s
-On an expanded polynomial each derivative is one pass over the terms: ∂/∂q of exp(i e q) brings down
+On an expanded polynomial each derivative is one pass over the terms: ∂/∂q of exp(i e q) gives a factor
 i e. A digit is a byte, so the exponents of a term are the bytes of its key.
 """
 
@@ -33,12 +33,12 @@ FORM = (
     "fully expanded; every product of sines and cosines written as one sine or cosine of an "
     "angle sum; like terms collected"
 )
-"""The canonical form that every count is taken in."""
+"""Canonical form in which all terms are counted."""
 
 
 @dataclass(frozen=True)
 class LinkTorques:
-    """τ_ij of link j for the joints asked for; those off path(j) are missing: their torque is 0.
+    """τ_ij of link j for the requested joints; joints that are not on path(j) are missing: their torque is 0.
 
     torques: d_i τ_ij by joint i, in the u_k = q_k/d_k of `variables`; the d are 1 but for geared joints
     """
@@ -55,7 +55,10 @@ def link_torques(
     progress: Progress,
     links: int | None = None,
 ) -> Iterator[LinkTorques]:
-    """Expand the first `links` links (None: all); raises BudgetExceededError at one too large."""
+    """Yield the torques of the first `links` links (None: all), expanded.
+
+    Raises BudgetExceededError at a link that is too large.
+    """
     energies = link_energies(system)
     rounding = 0.0 if is_exact(system, energies) else ROUNDING
     units = angle_units(system.coordinates, (expr for energy in energies for expr in _expressions(energy)))
@@ -79,7 +82,7 @@ def link_torques(
 def _torques(
     expansion: Expansion, link: StepwiseEnergy, joints: tuple[int, ...], path: tuple[int, ...]
 ) -> dict[int, Laurent]:
-    """Torques of a link on those of the joints that move it, by joint."""
+    """Return the torques of a link on those of the joints that move it, by joint."""
     chosen = [i for i in path if i in joints]
     if not chosen:
         return {}
@@ -95,7 +98,10 @@ def _expressions(energy: StepwiseEnergy) -> Iterator[sp.Expr]:
 
 
 def is_exact(system: System, energies: Iterable[StepwiseEnergy]) -> bool:
-    """Whether no coefficient is rounded: rotations of 0 and ±1, no angle offsets, no irrational number."""
+    """Return whether no coefficient is rounded.
+
+    These are exact: rotations of 0 and ±1, no angle offsets, no irrational number.
+    """
     links = system.robot.links if isinstance(system, RigidSystem) else ()
     straight = all(e in (-1.0, 0.0, 1.0) for link in links for row in link.joint.rotation for e in row)
     return straight and all(_is_rational(e.kinetic) and _is_rational(e.potential) for e in energies)
@@ -108,14 +114,14 @@ def _is_rational(energy: sp.Expr) -> bool:
 
 
 def form_of(system: System) -> str:
-    """Name the canonical form that the counts of `system` are taken in."""
+    """Return the canonical form in which the terms of `system` are counted, in words."""
     exact = is_exact(system, link_energies(system))
     rounded = f"fixed angles as decimals, coefficients below {ROUNDING:g} of the largest dropped"
     return f"{FORM}; {'coefficients exact' if exact else rounded}"
 
 
 class Differentiation:
-    """Derivatives by the coordinates of one expansion, of every polynomial expanded so far."""
+    """Derivatives by the coordinates of one expansion, for every polynomial expanded so far."""
 
     def __init__(self, coordinates: tuple[Coordinate, ...], variables: Variables) -> None:
         self._x, self._n = variables, len(coordinates)
@@ -123,7 +129,7 @@ class Differentiation:
         self._bare = [variables.digit_of(c.q) for c in coordinates]
 
     def torque(self, lagrangian: Laurent, i: int, path: tuple[int, ...]) -> Laurent:
-        """τ_ij from link j's expanded Lagrangian, with path(j) the coordinates that move it."""
+        """Return τ_ij from link j's expanded Lagrangian, with path(j) the coordinates that move it."""
         momentum = self._by_velocity(lagrangian, i)
         force = self._along(lagrangian, ((i, 0, None),))
         motion = tuple((s, self._x.qd(s), self._x.qdd(s)) for s in path)
@@ -131,13 +137,13 @@ class Differentiation:
         return bounded(add([rate, force.scaled(-1)]).reduced())
 
     def _exponents(self, p: Laurent) -> Iterator[tuple[int, int, bytes]]:
-        """Terms as key, coefficient and exponents, each of which is ZERO_BYTE too high."""
+        """Yield terms as key, coefficient and exponents, each of which is ZERO_BYTE too high."""
         offset, digits = lifted(self._digits), self._digits
         for key, c in p.terms.items():
             yield key, c, (key + offset).to_bytes(digits, "little")
 
     def _by_velocity(self, p: Laurent, k: int) -> Laurent:
-        """∂p/∂q̇_k."""
+        """Return ∂p/∂q̇_k."""
         at, one = 1 + self._n + k, self._x.qd(k)
         terms = {
             key - one: (powers[at] - ZERO_BYTE) * c
@@ -147,7 +153,10 @@ class Differentiation:
         return Laurent(terms, p.denominator, p.bound + 1)
 
     def _along(self, p: Laurent, motion: tuple[tuple[int, int, int | None], ...]) -> Laurent:
-        """Σ ∂p/∂q_s · rate + ∂p/∂q̇_s · acceleration over (s, rate, acceleration), monomials; None is 0."""
+        """Return Σ ∂p/∂q_s · rate + ∂p/∂q̇_s · acceleration.
+
+        The sum is over (s, rate, acceleration) of `motion`, with rate and acceleration monomials; None is 0.
+        """
         n = self._n
         places = [
             (1 + s, 1 + n + s, self._bare[s], rate, None if acc is None else acc - self._x.qd(s))

@@ -2,7 +2,7 @@
 
 A trigonometric sum is a Laurent polynomial in z_k = exp(i q_k): cos q = (z + 1/z)/2 and
 sin q = (z − 1/z)/2i. In it every product of sines and cosines is already one sine or cosine of an
-angle sum, and like terms meet by themselves. A monomial is one integer whose digits are the
+angle sum, and like terms combine without further steps. A monomial is one integer whose digits are the
 exponents, so that multiplying monomials is adding integers. Digits are balanced (−128..127); the
 lowest one is the power of i, kept at 0 or 1 by i² = −1.
 """
@@ -22,18 +22,18 @@ I_SQUARED = 2
 
 
 class BudgetExceededError(Exception):
-    """A polynomial grew beyond the terms it was allowed."""
+    """A polynomial has more terms than its budget allows."""
 
 
 class ExponentError(Exception):
-    """A power too high for its digit."""
+    """A power is too high for its digit."""
 
 
 @dataclass(frozen=True)
 class Laurent:
     """Σ coefficient · monomial, over one common denominator.
 
-    terms: packed exponents to a whole numerator, never zero
+    terms: numerators, whole and never zero, by packed exponents
     bound: no exponent exceeds it in size
     """
 
@@ -48,7 +48,7 @@ class Laurent:
         return len(self.terms)
 
     def scaled(self, factor: Fraction | int) -> "Laurent":
-        """factor · self."""
+        """Return factor · self."""
         if not factor:
             return ZERO
         top, below = Fraction(factor).as_integer_ratio()
@@ -56,7 +56,7 @@ class Laurent:
         return Laurent(terms, self.denominator * below, self.bound)
 
     def reduced(self) -> "Laurent":
-        """Return the same polynomial in lowest terms; keeps numerators short."""
+        """Return the polynomial in lowest terms, which keeps numerators short."""
         common = math.gcd(self.denominator, *self.terms.values())
         if common == 1:
             return self
@@ -64,10 +64,10 @@ class Laurent:
         return Laurent(terms, self.denominator // common, self.bound)
 
     def pruned(self, relative: float) -> "Laurent":
-        """Drop coefficients below `relative` times the largest, which rounding leaves behind."""
+        """Return the polynomial without coefficients below `relative` times the largest, left by rounding."""
         if not relative or not self.terms:
             return self
-        top, below = Fraction(relative).as_integer_ratio()  # numerators may be beyond any float
+        top, below = Fraction(relative).as_integer_ratio()  # numerators may be too large for a float
         least = top * max(map(abs, self.terms.values())) // below
         terms = {key: c for key, c in self.terms.items() if abs(c) > least}
         return Laurent(terms, self.denominator, self.bound)
@@ -83,7 +83,7 @@ def constant(value: Fraction | int) -> Laurent:
 
 
 def add(parts: Iterable[Laurent]) -> Laurent:
-    """Sum of polynomials."""
+    """Return the sum of polynomials."""
     summands = [part for part in parts if part]
     if len(summands) < 2:
         return summands[0] if summands else ZERO
@@ -102,7 +102,7 @@ def add(parts: Iterable[Laurent]) -> Laurent:
 
 
 def multiply(a: Laurent, b: Laurent, budget: int) -> Laurent:
-    """Return a · b; raises BudgetExceededError once the product has more than `budget` terms."""
+    """Return a · b; raise BudgetExceededError once the product has more than `budget` terms."""
     if len(a) > len(b):
         a, b = b, a
     square = a is b
@@ -149,7 +149,7 @@ def power(base: Laurent, exponent: int, budget: int) -> Laurent:
 
 
 def bounded(p: Laurent) -> Laurent:
-    """Return `p` with a bound within LIMIT; raises ExponentError if an exponent exceeds that."""
+    """Return `p` with a bound within LIMIT; raise ExponentError if an exponent exceeds that."""
     if p.bound <= LIMIT:
         return p
     digits = max(key.bit_length() for key in p.terms) // DIGIT + 2
@@ -162,13 +162,13 @@ def bounded(p: Laurent) -> Laurent:
 
 
 def exponents(key: int, digits: int) -> list[int]:
-    """Unpack the lowest `digits` exponents of a monomial, the power of i first."""
+    """Return the lowest `digits` exponents of a monomial, the power of i first."""
     raised = (key + lifted(digits)) & ((1 << (DIGIT * digits)) - 1)
     return [byte - ZERO_BYTE for byte in raised.to_bytes(digits, "little")]
 
 
 def lifted(digits: int) -> int:
-    """Return what makes every one of `digits` balanced digits non-negative when added to a key."""
+    """Return the number that, added to a key, makes each of its `digits` balanced digits non-negative."""
     return int.from_bytes(bytes([ZERO_BYTE]) * digits, "little")
 
 

@@ -19,7 +19,7 @@ ARITHMETIC = frozenset({"add", "sub", "mul", "div"})
 
 @dataclass(frozen=True)
 class Operations:
-    """Additions, multiplications and divisions, sines and cosines apart.
+    """Numbers of additions, multiplications and divisions, without sines and cosines.
 
     written: with every shared expression written out wherever it is used
     shared: with every shared expression computed once, as emitted
@@ -37,7 +37,7 @@ NO_OPERATIONS = Operations(0, 0)
 
 @dataclass(frozen=True)
 class PartOperations:
-    """One τ_ij and its part: the coefficient alone, and its product with the motion; None is a zero."""
+    """Operations of one τ_ij, and of its part: coefficient alone, and times the motion; None is a zero."""
 
     torque: Operations | None
     coefficient: Operations | None
@@ -54,7 +54,7 @@ class LinkOperations:
 
 
 def link_operations(system: System, joints: tuple[int, ...], query: TermQuery) -> Iterator[LinkOperations]:
-    """Operations of each link's own kernel, link after link."""
+    """Yield the operations of each link's own kernel, link after link."""
     for j in range(len(system.links)):
         kernel = link_kernel(system, j)
         forms = kernel.forms[0]
@@ -74,7 +74,7 @@ def _row(kernel: Kernel, i: int, query: TermQuery) -> PartOperations:
 
 
 def coefficient(kernel: Kernel, i: int, query: TermQuery) -> Node:
-    """Node of the coefficient asked for; zero where its coordinate is off the path."""
+    """Return the node of the requested coefficient; zero where its coordinate is off the path."""
     forms, k = kernel.forms[0], query.coordinate
     if query.order == 0:
         return forms.gravity[i]
@@ -90,7 +90,10 @@ def _cost_of_one(graph: Graph, node: Node) -> Operations | None:
 
 
 def summed(costs: Sequence[LinkOperations], i: int, query: TermQuery) -> tuple[Operations, Operations]:
-    """Cost of τ_i = Σ_j τ_ij and of its part, each link computed by itself; zeros are not added."""
+    """Return the cost of τ_i = Σ_j τ_ij and of its part, with each link computed by itself.
+
+    Zeros are not added.
+    """
     rows = [cost.rows[i] for cost in costs if i in cost.rows]
     torque = _sum([row.torque for row in rows if row.torque])
     parts = [row.part for row in rows if row.part]
@@ -106,7 +109,7 @@ def _sum(terms: Sequence[Operations]) -> Operations:
 
 
 def cost_of(graph: Graph, outputs: list[Node]) -> Operations:
-    """Cost of `outputs`, with and without sharing."""
+    """Return the cost of `outputs`, with and without sharing."""
     cost: dict[Node, int] = {}
     for node in reachable(graph, outputs):
         entry = graph.nodes[node]

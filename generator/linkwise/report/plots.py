@@ -15,9 +15,9 @@ from linkwise.report.torque_terms import TermsReport, TorqueTerms
 STEPS = 200
 """Points of a drawn curve."""
 DARKEST = 0.42
-"""Shade of the largest count, on which dark figures still read well."""
+"""Shade of the largest count, on which dark figures are still legible."""
 DPI, MOST_PIXELS = 200, 60_000
-"""Resolution of a plot, less where its longer side would have more pixels than matplotlib can draw."""
+"""Resolution of a plot, lowered where its longer side would have more pixels than matplotlib can draw."""
 
 
 def _images(name: str, draw: Callable[[Any], None], size: tuple[float, float]) -> dict[str, bytes]:
@@ -30,7 +30,7 @@ def _images(name: str, draw: Callable[[Any], None], size: tuple[float, float]) -
 
 
 def reduction_images(result: Study) -> dict[str, bytes]:
-    """Fig. 15: counted points, the fit and the paper's curve, with what each curve misses below."""
+    """Return Fig. 15: counted points, the fit and the paper's curve, with the residuals of each below."""
     return _images("reduction", lambda figure: _draw_reduction(figure, result), (6.3, 4.9))
 
 
@@ -65,7 +65,7 @@ def _whole_numbers(axes: Any, dof: Sequence[int]) -> None:
 
 @dataclass(frozen=True)
 class SavingsLine:
-    """What the q̈_1 part of τ_1 saves, by degrees of freedom; `kind` is terms, operations or seconds."""
+    """Saving of the q̈_1 part of τ_1, by degrees of freedom; `kind` is terms, operations or seconds."""
 
     kind: str
     label: str
@@ -77,7 +77,7 @@ class SavingsLine:
 
 
 def savings_lines(result: Study, timings: Sequence[Timing] = ()) -> tuple[SavingsLine, ...]:
-    """Lines of the comparison; the measured ones only where there are timings."""
+    """Return the lines of the comparison; measured lines only where there are timings."""
     points, dof = result.points, result.dof
     terms = tuple(p.reduction for p in points)
     written = tuple(p.written_reduction for p in points)
@@ -108,7 +108,7 @@ def savings_lines(result: Study, timings: Sequence[Timing] = ()) -> tuple[Saving
 
 
 def savings_images(name: str, robot: str, lines: Sequence[SavingsLine]) -> dict[str, bytes]:
-    """Draw what is saved in terms, in operations and in seconds, as files called `name`."""
+    """Draw the savings in terms, in operations and in seconds; return the images as files called `name`."""
     return _images(name, lambda figure: draw_savings(figure, robot, lines), (6.3, 4.0))
 
 
@@ -128,7 +128,7 @@ def draw_savings(figure: Any, robot: str, lines: Sequence[SavingsLine]) -> None:
 
 
 def terms_images(report: TermsReport) -> dict[str, bytes]:
-    """Terms of each τ_ij as a table of shades: joints down, links across, kept in brackets."""
+    """Return the terms of each τ_ij as a table of shades: joints down, links across, kept in brackets."""
     rows = len({row.joint for row in report.rows})
     columns = len({row.link for row in report.rows})
     size = max(4.2, 1.2 + 0.95 * columns), max(1.9, 1.2 + 0.62 * rows)
@@ -156,9 +156,9 @@ def _draw_terms(figure: Any, report: TermsReport) -> None:
 
 
 def _draw_cell(axes: Any, x: int, y: int, row: TorqueTerms, shade: float) -> None:
-    """Draw one count on its shade, and below it in brackets what is kept; a sum over links gets a frame."""
+    """Draw one count on its shade, and the kept terms in brackets below; a sum over links gets a frame."""
     edge = INK if row.link is None else "white"
-    # White at shade 0 to a dark blue at 1; its lightness alone tells the number.
+    # White at shade 0 to a dark blue at 1; its lightness alone shows the number.
     blue = 1.0 - shade, 1.0 - 0.8 * shade, 1.0 - 0.45 * shade
     place = (x - 0.46, y - 0.46), 0.92, 0.92
     axes.add_patch(

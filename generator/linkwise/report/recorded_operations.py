@@ -1,8 +1,8 @@
-"""The curve in the paper's own mechanism: operations that autograd takes for τ_1, recorded.
+"""The curve by the paper's own mechanism: operations recorded while autograd computes τ_1.
 
 For the arm of the first n links, recorded from its generated package: all of τ_1 = Σ_j D_1 L_j, against
-(Σ_j ∂²K_j/∂q̇_1²) q̈_1. Operations are those on numbers, equal ones counted once; what hangs on parameters
-alone, as a product of a mass and a length, is not counted, as it is the same at every instant.
+(Σ_j ∂²K_j/∂q̇_1²) q̈_1. Operations are those on numbers, equal ones counted once; operations on parameters
+alone, such as a product of a mass and a length, are not counted, as they are the same at every instant.
 """
 
 import tempfile
@@ -34,13 +34,16 @@ FORM = (
 
 @dataclass(frozen=True)
 class RecordedPair(TermPair):
-    """Operations of the graph of τ_1 and of its q̈_1 part, and `nodes`, those that autograd keeps for both."""
+    """Operations of the graph of τ_1 and of its q̈_1 part; `nodes` are those that autograd keeps for both."""
 
     nodes: TermPair
 
 
 def recorded_operations(system: System, links: int, progress: Progress) -> Iterator[RecordedPair]:
-    """Counts for the first 1, 2, … `links` links of a serial arm; raises LinkwiseError without torch."""
+    """Yield counts for the first 1, 2, … `links` links of a serial arm.
+
+    Raises LinkwiseError without torch.
+    """
     extra("torch")
     derivation = Derivation(system, derive(system), "recorded", {})
     with tempfile.TemporaryDirectory() as folder:
@@ -54,7 +57,10 @@ def recorded_operations(system: System, links: int, progress: Progress) -> Itera
 
 
 def _kept_nodes(robot: Any, links: int) -> TermPair:
-    """Nodes behind p_q · q̇ + p_q̇ · q̈ − ∂L/∂q_1 with p = ∂L/∂q̇_1, and behind Σ_j ∂p/∂q̇_1 q̈_1."""
+    """Return the numbers of nodes behind τ_1 and behind its q̈_1 part.
+
+    τ_1 is p_q · q̇ + p_q̇ · q̈ − ∂L/∂q_1 with p = ∂L/∂q̇_1, and its part Σ_j ∂p/∂q̇_1 q̈_1.
+    """
     torch = extra("torch")
     q, qd, qdd = torch.full((3, robot.n), 0.3, dtype=torch.float64).unbind()
     for motion in (q, qd, qdd):
@@ -71,7 +77,7 @@ def _kept_nodes(robot: Any, links: int) -> TermPair:
 
 
 def _slopes(value: Any, *by: Any) -> Any:
-    """Derivatives that can be differentiated again; zeros where there is nothing to differentiate."""
+    """Return derivatives that can be differentiated again; zeros where there is nothing to differentiate."""
     torch = extra("torch")
     if not value.requires_grad:
         return [torch.zeros_like(motion) for motion in by]
@@ -79,7 +85,7 @@ def _slopes(value: Any, *by: Any) -> Any:
 
 
 def _nodes(value: Any) -> int:
-    """Operations that a value came from, without the leaves."""
+    """Return the number of operations that a value came from, without the leaves."""
     found, waiting = set[Any](), [value.grad_fn]
     while waiting:
         node = waiting.pop()
@@ -90,7 +96,7 @@ def _nodes(value: Any) -> int:
 
 
 def _moving(graph: Any) -> int:
-    """Operations that hang on a motion."""
+    """Return the number of operations that depend on a motion."""
     known = {leaf.key for leaf in graph.leaves if leaf.kind != "parameter"}
     for operation in graph.operations:
         if not known.isdisjoint(operation.operands):

@@ -23,12 +23,12 @@ from linkwise.report.uncombined_terms import uncombined_terms
 from linkwise.symbolic.system import RigidSystem, System
 
 PAPER = TermQuery(joint=0, link=None, coordinate=0, order=2)
-"""The paper's: from τ_1, what contains q̈_1."""
+"""The paper's query: the terms of τ_1 that contain q̈_1."""
 
 
 @dataclass(frozen=True)
 class CurvePoint(TermPair):
-    """The arm of the first `dof` links: Σ_j τ_1j against what its q̈_1 part alone takes."""
+    """The arm of the first `dof` links: cost of Σ_j τ_1j against that of its q̈_1 part alone."""
 
     dof: int
     torque: Operations
@@ -37,28 +37,28 @@ class CurvePoint(TermPair):
 
     @property
     def operations_reduction(self) -> float:
-        """Share of the emitted operations of τ_1 that need no computing."""
+        """Share of the emitted operations of τ_1 that need not be computed."""
         return _saved(self.part.shared, self.torque.shared)
 
     @property
     def written_reduction(self) -> float:
-        """The same with every shared expression written out wherever it is used."""
+        """Share of operations of τ_1 that need not be computed, with shared expressions written out."""
         return _saved(self.part.written, self.torque.written)
 
 
 def _saved(part: int, whole: int) -> float:
-    """1 − part/whole; nothing is saved of a torque that takes no operation."""
+    """Return 1 − part/whole; 0 for a torque that takes no operation."""
     return 1.0 - part / whole if whole else 0.0
 
 
 @dataclass(frozen=True)
 class Study:
-    """The curve of one arm, with fits. The polynomials rest on points beyond those asked for too.
+    """The curve of one arm, with fits. The polynomials also use points beyond the requested ones.
 
     uncombined: the points by the convention of `uncombined_terms`, as far as the budget reaches; none for
     energies that a user wrote
-    recorded: operations that autograd takes, where they were asked for
-    spatial: whether the arm leaves a plane, as the paper's do not
+    recorded: operations that autograd takes, where these were requested
+    spatial: whether the arm leaves a plane, unlike the paper's arms
     """
 
     robot: str
@@ -89,9 +89,10 @@ def study(
     progress: Progress,
     graphs: bool = False,
 ) -> Study:
-    """Count the links of a serial arm, to `beyond` where possible, and report on first..last under `name`.
+    """Count the links of a serial arm, and report on first..last under `name`.
 
-    With `graphs`, which needs torch, operations that autograd takes are counted too.
+    Links are counted to `beyond` where possible. With `graphs`, which needs torch, operations that autograd
+    takes are counted too.
     """
     every = curve(system, last, budget, progress, beyond)
     points = every[first - 1 : last]
@@ -117,11 +118,11 @@ def study(
 def curve(
     system: System, last: int, budget: int, progress: Progress, beyond: int = 0
 ) -> tuple[CurvePoint, ...]:
-    """Points for 1..last links, and to `beyond` as far as links and budget reach.
+    """Return points for 1..last links, and to `beyond` as far as links and budget reach.
 
     Raises LinkwiseError for a tree, or where 1..last is beyond the links or the budget.
 
-    A link's torques depend on nothing behind it: the arm of n links is that of n − 1 and one more.
+    A link's torques do not depend on any link after it: the arm of n links is the arm of n − 1 and one more.
     """
     most = max(last, min(beyond, len(system.links)))
     _require_serial(system, last, most)

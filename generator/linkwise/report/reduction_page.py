@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from linkwise.emit.render import render
+from linkwise.render import render
 from linkwise.report.curve_fit import CountPolynomial, Saturation
 from linkwise.report.recorded_operations import FORM as RECORDED
 from linkwise.report.reduction_curve import CurvePoint, Study
@@ -46,7 +46,7 @@ def _recorded_json(result: Study) -> dict[str, Any]:
 
 
 def point_row(point: CurvePoint) -> dict[str, Any]:
-    """Return one point as JSON values; its keys head the columns of the table."""
+    """Return one point as JSON values; its keys are the table's column names."""
     return {
         "dof": point.dof,
         "terms": point.total,
@@ -94,7 +94,7 @@ def _polynomial(found: CountPolynomial | None) -> dict[str, Any] | None:
 
 
 def reduction_markdown(result: Study, pictures: bool = False) -> str:
-    """Return the study as Markdown; with pictures where they lie beside it."""
+    """Return the study as Markdown; `pictures` shows the pictures that lie beside it."""
     view = {
         "pictures": pictures,
         "robot": result.robot,

@@ -1,4 +1,4 @@
-"""Verdicts on the paper's claim in words: where counts hold it, and where they are weaker or stronger."""
+"""Verdicts on the paper's claim in words: where counts confirm it, and where they are weaker or stronger."""
 
 from collections.abc import Iterator
 from math import exp
@@ -18,15 +18,15 @@ from linkwise.report.spatial_arms import spatial_remark
 CLOSE = 0.02
 """RMSE up to which a curve is said to describe the points."""
 SHOWN = (1, 2, 3, 5, 10)
-"""Degrees of freedom that are told in a sentence."""
+"""Degrees of freedom that a sentence reports."""
 PAPER_DOF = 10
-"""Most degrees of freedom that the paper fitted its curve to."""
+"""Most degrees of freedom to which the paper fitted its curve."""
 PAPER_REDUNDANT = {5: 3, 10: 16}
 """Redundant terms for each kept one that the paper states, by degrees of freedom."""
 
 
 def verdicts(result: Study) -> Iterator[str]:
-    """Say where the paper's claim holds, and where it is weaker or stronger, by the points."""
+    """Yield where the paper's claim holds, and where it is weaker or stronger, by the points."""
     yield _curve_verdict(result)
     for point in result.points:
         if point.dof in PAPER_REDUNDANT:
@@ -47,7 +47,7 @@ def verdicts(result: Study) -> Iterator[str]:
 
 
 def _nodes_verdict(result: Study) -> str:
-    """The same by the nodes that autograd keeps."""
+    """Return the savings in the nodes that autograd keeps, in words."""
     told = [
         f"{pair.nodes.reduction:.2f} at {dof} DoF ({pair.nodes.total} and {pair.nodes.kept})"
         for dof, pair in zip(result.dof, result.recorded, strict=True)
@@ -57,7 +57,7 @@ def _nodes_verdict(result: Study) -> str:
 
 
 def _curve_verdict(result: Study) -> str:
-    """Hold the paper's curve against the joints it was fitted to, and say where it is further out."""
+    """Return a comparison of the paper's curve with the points it was fitted to, and with further points."""
     inside = [p for p in result.points if p.dof <= PAPER_DOF] or list(result.points)
     outside = result.points[len(inside) :]
     paper = held_against(PAPER_A, PAPER_RATE, [p.dof for p in inside], [p.reduction for p in inside])
@@ -78,7 +78,7 @@ def _curve_verdict(result: Study) -> str:
 
 
 def _no_share(found: Saturation) -> str:
-    """What a fit means that ends above 1."""
+    """Return a remark on a fit with a limit above 1; "" for other fits."""
     return "" if found.is_share else ", but no more than all can be saved: an A above 1 tells of no limit"
 
 
@@ -93,7 +93,7 @@ def _redundancy_verdict(point: CurvePoint) -> str:
 
 
 def _limit_verdict(total: CountPolynomial, kept: CountPolynomial) -> str:
-    """Hold the limit of the exact curve against the paper's: its words say 1, its curve ends at A."""
+    """Return a comparison of the exact limit with the paper's: its words say 1, its curve ends at A."""
     excess = total.degree - kept.degree
     counts = f"Both counts are polynomials in n (degrees {total.degree} and {kept.degree})"
     if excess <= 0:
@@ -110,7 +110,7 @@ def _limit_verdict(total: CountPolynomial, kept: CountPolynomial) -> str:
 
 
 def _convention_verdict(result: Study) -> str:
-    """Say which of the paper's numbers the other convention gives too."""
+    """Return a sentence on those of the paper's numbers that the other convention gives too."""
     pairs = dict(zip(result.dof, result.uncombined, strict=False))
     told = [
         f"{pairs[dof].redundant_per_kept:.1f} redundant terms for each kept one at {dof} DoF "
@@ -147,7 +147,7 @@ def _operations_verdict(last: CurvePoint) -> str:
 
 
 def _graph_verdict(result: Study) -> str:
-    """Say what is saved of autograd's recorded operations, and where that ends."""
+    """Return a sentence on the savings of autograd's recorded operations, and their limit."""
     last, dof = result.recorded[-1], result.dof[-1]
     verdict = "Weaker" if last.reduction < result.points[-1].reduction else "Stronger"
     text = (
@@ -155,7 +155,7 @@ def _graph_verdict(result: Study) -> str:
         f"equal ones counted once, its q̈_1 part needs {last.kept}: {last.reduction:.1%} are saved, where "
         f"{result.points[-1].reduction:.1%} of the terms are"
     )
-    # One joint is different: it has no velocity forces.
+    # One joint differs: it has no velocity forces.
     pairs = [pair for n, pair in zip(result.dof, result.recorded, strict=True) if n > 1]
     total, kept = (count_polynomial([getattr(p, name) for p in pairs]) for name in ("total", "kept"))
     if total is None or kept is None or total.degree != kept.degree:

@@ -15,7 +15,7 @@ from linkwise.report.torque_terms import TermsReport
 
 
 def terms_files(result: TermsReport) -> dict[str, bytes]:
-    """Files of a terms report: data, table, page and plot."""
+    """Return the files of a terms report: data, table, page and plot."""
     texts = {
         "terms.json": report_json(terms_json(result)),
         "terms.csv": terms_table(result),
@@ -25,7 +25,7 @@ def terms_files(result: TermsReport) -> dict[str, bytes]:
 
 
 def study_files(result: Study, measured: dict[str, Any] | None = None) -> dict[str, bytes]:
-    """Files of a cost-reduction study; what was measured stays in files of its own."""
+    """Return the files of a cost-reduction study; measured times go into files of their own."""
     texts = {
         "reduction.json": report_json(reduction_json(result)),
         "reduction.csv": reduction_table(result),
@@ -42,7 +42,7 @@ def study_files(result: Study, measured: dict[str, Any] | None = None) -> dict[s
 
 
 def terms_table(report: TermsReport) -> str:
-    """Return every count as comma-separated values, one torque a row."""
+    """Return every count as comma-separated values, one torque in each row."""
     n = range(1, len(report.joints) + 1)
     header = ["joint", "link", "terms", "kept", "reduction", "gravity"]
     header += [f"acceleration_{k}" for k in n] + [f"velocity_{k}" for k in n]
@@ -65,12 +65,12 @@ def reduction_table(result: Study) -> str:
 
 
 def report_json(data: Any) -> str:
-    """JSON as people read it."""
+    """Return JSON that is laid out for people."""
     return f"{json_text(data, indent=2)}\n"
 
 
 def _csv_text(header: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    """Comma-separated values; None is an empty cell."""
+    """Return comma-separated values; None is an empty cell."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(header)

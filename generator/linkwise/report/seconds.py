@@ -1,4 +1,4 @@
-"""Measured time: one coefficient extracted, or everything computed, by a generated package."""
+"""Measured time of a generated package: to extract one coefficient, or to compute everything."""
 
 import importlib
 import math
@@ -17,27 +17,27 @@ from linkwise.emit.assemble import package_files
 from linkwise.emit.backend import chosen_backends
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.printer import PythonPrinter
-from linkwise.emit.render import render
 from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.expression.expression_graph import Node
 from linkwise.extras import extra
 from linkwise.package.load import Package, open_package
 from linkwise.package.write import write_package
 from linkwise.progress import Progress
+from linkwise.render import render
 from linkwise.symbolic.system import EnergySystem, System, rigid_system
 
 BATCH = 1024
 METHODS = ("closed form", "autograd")
 REPEATS, SHORTEST = 7, 0.02
-"""Runs of which the fastest counts, and the least time of one run in s."""
+"""Number of runs, of which the fastest counts, and the least time of one run in s."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """µs a sample, batch 1,024, float64, one thread, for the first `dof` links.
+    """Times in µs for each sample, batch 1,024, float64, one thread, for the first `dof` links.
 
     extract: the part of τ_1 with q̈_1 alone
-    whole: τ_1 in closed form; by autograd every τ_i, which one sweep gives together
+    whole: τ_1 in closed form; by autograd every τ_i, as one sweep gives all of them
     everything: all coefficients of all links
     """
 
@@ -54,7 +54,7 @@ class Timing:
 
 
 def measure(system: System, dof: tuple[int, ...], progress: Progress) -> tuple[Timing, ...]:
-    """Time the arms of the first 1..n links of a serial arm, for each n of `dof`."""
+    """Return the times of the arm of the first n links of a serial arm, for each n of `dof`."""
     torch = extra("torch")
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
@@ -86,7 +86,7 @@ def first_links(system: System, n: int) -> System:
 
 
 def _generated(system: System, directory: Path) -> Package:
-    """Return the package of `system`, with one module more: row.py, which computes τ_1 alone."""
+    """Return the package of `system`, with an additional module: row.py, which computes τ_1 alone."""
     derivation = Derivation(system, derive(system), directory.name, {})
     files = package_files(derivation, chosen_backends(("numpy", "autograd")))
     files["row.py"] = render("report/row.py.j2", row_view(system, derivation.kernels))
@@ -132,7 +132,7 @@ def _motion(n: int) -> Iterator[Any]:
 
 
 def _second(torch: Any, lagrangian: Any, q: Any, qd: Any) -> Any:
-    """c2_1j1 = ∂²L_j/∂q̇_1², two reverse sweeps and nothing else."""
+    """Return c2_1j1 = ∂²L_j/∂q̇_1², by two reverse sweeps and nothing else."""
     first = qd[..., :1].detach().requires_grad_()
     energy = lagrangian(q, torch.cat([first, qd[..., 1:]], -1)).sum()
     (slope,) = torch.autograd.grad(energy, first, create_graph=True)
@@ -150,7 +150,7 @@ class RowFunction:
 
 
 def row_view(system: System, kernels: tuple[Kernel, ...]) -> dict[str, Any]:
-    """Functions for c2_1j1 and for τ_1j, written as the package writes its own."""
+    """Return functions for c2_1j1 and for τ_1j, written as the package's own functions are."""
     coefficients = [
         _function(system, kernel, f"coefficient_{j + 1}", kernel.forms[0].acceleration[0, 0])
         for j, kernel in enumerate(kernels)
@@ -172,7 +172,10 @@ def _function(system: System, kernel: Kernel, name: str, output: Node) -> RowFun
 
 
 def _fastest(*calls: Callable[[], object]) -> list[float]:
-    """µs a sample of each call: the fastest of a few runs, in turns so that all see one machine."""
+    """Return µs for each sample of each call: the fastest of several runs.
+
+    Calls take turns, so that all run under the same conditions.
+    """
     loops = []
     for call in calls:
         call()

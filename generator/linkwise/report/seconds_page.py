@@ -1,4 +1,4 @@
-"""Measured seconds as data and as a page; read back, they draw the same plot again."""
+"""Measured seconds as data and as a page; data that are read back give the same plot again."""
 
 import json
 import math
@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.emit.render import render
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import json_text
 from linkwise.extras import extra
 from linkwise.input_file import require_file
+from linkwise.render import render
 from linkwise.report.derivation_seconds import LIMIT, DerivationTime
 from linkwise.report.reduction_curve import Study
 from linkwise.report.seconds import BATCH, METHODS, Timing
@@ -26,7 +26,10 @@ MADE_WITH = ("machine", "python", "numpy", "torch")
 def seconds_json(
     robot: str, timings: Sequence[Timing], derivations: Sequence[DerivationTime]
 ) -> dict[str, Any]:
-    """Return the measurement, and where it was made, as JSON values; times in µs a sample, in s to derive."""
+    """Return the measurement, and where it was made, as JSON values.
+
+    Times are in µs for each sample, times of deriving in s.
+    """
     rows = [{**asdict(t), "reduction": t.reduction} for t in timings]
     return {
         "schema": 2,
@@ -50,7 +53,7 @@ def _rounded(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def read_seconds(path: Path) -> dict[str, Any]:
-    """Read an earlier measurement; raises LinkwiseError for a file that is not one."""
+    """Return an earlier measurement from a file; raise LinkwiseError for a file that is not one."""
     try:
         with within(str(path)):
             require_file(path, "cannot be read (No such file or directory); give --seconds FILE")
@@ -68,7 +71,7 @@ def read_seconds(path: Path) -> dict[str, Any]:
 
 
 def _check(found: dict[str, Any]) -> None:
-    """Raise what `read_seconds` expects of a file that does not hold what `seconds_json` makes."""
+    """Raise the errors that `read_seconds` expects for a file that does not hold data of `seconds_json`."""
     json_text(found)  # raises for NaN
     methods = {timing.method for timing in timings_of(found) if math.isfinite(timing.reduction)}
     texts = all(isinstance(found[key], str) for key in ("robot", *MADE_WITH))
@@ -93,7 +96,7 @@ def timings_of(found: dict[str, Any]) -> tuple[Timing, ...]:
 
 
 def derivations_of(found: dict[str, Any]) -> tuple[DerivationTime, ...]:
-    """Return the times of deriving of a measurement's data."""
+    """Return the derivation times in a measurement's data."""
 
     def seconds(value: Any) -> float | None:
         return None if value is None else float(value)
@@ -105,7 +108,7 @@ def derivations_of(found: dict[str, Any]) -> tuple[DerivationTime, ...]:
 
 
 def seconds_markdown(result: Study, found: dict[str, Any], pictures: bool = False) -> str:
-    """Return the measurement as Markdown; with its picture where that lies beside it."""
+    """Return the measurement as Markdown; `pictures` shows the picture that lies beside it."""
     timings = timings_of(found)
     methods = dict.fromkeys(t.method for t in timings)
     view = {

@@ -1,4 +1,4 @@
-"""What differs where an arm does not move in a plane, as the paper's do."""
+"""Differences of an arm that does not move in a plane, as the paper's arms do."""
 
 from collections.abc import Iterator
 
@@ -9,13 +9,13 @@ from linkwise.report.term_count import TermPair
 from linkwise.symbolic.system import RigidSystem, System
 
 PARALLEL = 1e-9
-"""Of a unit vector: what is less across an axis is rounding."""
+"""Part of a unit vector: a smaller component across an axis is rounding."""
 
 
 def is_spatial(system: System, links: int) -> bool:
-    """Whether the first `links` links of a serial arm of rigid bodies leave a plane.
+    """Return whether the first `links` links of a serial arm of rigid bodies leave a plane.
 
-    They stay in one where all turns are about parallel axes, and all slides across these.
+    They stay in one where all revolute axes are parallel, and all prismatic axes perpendicular to these.
     """
     if not isinstance(system, RigidSystem):
         return False
@@ -31,7 +31,12 @@ def is_spatial(system: System, links: int) -> bool:
 def spatial_remark(
     dof: int, terms: TermPair, uncombined: TermPair | None, first: TermPair | None
 ) -> Iterator[str]:
-    """Sentences; the counts at the most degrees of freedom, by both conventions, and those of one link."""
+    """Yield sentences on a spatial arm.
+
+    dof: the most degrees of freedom
+    terms, uncombined: counts there, by both conventions
+    first: counts of one link
+    """
     yield (
         "**A spatial arm differs.** The paper's claim is about arms that move in a plane, and this one's "
         "axes are not parallel. Turns about parallel axes add up to one angle, and the counts of a planar "

@@ -1,4 +1,4 @@
-"""Terms of an expanded torque by the motion they contain, and which of them a query keeps."""
+"""Terms of an expanded torque by the motion they contain, and those of them that a query keeps."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ class TermQuery:
     """One bucket of some torques τ_ij; the default is the paper's. Indices from 0; None means all.
 
     joint: i            link: j            coordinate: k, the joint whose motion is followed
-    order: 2 keeps what contains q̈_k, 1 what contains q̇_k, 0 gravity
+    order: 2 keeps terms that contain q̈_k, 1 those that contain q̇_k, 0 gravity
     """
 
     joint: int | None = 0
@@ -32,12 +32,12 @@ class TermQuery:
         return f"{ORDERS[self.order]}{motion}"
 
     def joints(self, n: int) -> tuple[int, ...]:
-        """Return the joints, of n, whose torques are wanted."""
+        """Return the joints, of n, whose torques are requested."""
         return tuple(range(n)) if self.joint is None else (self.joint,)
 
 
 def position(text: str, names: Sequence[str], option: str) -> int:
-    """Index of a name, or of a number from 1; raises LinkwiseError naming the choices."""
+    """Return the index of a name, or of a number from 1; raise LinkwiseError that names the choices."""
     if (name := known_as(text, names)) is not None:
         return names.index(name)
     if text.isascii() and text.isdigit() and len(text) < 10 and 1 <= int(text) <= len(names):
@@ -55,12 +55,12 @@ class TermPair:
 
     @property
     def reduction(self) -> float:
-        """Share of terms that need no computing."""
+        """Share of terms that need not be computed."""
         return 1.0 - self.kept / self.total
 
     @property
     def redundant_per_kept(self) -> float:
-        """Terms computed in vain for each one that is wanted."""
+        """Number of terms computed in vain for each kept one."""
         return (self.total - self.kept) / self.kept
 
 
@@ -87,20 +87,20 @@ class TermCount:
         )
 
     def kept(self, query: TermQuery) -> int:
-        """Terms of the bucket that `query` asks for."""
+        """Return the number of terms in the bucket of `query`."""
         k = query.coordinate
         return (self.gravity, self.velocity[k], self.acceleration[k])[query.order]
 
     @classmethod
     def none(cls, n: int) -> "TermCount":
-        """No term at all: the torque on joint i of a link that it does not move."""
+        """Return a count of no terms: the torque on joint i of a link that it does not move."""
         return cls(0, (0,) * n, (0,) * n, 0)
 
 
 def count_terms(p: Laurent, x: Variables) -> TermCount:
     """Count the sines and cosines behind the exponentials of `p`.
 
-    c cos(a·q) + s sin(a·q) is one entry c/2 at each of ±a for the cosine and one ∓i s/2 for the
+    c cos(a·q) + s sin(a·q) has one entry c/2 at each of ±a for the cosine and one ∓i s/2 for the
     sine; a term without an angle is one entry. So a term is half of two entries, or its only one.
     """
     offset, n = lifted(x.digits), x.n
@@ -138,7 +138,7 @@ class RunningCount:
         self._keys: set[int] = set()
 
     def add(self, torque: Laurent, variables: Variables) -> TermCount:
-        """Add one link's torque; returns its own count."""
+        """Add one link's torque; return its own count."""
         own = count_terms(torque, variables)
         if self._keys.isdisjoint(torque.terms):
             self._parts.append(torque)

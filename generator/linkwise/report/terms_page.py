@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from linkwise.emit.render import render
+from linkwise.render import render
 from linkwise.report.operations import NO_OPERATIONS, LinkOperations, Operations
 from linkwise.report.torque_terms import TermsReport, TorqueTerms
 
@@ -86,13 +86,13 @@ def terms_markdown(report: TermsReport) -> str:
 
 
 def _in_a_term(report: TermsReport) -> list[int]:
-    """Coordinates whose motion is in some term: a large robot has many that load nothing counted."""
+    """Return the coordinates whose motion is in some term: in a large robot, many load no counted torque."""
     counts = [row.count for row in report.rows]
     return [k for k in range(len(report.joints)) if any(c.acceleration[k] or c.velocity[k] for c in counts)]
 
 
 def progress_line(report: TermsReport) -> str:
-    """Say how far the count got."""
+    """Return a sentence on how far the count got."""
     if report.complete:
         return f"Links counted: all {report.counted} asked for."
     stopped = report.links[report.counted]

@@ -1,4 +1,4 @@
-"""How many terms each partial torque has, and how many of them one bucket needs."""
+"""Terms of each partial torque, and those of them that one bucket needs."""
 
 from dataclasses import dataclass
 
@@ -29,16 +29,16 @@ class TorqueTerms:
 
 @dataclass(frozen=True)
 class TermsReport:
-    """The answer for one robot; the first `counted` of the links `wanted` fitted the budget.
+    """The report on one robot; the first `counted` of the links `wanted` fitted the budget.
 
-    sums: operations of τ_i over all links, and of its part, by joint i; none when one link is asked for
+    sums: operations of τ_i over all links, and of its part, by joint i; none when one link is requested
     """
 
     robot: str
     query: TermQuery
     form: str
     potential: str
-    """What terms without any motion are called."""
+    """Name of the terms without any motion."""
     joints: tuple[str, ...]
     links: tuple[str, ...]
     counted: int
@@ -50,21 +50,21 @@ class TermsReport:
 
     @property
     def kept(self) -> str:
-        """What is kept, in words."""
+        """Kept terms, in words."""
         return str(self.query) if self.query.order else self.potential
 
     @property
     def complete(self) -> bool:
-        """Whether every link asked for was counted."""
+        """True if every requested link was counted."""
         return self.counted == self.wanted
 
 
 def terms_report(
     system: System, query: TermQuery, budget: int, partial: bool, progress: Progress
 ) -> TermsReport:
-    """Count terms and operations; raises LinkwiseError for a robot beyond the budget.
+    """Return counts of terms and operations; raise LinkwiseError for a robot beyond the budget.
 
-    With `partial` the links that fit are reported, as long as there is one of those asked for.
+    With `partial` the links that fit are reported, if at least one of them was requested.
     """
     wanted = len(system.links) if query.link is None else query.link + 1
     rows, counted = _rows(system, query, wanted, budget, progress)
@@ -94,7 +94,7 @@ def terms_report(
 def _rows(
     system: System, query: TermQuery, wanted: int, budget: int, progress: Progress
 ) -> tuple[tuple[TorqueTerms, ...], int]:
-    """Counts of each τ_ij and of the sums over j, and how many links fitted the budget."""
+    """Return counts of each τ_ij and of the sums over j, and how many links fitted the budget."""
     n = len(system.coordinates)
     sums = {i: RunningCount(n) for i in query.joints(n)}
     rows: list[TorqueTerms] = []
@@ -108,7 +108,7 @@ def _rows(
                     rows.append(_row(i, found.link, own, query))
             counted += 1
     except BudgetExceededError:
-        pass  # the report says how far it got
+        pass  # the report says how many links were counted
     if query.link is None and rows:
         rows += [_row(i, None, running.count, query) for i, running in sums.items()]
     # τ_i1, τ_i2, …, then their sum, joint after joint.

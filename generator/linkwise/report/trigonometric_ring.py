@@ -1,4 +1,4 @@
-"""Polynomials in sines and cosines of angle sums, of which products stay as they are.
+"""Polynomials in sines and cosines of angle sums, whose products are not combined.
 
 d/dt sin a = ȧ cos a      d/dt cos a = −ȧ sin a
 """
@@ -12,7 +12,7 @@ from linkwise.report.expanded_arm import ExpandedArm
 from linkwise.report.laurent import Laurent, exponents
 
 Polynomial: TypeAlias = Any
-"""Of a SymPy ring over the rational numbers."""
+"""Polynomial of a SymPy ring over the rational numbers."""
 Angle: TypeAlias = tuple[int, ...]
 """Whole multiples of the u_k; the first that is not 0 is above 0."""
 
@@ -48,7 +48,7 @@ class TrigonometricRing:
         return tuple(exponents(key, self._digits)[1 : 1 + self._n])
 
     def __call__(self, p: Laurent) -> Polynomial:
-        """The same in sines and cosines: c cos a has c/2 at each of ±a, s sin a has ∓i s/2."""
+        """Return p in sines and cosines: c cos a has c/2 at each of ±a, s sin a has ∓i s/2."""
         n, result = self._n, self.zero
         for key, c in p.terms.items():
             powers = exponents(key, self._digits)
@@ -65,11 +65,11 @@ class TrigonometricRing:
         return result
 
     def expression(self, p: Laurent) -> sp.Expr:
-        """The same for SymPy, as people write it."""
+        """Return p as a SymPy expression in sines, cosines, coordinates, velocities and accelerations."""
         return self(p).as_expr(*self._symbols)
 
     def slope(self, p: Polynomial, k: int) -> Polynomial:
-        """∂p/∂u_k."""
+        """Return ∂p/∂u_k."""
         bare = self._bare[k]
         total = self.zero if bare is None else p.diff(bare)
         for angle, (sine, cosine) in self._waves.items():
@@ -78,13 +78,13 @@ class TrigonometricRing:
         return total
 
     def rate(self, p: Polynomial) -> Polynomial:
-        """dp/dt."""
+        """Return dp/dt."""
         return sum(
             (self.slope(p, k) * self.qd[k] + p.diff(self.qd[k]) * self.qdd[k] for k in range(self._n)),
             self.zero,
         )
 
     def count(self, p: Polynomial, x: Polynomial) -> int:
-        """Terms of p that contain the generator x."""
+        """Return the number of terms of p that contain the generator x."""
         at = self._ring.gens.index(x)
         return sum(1 for powers in p.itermonoms() if powers[at])

@@ -1,11 +1,11 @@
 """Terms of τ_1 by another convention: products of sines and cosines stay, sin² + cos² is two terms.
 
-What velocities consist of (see `expanded_arm`) is written in sines and cosines of angle sums, which are
-symbols from then on: of the energies K = ½ m v·v + ½ ω·I ω, P = −m g·r, and of their derivatives
+The vectors of which velocities are made (see `expanded_arm`) are written in sines and cosines of angle sums,
+which are symbols from then on: for the energies K = ½ m v·v + ½ ω·I ω, P = −m g·r, and for their derivatives
 
     d/dt sin a = ȧ cos a      d/dt cos a = −ȧ sin a      τ_1j = d/dt ∂L_j/∂q̇_1 − ∂L_j/∂q_1
 
-products are multiplied out and like ones collected, and nothing else.
+products are multiplied out and like terms collected, and nothing else.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from linkwise.report.trigonometric_ring import Polynomial, TrigonometricRing
 from linkwise.symbolic.system import RigidSystem
 
 COSTLIEST = 50
-"""Products of terms in one multiplication, over the budget."""
+"""Products of terms in one multiplication, as a multiple of the budget."""
 FORM = (
     "fully expanded from velocities of the centres of mass in the world's axes; products of sines and "
     "cosines of angle sums not combined; like terms collected"
@@ -25,7 +25,7 @@ FORM = (
 
 
 def uncombined_terms(system: RigidSystem, links: int, budget: int) -> Iterator[TermPair]:
-    """Counts for the first 1, 2, … `links` links of a serial arm, as far as the budget of terms reaches."""
+    """Yield counts for the first 1, 2, … `links` links of a serial arm, as far as the budget allows."""
     arm = expanded_arm(system, links, budget)
     terms = TrigonometricRing(arm)
     torque = terms.zero
@@ -35,7 +35,7 @@ def uncombined_terms(system: RigidSystem, links: int, budget: int) -> Iterator[T
 
 
 def _torque(terms: TrigonometricRing, body: ExpandedBody, gravity: Vector, budget: int) -> Polynomial:
-    """τ_1j of a body."""
+    """Return τ_1j of a body."""
 
     def times(a: Polynomial, b: Polynomial) -> Polynomial:
         if len(a) * len(b) > COSTLIEST * budget:

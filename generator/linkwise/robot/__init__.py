@@ -1,4 +1,4 @@
-"""Robots: what a description says, and the readers for it."""
+"""Robots: descriptions read from files, and the robots that are built of them."""
 
 from linkwise.robot.build import Options
 from linkwise.robot.notes import Note, effects, kept_apart, left_out

@@ -1,4 +1,4 @@
-"""From what a file says to a Robot: expand, cut, substitute, merge, and check."""
+"""Building a Robot from the description of a file: expand, cut, substitute, merge, and check."""
 
 from dataclasses import asdict, dataclass, field, fields, replace
 from hashlib import sha256
@@ -30,7 +30,7 @@ from linkwise.robot.tree import check_loops, cut, depth_first
 
 @dataclass(frozen=True)
 class Options:
-    """How a description becomes a robot; the command line's flags of the same names."""
+    """Options for building a robot from a description; the command line's flags of the same names."""
 
     parameters: Literal["numeric", "nonzero", "symbolic"] = "numeric"
     lock: dict[str, float] = field(default_factory=dict)
@@ -49,7 +49,7 @@ class Options:
         return tuple(f.name for f in fields(self) if getattr(self, f.name) != getattr(usual, f.name))
 
     def request(self) -> dict[str, Any]:
-        """What a manifest keeps of them; of a file its name and the SHA-256 of its content."""
+        """Return the options as a manifest keeps them: of a file its name and the SHA-256 of its content."""
         told = asdict(self) | {"independent": list(self.independent)}
         if self.constraints is not None:
             path = Path(self.constraints)
@@ -131,7 +131,10 @@ def build(description: Description, options: Options) -> Robot:
 def _with_known(
     frames: tuple[Frame, ...], parameters: tuple[Parameter, ...], values: dict[str, float]
 ) -> tuple[Frame, ...]:
-    """Return the frames in the robot's parameters; a file's own that move no torque are numbers."""
+    """Return the frames in the robot's parameters.
+
+    Parameters of the file that no torque depends on become numbers.
+    """
     kept = {parameter.name for parameter in parameters}
 
     def known(value: Scalar) -> Scalar:
@@ -149,7 +152,7 @@ def _with_known(
 
 
 def _naming(description: Description, options: Options) -> Naming | None:
-    """Return what gives names to the numbers that may be varied; None where all stay numbers."""
+    """Return the Naming that gives names to the numbers that may be varied; None where all stay numbers."""
     if options.parameters == "numeric":
         return None
     wanted: Named = "every" if options.parameters == "symbolic" else "nonzero"
@@ -157,7 +160,11 @@ def _naming(description: Description, options: Options) -> Naming | None:
 
 
 def _connections(description: Description, options: Options) -> tuple[str, tuple[Connection, ...]]:
-    """Root link, and the joints parents first, that of its base among them where it floats or is held."""
+    """Return the root link and the joints, parents first.
+
+    The joint of the base is among them where the base floats or is held. Raises LinkwiseError where the world
+    itself is to float, and where no joint moves.
+    """
     root, connections = depth_first(description)
     free = description.free
     if options.base == "floating" or (free and options.base is None):
@@ -185,7 +192,7 @@ def _links(description: Description, options: Options, motion: dict[str, AxisRul
 def _of_root(
     description: Description, root: str, connections: tuple[Connection, ...], options: Options
 ) -> list[Note]:
-    """What became of the root: the ground, or what falls though nobody asked for that."""
+    """Return notes on the root: merged into the ground, or free to fall though no option asked for it."""
     if free := description.free:
         shown = named_pose("base", free.rotation, free.translation)
         return [Note("free", root, f"in the file {shown}", FREE)] if options.base is None else []
@@ -197,13 +204,13 @@ def _of_root(
 
 
 def _massless(description: Description, links: tuple[Link, ...]) -> list[Note]:
-    """Name the moving links of the file, not the reader's own, that carry no mass."""
+    """Return a note for each moving link of the file, not the reader's own, that carries no mass."""
     named = {body.name for body in description.bodies if not body.invented}
     return [Note("massless", link.name) for link in links if link.massless and link.name in named]
 
 
 def _as_read(connections: tuple[Connection, ...]) -> list[Note]:
-    """Rotations that reading rounded."""
+    """Return a note for each joint whose rotation was rounded on reading."""
     return [
         Note("snapped", c.name, "rotation entries within 1e-12 of -1, 0, 1") for c in connections if c.snapped
     ]
@@ -215,7 +222,7 @@ def _left_out(
     motion: dict[str, AxisRule],
     carrier: dict[str, int | None],
 ) -> list[Note]:
-    """What no torque holds of joints and bodies that move."""
+    """Return a note for each force and inertia of moving joints and bodies that the torques leave out."""
     moving = {c.name for c, axes in joints if any(motion[axis.name].coordinate is not None for axis in axes)}
     carried = {body for body, link in carrier.items() if link is not None}
     return [omission.note() for omission in description.omissions if omission.acts(moving, carried)]

@@ -1,4 +1,4 @@
-"""What holds beside the tree of a robot: ties of its frames, couplings of its joints, who moves them."""
+"""Constraints beside the tree of a robot: ties of frames, couplings of joints, and what moves them."""
 
 from collections import Counter
 from collections.abc import Collection, Sequence
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 from linkwise_runtime.chosen_names import nearest_first
+from linkwise_runtime.rule.joint_tree import TreeTie
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
@@ -14,16 +15,20 @@ from linkwise.robot.couplings import check_joints, coupled
 from linkwise.robot.description import Description
 from linkwise.robot.joint_types import expand
 from linkwise.robot.notes import Note
-from linkwise.robot.robot import Coupling, Frame, Tie
+from linkwise.robot.robot import Coupling, Frame
 from linkwise.robot.size import check_constraint_count
 from linkwise.robot.ties import Ends, check_ties, tied
 
 
 @dataclass(frozen=True)
 class Constrained:
-    """Constraints of a robot; `wanted` are joints asked for as independent, `driven` by actuators."""
+    """Constraints of a robot.
 
-    ties: tuple[Tie, ...]
+    `wanted` are the names of the joints asked for as independent, `driven` the coordinates that actuators
+    drive.
+    """
+
+    ties: tuple[TreeTie, ...]
     couplings: tuple[Coupling, ...]
     wanted: tuple[str, ...]
     driven: tuple[int, ...]
@@ -31,7 +36,7 @@ class Constrained:
 
 
 def check_constraints(description: Description) -> None:
-    """Raise LinkwiseError for a constraint without a name of its own, of unknown links or joints."""
+    """Raise LinkwiseError for a constraint whose name is empty or repeated, or on unknown links or joints."""
     names = Counter([tie.name for tie in description.ties] + [c.name for c in description.couplings])
     for name, count in names.items():
         if not name.strip():
@@ -54,10 +59,11 @@ def constrained(
     free_mimic: bool,
     independent: tuple[str, ...],
 ) -> Constrained:
-    """Return what holds among the frames and coordinates that are left.
+    """Return the constraints among the frames and coordinates that are left.
 
-    independent: those of the command line, which go before the file's. Raises LinkwiseError for a constraint
-    of which a part was cut away, for far too many, and for names that are not of coordinates.
+    independent: names from the command line, which take precedence over the file's. Raises LinkwiseError for
+    a constraint of which a part was cut away, for far too many constraints, for `independent` without any,
+    and for names that are not of coordinates or are given twice.
     """
     values = {sp.Symbol(name, real=True): value for name, value in description.parameters}
     ties, lost = tied(description.ties, ends, frames, values)

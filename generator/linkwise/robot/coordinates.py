@@ -1,4 +1,4 @@
-"""Which joints become coordinates, which stand still and which follow another."""
+"""Assignment of coordinates to joints: joints that move, that stand still, and that follow another."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -17,9 +17,9 @@ from linkwise.robot.robot import Coordinate, unusable
 
 @dataclass(frozen=True)
 class AxisRule:
-    """How an axis moves: ratio · q + offset of a coordinate, or by a curve of it.
+    """Rule by which an axis moves: ratio · q + offset of a coordinate q, or a curve of it.
 
-    Without a coordinate it stands at the offset.
+    Without a coordinate the axis stands at the offset.
     """
 
     coordinate: int | None
@@ -30,7 +30,7 @@ class AxisRule:
 
 @dataclass(frozen=True)
 class Movement:
-    """The coordinates, and how each axis moves with them, by its name."""
+    """Coordinates of a robot; `motion` is the rule by which each axis moves with them, by the axis's name."""
 
     coordinates: tuple[Coordinate, ...]
     motion: dict[str, AxisRule]
@@ -40,9 +40,9 @@ class Movement:
 def movement(
     axes: tuple[Axis, ...], connections: tuple[Connection, ...], lock: dict[str, float], free_mimic: bool
 ) -> Movement:
-    """Give each axis a coordinate of its own unless it is locked or follows another.
+    """Return the Movement: each axis has a coordinate of its own unless it is locked or follows another.
 
-    Raises LinkwiseError for two axes of one name, a lock without an axis, and a mimic that cannot be.
+    Raises LinkwiseError for two axes of one name, a lock of an unknown joint, and a mimic that cannot be.
     """
     curved = _Curved(connections, lock)
     _check_axes(axes, [*(axis.name for axis in axes if axis.follows is None), *curved.units], lock)
@@ -76,7 +76,7 @@ def movement(
 
 
 class _Curved:
-    """Coordinates that axes follow by curves; those of one joint come together, in the file's order."""
+    """Coordinates that axes follow by curves; those of one joint are added together, in the file's order."""
 
     def __init__(self, connections: Iterable[Connection], lock: dict[str, float]) -> None:
         self._lock = lock
@@ -85,7 +85,7 @@ class _Curved:
         self.units = {c.name: c.unit for joint in self._joints.values() for c in joint}
 
     def rule(self, axis: str, name: str, curve: Curve, moving: list[Coordinate]) -> AxisRule:
-        """The rule of an axis that follows `name`; what that needs is added to those moving.
+        """Return the rule of an axis that follows `name`; append the coordinates that it needs to `moving`.
 
         Raises LinkwiseError for a coordinate whose joint is not there.
         """
@@ -128,7 +128,11 @@ def _check_axes(axes: tuple[Axis, ...], coordinates: list[str], lock: dict[str, 
 def _mimics(
     connections: tuple[Connection, ...], axes: set[str], lock: dict[str, float], free: bool
 ) -> tuple[dict[str, Mimic], list[Note]]:
-    """Joints that follow another, and notes on those let free; raises LinkwiseError where neither can be."""
+    """Return the joints that follow another, by name, and notes on those let free.
+
+    Raises LinkwiseError for a joint of several axes, a master that is a mimic too and, unless `free`, a
+    master that is not there.
+    """
     mimics: dict[str, Mimic] = {}
     for c in connections:
         if c.mimic is None or c.name in lock or c.type == "fixed":

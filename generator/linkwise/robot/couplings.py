@@ -1,4 +1,4 @@
-"""Couplings of joints as constraints on coordinates: joints that are locked or follow others are put in."""
+"""Couplings of joints as constraints on coordinates; joints that are locked or follow others are put in."""
 
 from collections.abc import Collection, Iterable, Mapping
 
@@ -12,7 +12,7 @@ from linkwise.robot.notes import UNCOUPLED, Note
 from linkwise.robot.robot import Coupling, unusable
 
 CLOSE = 1e-9
-"""In rad and m, by which joints that stand still may miss what a coupling asks of them."""
+"""Tolerance in rad and m: joints that stand still may miss a coupling by this much."""
 
 
 def coupled(
@@ -21,10 +21,10 @@ def coupled(
     lock: Collection[str],
     free: bool,
 ) -> tuple[tuple[Coupling, ...], list[Note]]:
-    """Return the couplings of the coordinates, and notes on those that are none here.
+    """Return the couplings of the coordinates, and notes on couplings that constrain no coordinate.
 
-    As with a mimic joint, to `lock` the first joint of a coupling lets the others move by themselves, and to
-    lock others holds the first. So does `free` with MJCF's equalities, and those whose master was cut away.
+    Locking the first joint of a coupling lets the others move by themselves, as with a mimic joint; locking
+    the others holds the first. `free` drops MJCF's equalities, and couplings whose master was cut away.
     Raises LinkwiseError for a master that was cut away, and for joints that cannot keep a coupling.
     """
     found: list[Coupling] = []
@@ -49,7 +49,7 @@ def coupled(
 
 
 def check_joints(couplings: Iterable[JointCoupling], axes: Collection[str]) -> None:
-    """Raise LinkwiseError for a joint that the file doesn't have, and for numbers that cannot be."""
+    """Raise LinkwiseError for a joint that the file does not have, and for unusable numbers."""
     for coupling in couplings:
         if fault := unusable(*(c for _, coefficients in coupling.terms for c in coefficients)):
             raise LinkwiseError(f"constraint {coupling.name!r} has {fault} in its terms; give numbers")
@@ -72,7 +72,10 @@ def _orphan(coupling: JointCoupling, follower: str, master: str) -> str:
 def _terms(
     coupling: JointCoupling, motion: Mapping[str, AxisRule]
 ) -> tuple[tuple[int, tuple[float, ...]], ...]:
-    """Terms by coordinate, all constants in the first one; none where nothing that moves is asked for."""
+    """Return the terms by coordinate, all constants in the first; empty if no moving joint is constrained.
+
+    Raises LinkwiseError if joints that stand still, or move as one, miss the coupling.
+    """
     constant, by_coordinate = 0.0, dict[int, list[float]]()
     for joint, coefficients in coupling.terms:
         rule = motion[joint]
@@ -96,7 +99,7 @@ def _terms(
 
 
 def _given_by_others(rule: AxisRule, terms: tuple[tuple[int, tuple[float, ...]], ...]) -> int | None:
-    """The coordinate of a first joint, if its term has one value for each sum of the others."""
+    """Return the coordinate of the first joint, if its term has one value for each sum of the others."""
     for coordinate, factors in terms:
         if coordinate == rule.coordinate and len(terms) > 1 and not any(factors[2:]):
             return coordinate

@@ -1,4 +1,4 @@
-"""Functions of one coordinate in pieces, each a polynomial: how a joint moves that follows a curve."""
+"""Piecewise polynomials of one coordinate, by which a joint moves that follows a curve."""
 
 import math
 from bisect import bisect_right
@@ -18,15 +18,15 @@ Polynomial = tuple[float, ...]
 class Curve:
     """Polynomials in x − start, each from its `start` to the next one's; the first holds before it too.
 
-    The curve's values are in rad or m, x in those of the coordinate that it follows.
+    The curve's values are in rad or m; x is in the unit of the coordinate that it follows.
     """
 
     starts: tuple[float, ...]
-    """Ascending; the first two may be the same."""
+    """Places where the pieces begin, ascending; the first two may be the same."""
     pieces: tuple[Polynomial, ...]
 
     def __call__(self, x: float, derivative: int = 0) -> float:
-        """Value at x, or that of a derivative."""
+        """Return the value at x, or the value of a derivative of the given order."""
         at = bisect_right(self.starts, x, lo=1) - 1
         value = 0.0
         for coefficient in reversed(_differentiated(self.pieces[at], derivative)):
@@ -35,22 +35,22 @@ class Curve:
 
     @property
     def line(self) -> tuple[float, float] | None:
-        """Value at 0 and slope of a curve that is one line; None of another."""
+        """Value at 0 and slope of a curve that is one line; None for any other curve."""
         if len(self.pieces) > 1 or any(self.pieces[0][2:]):
             return None
         return self(0.0), self(0.0, 1)
 
     @classmethod
     def straight(cls, at_zero: float, slope: float = 0.0) -> "Curve":
-        """One that is a line, or the same everywhere."""
+        """Return a curve that is a straight line, or constant."""
         return cls((0.0,), ((at_zero, slope) if slope else (at_zero,),))
 
     def scaled(self, factor: float) -> "Curve":
-        """The curve times a number."""
+        """Return the curve times a number."""
         return Curve(self.starts, tuple(tuple(factor * c for c in piece) for piece in self.pieces))
 
     def after(self, inner: "Curve") -> "Curve":
-        """The curve of what another curve gives: self(inner(x))."""
+        """Return the curve of another curve's values: self(inner(x))."""
         starts, pieces = list[float](), list[Polynomial]()
         ends = (-math.inf, *inner.starts[1:], math.inf)
         for (low, high), start, piece in zip(pairwise(ends), inner.starts, inner.pieces, strict=True):
@@ -64,7 +64,10 @@ class Curve:
         return Curve(tuple(starts), tuple(pieces))
 
     def _crossings(self, start: float, piece: Polynomial, low: float, high: float) -> list[float]:
-        """Where between two places a polynomial in x − start meets the end of one of this curve's pieces."""
+        """Return the places between `low` and `high` where `piece` meets an end of this curve's pieces.
+
+        `piece` is a polynomial in x − start.
+        """
         found = set[float]()
         for end in self.starts[1:]:
             roots = polynomial.polyroots(polynomial.polytrim((piece[0] - end, *piece[1:])))
@@ -79,7 +82,7 @@ def _differentiated(coefficients: Polynomial, times: int) -> Polynomial:
 
 
 def _composed(outer: Sequence[float], inner: Polynomial) -> Polynomial:
-    """Coefficients of outer(inner), by Horner's rule."""
+    """Return the coefficients of outer(inner), by Horner's rule."""
     value: np.ndarray[tuple[int], np.dtype[np.floating[Any]]] = np.zeros(1)
     for coefficient in reversed(outer):
         value = polynomial.polyadd(polynomial.polymul(value, inner), (coefficient,))
@@ -87,7 +90,7 @@ def _composed(outer: Sequence[float], inner: Polynomial) -> Polynomial:
 
 
 def _inside(low: float, high: float) -> float:
-    """A place between two ends, each of which may be infinite."""
+    """Return a place between two ends, each of which may be infinite."""
     if math.isinf(low):
         return 0.0 if math.isinf(high) else high - 1.0
     return low + 1.0 if math.isinf(high) else 0.5 * (low + high)

@@ -1,4 +1,4 @@
-"""What a robot file says, before fixed joints are merged and frames are chosen."""
+"""Description of a robot as its file has it, before fixed joints are merged and frames are chosen."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -25,11 +25,11 @@ IDENTITY: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True)
 class Body:
-    """A link as the file has it; com and inertia about it in the link's frame.
+    """A link as the file has it; com, and the inertia about it, are in the link's frame.
 
-    `origin` is where that frame's origin is from the place of the link's joint, in the same axes.
-    `unphysical` holds the file's own reason for an inertia that no rigid body has (empty: none); `invented`
-    says that the reader made the body up, between two axes of one joint.
+    `origin` is the position of that frame's origin relative to the place of the link's joint, in the same
+    axes. `unphysical` holds the file's own reason for an inertia that no rigid body has (empty: none);
+    `invented` says that the reader made the body up, between two axes of one joint.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Site:
-    """A named place on a body, and its axes there, in the body's frame."""
+    """A named place on a body, with axes, both in the body's frame."""
 
     name: str
     body: str
@@ -53,7 +53,7 @@ class Site:
 
 @dataclass(frozen=True)
 class Mimic:
-    """q = ratio · q_master + offset."""
+    """Rule of a joint that follows another: q = ratio · q_master + offset."""
 
     master: str
     ratio: float = 1.0
@@ -62,7 +62,7 @@ class Mimic:
 
 @dataclass(frozen=True)
 class Anchor:
-    """An end of a tie: a place on a body, and axes there, in the body's frame."""
+    """An end of a tie: a place on a body, with axes, both in the body's frame."""
 
     body: str
     rotation: Rotation = IDENTITY
@@ -78,12 +78,12 @@ class AnchoredTie:
     first: Anchor
     second: Anchor
     length: Scalar = 0.0
-    """In m, of a distance only."""
+    """Length in m, for the kind distance only."""
 
 
 @dataclass(frozen=True)
 class JointCoupling:
-    """Positions of joints that a sum ties together: Σ c_0 + c_1 q + c_2 q² + … over its `terms` is 0.
+    """Coupling of joint positions by a sum: Σ c_0 + c_1 q + c_2 q² + … over its `terms` is 0.
 
     The first of its joints follows the others. An `equality` of MJCF may be let go with --free-mimic.
     """
@@ -94,17 +94,17 @@ class JointCoupling:
 
     @property
     def rule(self) -> str:
-        """What it does to its first joint, in words."""
+        """Effect of the coupling on its first joint, in words."""
         others = [repr(joint) for joint, _ in self.terms[1:]]
         return f"coupled to {' and '.join(others)}" if others else "held"
 
 
 @dataclass(frozen=True)
 class Loop:
-    """A constraint that is not modelled, on pairs of bodies; none where it ties others.
+    """A constraint that is not modelled, on `pairs` of bodies; empty where it ties anything else.
 
-    `what` names it in a sentence, `remedy` says how to do without it. A tie `of_joints` is gone with either
-    body of its pair; any other still loads the one that is left.
+    `what` names it in a sentence, `remedy` says how to do without it. A constraint `of_joints` vanishes when
+    either body of its pair is cut away; any other still loads the body that is left.
     """
 
     what: str
@@ -117,9 +117,9 @@ class Loop:
 class CurvedAxis:
     """One axis of a `curved` joint: it moves by a curve of a coordinate.
 
-    name: its own; of one axis for each coordinate the coordinate's name
-    suffix: what tells the joint's other axes' bodies from its child; direction: in the child's axes at the
-    place where all axes of the joint stand at 0
+    name: the axis's own name; for one axis of each coordinate it is the coordinate's name
+    suffix: added to the child's name for the bodies between the joint's axes; direction: in the child's axes,
+    with all axes of the joint at 0
     """
 
     name: str
@@ -127,7 +127,7 @@ class CurvedAxis:
     kind: Literal["revolute", "prismatic"]
     direction: tuple[float, float, float]
     coordinate: str
-    """Empty where the axis stands still."""
+    """Name of the coordinate; empty where the axis stands still."""
     curve: Curve
 
 
@@ -144,7 +144,7 @@ class CurvedCoordinate:
 
 @dataclass(frozen=True)
 class FreeRoot:
-    """Where the file shows a root in the world that no joint holds: it falls, unless it is held there."""
+    """Pose in the world of a root that no joint holds: it falls, unless it is held there."""
 
     rotation: Rotation
     translation: Vec3
@@ -152,11 +152,11 @@ class FreeRoot:
 
 @dataclass(frozen=True)
 class Connection:
-    """A joint as the file has it: any type, any axis; its place in the parent's frame, its axis in its own.
+    """A joint as the file has it, of any type: its pose in the parent's frame, its axis in its own frame.
 
     `snapped` says that entries of the rotation were rounded to −1, 0 or 1; only a joint of one axis has
-    anything `passive`, and limits. A `curved` joint has `axes`, from the parent on, the coordinates that they
-    follow, and `followers` that are coordinates in the file only.
+    `passive` values and limits. A `curved` joint has `axes`, from the parent on, the `coordinates` that they
+    follow, and `followers`, which are coordinates in the file only.
     """
 
     name: str
@@ -179,7 +179,8 @@ class Connection:
 class Description:
     """A robot as its file has it.
 
-    With `only_named` nothing but its own parameters may be varied: its numbers say what it is, say planar.
+    With `only_named`, only its own parameters may be varied: its numbers define what it is, for example
+    planar.
     """
 
     name: str
@@ -197,10 +198,10 @@ class Description:
     driven: tuple[str, ...] = ()
     """Joints that actuators of the file drive."""
     independent: tuple[str, ...] = ()
-    """Joints whose motion is to give that of all others under the constraints; none: to be chosen."""
+    """Joints whose motion determines that of all others under the constraints; empty: to be chosen."""
     ground: str = ""
-    """The body that is the world itself, where the file has one."""
+    """Name of the body that is the world itself, where the file has one."""
     free: FreeRoot | None = None
-    """None where the file holds the root, or its format says nothing of that."""
+    """Pose of a free root; None where the file holds the root, or its format does not say."""
     ordered: bool = False
-    """Whether Pinocchio has siblings in the file's order, and not in that of their joints' names."""
+    """True if Pinocchio has siblings in the file's order, false if in the order of their joints' names."""

@@ -1,4 +1,4 @@
-"""Joints of a robot's file that are no coordinates: what they do, for who has a log of all of them."""
+"""Joints of a robot's file that are no coordinates, and how they move; logs may contain all of them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -13,7 +13,7 @@ from linkwise.robot.robot import Follower
 def followers(
     axes: Sequence[Axis], connections: Sequence[Connection], moving: Movement, lock: Mapping[str, float]
 ) -> Iterator[Follower]:
-    """Joints that follow another or are locked, by what their axes do, or their file says."""
+    """Yield a Follower for each joint that follows another or is locked, by its axes or by its file."""
     names = [c.name for c in moving.coordinates]
     for axis in axes:
         rule = moving.motion[axis.name]

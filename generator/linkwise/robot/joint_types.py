@@ -27,7 +27,7 @@ BALL: tuple[Part, ...] = (("yaw", "revolute", Z), ("pitch", "revolute", Y), ("ro
 FLOATING: tuple[Part, ...] = (("x", "prismatic", X), ("y", "prismatic", Y), ("z", "prismatic", Z), *BALL)
 KNOWN = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating", "ball")
 EFFECTS = {"ball": TURNS, "floating": FLOATS}
-"""What the coordinates of a joint type mean for the torques."""
+"""Effect of a joint type's coordinates on the torques, in words."""
 
 
 @dataclass(frozen=True)
@@ -39,20 +39,20 @@ class Axis:
     kind: Kind
     direction: Vector
     follows: tuple[str, Curve] | None = None
-    """The coordinate, empty for none, and the curve of it, of an axis that has none of its own."""
+    """Name of the coordinate (empty: none) and curve of it, for an axis without a coordinate of its own."""
 
     @property
     def unit(self) -> Literal["rad", "m"]:
-        """Return rad or m."""
+        """Unit of the axis's coordinate: rad or m."""
         return "rad" if self.kind == "revolute" else "m"
 
 
 def expand(connection: Connection) -> tuple[Axis, ...]:
     """Return the axes of a joint, none for a fixed one; raises LinkwiseError for an unknown type.
 
-    A floating joint is x, y, z of its parent's frame, then yaw, pitch, roll about the moved z, y, x: the
-    order of rpy. A ball is its last three. A planar joint slides in the plane normal to its axis, then
-    turns about it.
+    A floating joint has x, y, z of the joint's frame on the parent, then yaw, pitch, roll about the moved z,
+    y, x: the order of rpy. A ball has the last three. A planar joint slides in the plane normal to its axis,
+    then turns about it.
     """
     if connection.type == "fixed":
         return ()
@@ -84,7 +84,7 @@ def expansion_notes(connections: Iterable[Connection]) -> list[Note]:
 
 
 def named_pose(joint: str, rotation: Rotation, translation: Vec3) -> str:
-    """Coordinates of a floating joint at which it has this pose, in words, in m and rad; 0 is left out."""
+    """Return the coordinates of a floating joint at this pose, in words, in m and rad; zeros are left out."""
     yaw, roll = (
         math.atan2(float(a), float(b)) for a, b in ((rotation[1][0], rotation[0][0]), rotation[2][1:])
     )

@@ -1,4 +1,4 @@
-"""Limits that a robot's file gives its joints, by the coordinates that these became."""
+"""Limits that a robot's file gives its joints, assigned to the coordinates of these joints."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -10,17 +10,17 @@ from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.robot import UNLIMITED, Coordinate, Limits
 
 ROUNDING = 1e-6
-"""How far, in rad or m, a joint may stand past a limit that was rounded."""
+"""Distance, in rad or m, by which a joint may stand past a limit that was rounded."""
 
 
 def coordinate_limits(
     connections: Sequence[Connection], coordinates: Sequence[Coordinate]
 ) -> tuple[Limits, ...]:
-    """Limits of each coordinate: those of the joint of its name, none of one of several axes.
+    """Return the limits of each coordinate: those of the joint of its name, none if it has several axes.
 
-    A joint that follows another has limits of its own, which are not carried over: its file may give them for
-    the sake of form, and how they bind the other is for who drives both. Raises LinkwiseError for a limit
-    that is not a number.
+    The result is empty if no coordinate has limits. A joint that follows another has limits of its own, which
+    are not carried over: its file may give them only for the sake of form, and how they bind the other is up
+    to whoever drives both. Raises LinkwiseError for a limit that is not a number.
     """
     known = _known(connections)
     for name, limits in known.items():
@@ -31,7 +31,7 @@ def coordinate_limits(
 
 
 def check_locks(connections: Sequence[Connection], lock: Mapping[str, float]) -> None:
-    """Raise LinkwiseError where a joint is to stand outside of its limits, as a number in degrees would."""
+    """Raise LinkwiseError for a joint locked outside of its limits, as happens with a number in degrees."""
     known = _known(connections)
     for name, at in lock.items():
         limits = known.get(name, UNLIMITED)
@@ -43,6 +43,6 @@ def check_locks(connections: Sequence[Connection], lock: Mapping[str, float]) ->
 
 
 def _known(connections: Sequence[Connection]) -> dict[str, Limits]:
-    """Limits of the file's joints of one axis, and of coordinates that axes follow."""
+    """Return the limits of the file's joints of one axis, and of coordinates that axes follow, by name."""
     known = {c.name: c.limits for c in connections if c.type in SINGLE}
     return known | {c.name: c.limits for connection in connections for c in connection.coordinates}

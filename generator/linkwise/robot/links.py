@@ -1,4 +1,4 @@
-"""Moving links from the bodies and joints of a description: frames on axes, fixed joints merged away."""
+"""Moving links made of a description's bodies and joints: frames on axes, fixed joints merged away."""
 
 from dataclasses import dataclass, field, replace
 
@@ -14,7 +14,7 @@ from linkwise.robot.robot import Frame, Joint, Link, Rotation, Vec3
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a body is: the moving link that it belongs to (None: the ground), and its frame's pose there."""
+    """Pose of a body's frame on the moving link that it belongs to (None: the ground)."""
 
     link: int | None
     rotation: Rotation = IDENTITY
@@ -25,7 +25,7 @@ class _Place:
 class _Moving:
     """A moving link while it gathers bodies, in axes of its own.
 
-    Those become the link's frame, with z on the joint's axis, by `shift` and then `turn`.
+    `shift` and then `turn` lead from these to the link's frame, which has z on the joint's axis.
     """
 
     name: str
@@ -36,11 +36,11 @@ class _Moving:
     members: list[Placed] = field(default_factory=list)
 
     def framed(self, position: Vec3) -> Vec3:
-        """Return a place in the link's frame."""
+        """Return a place, given in the gathering axes, in the link's frame."""
         return transforms.rotate(self.turn, transforms.add(self.shift, position))
 
     def link(self, naming: Naming | None) -> Link:
-        """Return the link with what it gathered, its numbers named where `naming` does so."""
+        """Return the link with the bodies that it gathered; its numbers get names from `naming`, if any."""
         mass, com, inertia = merge(self.members)
         if naming:
             mass, com, inertia = naming.body(self.name, len(self.members) > 1, mass, com, inertia)
@@ -50,7 +50,7 @@ class _Moving:
 
 @dataclass(frozen=True)
 class Assembly:
-    """The moving links; `carrier` is the index of that which each body belongs to, None for the ground."""
+    """Moving links of a robot; `carrier` is the index of each body's moving link, None for the ground."""
 
     links: tuple[Link, ...]
     carrier: dict[str, int | None]
@@ -79,7 +79,7 @@ def moving_links(
         before, child = places.get(connection.parent, _Place(None)), by_name[connection.child]
         start = connection.translation
         if naming:
-            # On the ground it shifts everything alike; of a fixed joint it is part of the body it belongs to.
+            # A place on the ground shifts everything alike; that of a fixed joint is part of a merged body.
             moves = any(motion[axis.name].coordinate is not None for axis in axes)
             start = naming.place(connection, moves and before.link is not None)
         turn = transforms.compose(before.rotation, connection.rotation)
@@ -108,7 +108,7 @@ def moving_links(
 def _frames(
     places: dict[str, _Place], sites: tuple[Site, ...], moving: list[_Moving]
 ) -> tuple[tuple[Frame, ...], list[Note]]:
-    """Return the frames by name, those on the ground first, then link by link; and notes on sites left out.
+    """Return the frames, those on the ground first, then link by link, and notes on sites left out.
 
     A site whose body is not there was cut away.
     """
@@ -143,10 +143,11 @@ def _pass(
     moving: list[_Moving],
     own_axes: bool,
 ) -> _Place:
-    """Pass one axis: a new moving link, the child's behind the `last` that moves, or a fixed displacement.
+    """Return the place behind one axis: on a new moving link, or displaced by a fixed amount.
 
-    The new link's frame has z on the axis; an offset of the coordinate is folded into the fixed part. What it
-    gathers is in that frame, or in the child's `own_axes`.
+    A new link is appended to `moving`, as the child's behind the `last` axis that moves. Its frame has z on
+    the axis; an offset of the coordinate is folded into the fixed part. It gathers bodies in that frame or,
+    with `own_axes`, in the child's axes.
     """
     align = transforms.align_z(axis.direction)
     rotation, position = transforms.compose(place.rotation, align), place.position

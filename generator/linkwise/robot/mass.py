@@ -1,4 +1,4 @@
-"""Mass properties: merging rigidly connected bodies, and whether a body can exist."""
+"""Mass properties: merging of rigidly connected bodies, and the test whether a body can exist."""
 
 from collections.abc import Iterable
 from typing import Any, TypeAlias
@@ -16,18 +16,19 @@ TRIANGLE = 1e-6
 """Relative slack of the triangle inequality: files round flat bodies' moments to about six digits."""
 
 MOST_NAMED = 20
-"""Bodies that cannot exist, in one message."""
+"""Most bodies that cannot exist, in one message."""
 
 SPECK = 1e-14
-"""m²: moments below mass · (100 nm)² count as zero. The moments of a point mass are zeros that turning
-and rounding leave at 1e-18 or 1e-35, where no relative slack helps; a solid body so small weighs 1e-15 kg."""
+"""Area in m²: moments below mass · (100 nm)² count as zero. The moments of a point mass are zeros that
+turning and rounding leave at 1e-18 or 1e-35, where no relative slack helps; a solid body so small weighs
+1e-15 kg."""
 
 Array: TypeAlias = np.ndarray[Any, Any]
 Placed = tuple[Body, Rotation, Vec3]
 
 
 def merge(bodies: list[Placed]) -> tuple[Scalar, Vec3, Mat3]:
-    """Mass, centre of mass and inertia about it of rigidly connected bodies, in one frame."""
+    """Return the mass, centre of mass and inertia about it of rigidly connected bodies, in one frame."""
     placed = [
         (
             body.mass,
@@ -60,10 +61,10 @@ def _empty(body: Body) -> bool:
 
 
 def check_bodies(bodies: Iterable[Body], allow: bool) -> list[Note]:
-    """Return a note for each body that cannot exist, of bodies with numbers for values.
+    """Return a note for each body that cannot exist; the bodies have numbers for values.
 
-    Raises LinkwiseError for all of them unless `allow` or the file itself allows it, and for what is not a
-    usable number always.
+    Raises LinkwiseError that names all of them unless `allow` or the file itself allows it, and always for
+    numbers that are not usable.
     """
     faults = [(body, fault) for body in bodies if (fault := _fault(body))]
     refused = [] if allow else [(body.name, fault) for body, fault in faults if not body.unphysical]
@@ -82,14 +83,20 @@ def check_bodies(bodies: Iterable[Body], allow: bool) -> list[Note]:
 
 
 def principal(mass: float, inertia: Array) -> tuple[Array, Array]:
-    """Return the principal moments, rounding's left-overs set to zero, in ascending order, and their axes."""
+    """Return the principal moments (3,), ascending, and their axes (3, 3), in columns.
+
+    Moments that are only rounding are set to zero.
+    """
     moments, axes = np.linalg.eigh(inertia)
     noise = max(SPECK * mass, np.finfo(float).eps * float(np.abs(moments).max()))
     return np.where(np.abs(moments) <= noise, 0.0, moments), axes
 
 
 def _fault(body: Body) -> str:
-    """Return what is unphysical about a body, or an empty string."""
+    """Return the unphysical property of a body in words, or an empty string.
+
+    Raises LinkwiseError for numbers that are not usable.
+    """
     values = (body.mass, *body.com, *(entry for row in body.inertia for entry in row))
     if fault := unusable(*values):
         raise LinkwiseError(f"link {body.name!r} has {fault} in its mass, com or inertia; give numbers")

@@ -1,4 +1,4 @@
-"""Whether a robot's total mass matrix can be inverted: which coordinates carry no inertia of their own.
+"""Test whether a robot's total mass matrix is singular: coordinates that carry no inertia of their own.
 
 M(q) = A(q)ᵀ A(q), where A stacks √m times each link's linear and √I times its angular Jacobian. M is singular
 in every state if it is so at random ones: A is analytic in q, and so its rank is largest almost everywhere.
@@ -21,30 +21,30 @@ STATES = 3
 """Random states that must agree before a robot is refused."""
 
 OWN = 1e-8
-"""√ of the least share of a coordinate's inertia that is its own: in M, rounding takes a smaller one."""
+"""√ of the least share of a coordinate's inertia that is its own: in M, rounding hides a smaller one."""
 
 CLEAR = 1e-5
-"""A share of which M itself, in double precision, leaves no doubt: 1e-10 of its diagonal."""
+"""√ of a share of which M itself, in double precision, leaves no doubt: 1e-10 of its diagonal."""
 
 SHARE = 1e-6
-"""Of a coordinate's motion, less than this is rounding."""
+"""Share of a coordinate's motion below which it is rounding."""
 
 
 @dataclass(frozen=True)
 class _Factor:
-    """A with M = AᵀA at one state, (rows, n), and the mass that each coordinate turns, in kg."""
+    """Factor A with M = AᵀA at one state, (rows, n), and the mass (n,) that each coordinate turns, in kg."""
 
     a: Array
     turned: Array
 
     @property
     def idle(self) -> Array:
-        """Whether a coordinate moves no inertia: its masses are none, or points on its axis."""
+        """True where a coordinate moves no inertia (n,): no mass, or only points on its axis."""
         moved: Array = (self.a**2).sum(0) <= SPECK * self.turned
         return moved
 
     def dependent(self, columns: Array) -> tuple[int, ...]:
-        """Return the first of the columns that depends on others before it, behind these; or none."""
+        """Return the first column that depends on others before it, behind these; empty if there is none."""
         a = self.a[:, columns]
         a = a / np.sqrt((a**2).sum(0))
         if _clearly_regular(a.T @ a):
@@ -60,7 +60,10 @@ class _Factor:
 
 
 def _clearly_regular(m: Array) -> bool:
-    """Whether a matrix with ones on its diagonal is far from singular; quick, and enough for most robots."""
+    """Return whether a matrix with ones on its diagonal is far from singular.
+
+    The test is quick, and enough for most robots.
+    """
     try:
         return bool(np.diag(np.linalg.cholesky(m)).min(initial=1.0) > CLEAR)
     except np.linalg.LinAlgError:
@@ -72,7 +75,7 @@ def check_mass_matrix(
 ) -> list[Note]:
     """Return a note on each coordinate without inertia of its own; raises LinkwiseError unless `allow`.
 
-    Links have numbers for values; `files` names those that stand in the file.
+    Links have numbers for values; `files` are the names of those that stand in the file.
     """
     generator = np.random.default_rng(0)
     states = generator.uniform(-np.pi, np.pi, (STATES, len(moving)))
@@ -104,7 +107,7 @@ def check_mass_matrix(
 
 
 def _mend(links: Sequence[Link], coordinate: int, files: Collection[str]) -> str:
-    """Return which link could tell the last of the joints from the others, if it is one of the file."""
+    """Return the remedy in words: mass for the link before the coordinate's joint, if the file has it."""
     at = next(link.parent for link in links if link.joint.coordinate == coordinate)
     if at is not None and links[at].name in files:
         return f"give link {links[at].name!r} between them mass and inertia"
@@ -112,7 +115,10 @@ def _mend(links: Sequence[Link], coordinate: int, files: Collection[str]) -> str
 
 
 def _factor(links: Sequence[Link], q: Array) -> _Factor:
-    """Return A at one state; a mass below zero, which only an option allows, counts as one above."""
+    """Return A at the state q (n,).
+
+    A mass or moment below zero, which only an option allows, counts as one above.
+    """
     frames, joints = _frames(links, q), [link.joint for link in links]
     axes = np.array([rotation[:, 2] for rotation, _ in frames])
     places = np.array([place for _, place in frames])
@@ -139,7 +145,7 @@ def _factor(links: Sequence[Link], q: Array) -> _Factor:
 
 
 def _displacement(joint: Joint, q: Array, derivative: int = 0) -> float:
-    """What a joint moves by, or the derivative of that by its coordinate."""
+    """Return the displacement of a joint in rad or m, or the derivative of it by its coordinate."""
     x = float(q[joint.coordinate])
     if joint.curve:
         return joint.ratio * joint.curve(x, derivative)
@@ -147,7 +153,7 @@ def _displacement(joint: Joint, q: Array, derivative: int = 0) -> float:
 
 
 def _frames(links: Sequence[Link], q: Array) -> list[tuple[Array, Array]]:
-    """Rotation and place of each link's frame in the world, parents first."""
+    """Return the rotation (3, 3) and origin (3,), in m, of each link's frame in the world, parents first."""
     frames: list[tuple[Array, Array]] = []
     for link in links:
         joint = link.joint

@@ -1,4 +1,4 @@
-"""Joints of a file by their coordinates, in the file's order and in Pinocchio's."""
+"""Moving joints of a file, by their coordinates, in the file's order and in Pinocchio's."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
@@ -19,7 +19,7 @@ KINDS: Mapping[str, Literal["continuous", "planar", "ball", "floating"]] = {
 def moving_joints(
     joints: Sequence[tuple[Connection, tuple[Axis, ...]]], moving: Movement, ordered: bool
 ) -> tuple[MovingJoint, ...]:
-    """Return joints of which a coordinate is, in the order of these.
+    """Return the joints that have coordinates, in the order of these.
 
     ordered: whether Pinocchio has siblings in the file's order, and not in that of their joints' names, fixed
     ones among them
@@ -44,7 +44,7 @@ def moving_joints(
 
 
 def _by_name(connections: Sequence[Connection]) -> Iterator[str]:
-    """Names of joints depth first, siblings in the order of their names."""
+    """Yield the names of joints depth first, siblings in the order of their names."""
     below: dict[str, list[Connection]] = {}
     for connection in sorted(connections, key=lambda c: c.name, reverse=True):
         below.setdefault(connection.parent, []).append(connection)

@@ -21,14 +21,14 @@ KINDS = {
     ),
 }
 MOST_USES = 4
-"""Uses of a file's own parameter that its meaning names."""
+"""Most uses of a file's own parameter that its meaning names."""
 
 Named = Literal["every", "nonzero", "none"]
-"""Which numbers get a name, beside what the file gives names itself."""
+"""Kinds of numbers that get a name, beside those that the file names itself."""
 
 
 class Naming:
-    """Gives numbers names: m_LINK, c_LINK_x, I_LINK_xy of a link, p_LINK_x of its joint; formulas stay.
+    """Naming of numbers: m_LINK, c_LINK_x, I_LINK_xy of a link, p_LINK_x of its joint; formulas stay.
 
     Values are the file's. A name that the file's own parameters (`given`) have already gets an underscore.
     """
@@ -39,7 +39,7 @@ class Naming:
         self._uses: dict[str, list[str]] = {}
 
     def place(self, connection: Connection, varied: bool) -> Vec3:
-        """Place of a joint, which stays what it is unless `varied`."""
+        """Return the place of a joint, in m, its numbers replaced by names if `varied`."""
         self._made.setdefault(connection.child, {})
         link, what = connection.child, f"place of joint {connection.name!r}"
         frame = f"in the frame of link {connection.parent!r}"
@@ -52,7 +52,7 @@ class Naming:
     def body(
         self, link: str, merged: bool, mass: Scalar, com: Vec3, inertia: Mat3
     ) -> tuple[Scalar, Vec3, Mat3]:
-        """Mass, centre of mass and inertia of a link; one without any of them gets none."""
+        """Return mass, centre of mass and inertia of a link, named; a link without any of them gets none."""
         if mass == 0 and all(entry == 0 for row in inertia for entry in row):
             return mass, com, inertia
         whole = f"link {link!r}{' with what is fixed to it' if merged else ''}"
@@ -77,9 +77,9 @@ class Naming:
     def parameters(
         self, links: Iterable[Link], gravity: Vec3, tied: Iterable[tuple[str, Scalar]] = ()
     ) -> tuple[Parameter, ...]:
-        """The file's own that are used, then those made, link by link: where the joint is, then the body.
+        """Return the file's own parameters that are used, then those made, link by link: joint before body.
 
-        tied: numbers of constraints, each with what it is
+        tied: numbers of constraints, each with its name
         """
         others = [*((f"gravity_{axis}", value) for axis, value in zip("xyz", gravity, strict=True)), *tied]
         for use, value in others:
@@ -94,7 +94,7 @@ class Naming:
         return (*own, *(p for made in self._made.values() for p in made.values()))
 
     def notes(self) -> list[Note]:
-        """What the kinds of names made mean."""
+        """Return a note on the meaning of each kind of name that was made."""
         letters = {name[0] for made in self._made.values() for name in made}
         return [
             Note("promoted", f"{letter}_…", f"{what}{' in kg' if letter == 'm' else ''}")

@@ -1,4 +1,4 @@
-"""What became of things that a file says, and what of that touches the torques."""
+"""Notes on what was done with the content of a robot's file, and what of it affects the torques."""
 
 from collections import Counter
 from collections.abc import Collection, Iterable
@@ -21,12 +21,12 @@ FLOATS = f"six coordinates without any contact forces, {TURNS}"
 SHOWN = 5
 """Most subjects that one line of effects names."""
 LONGEST_ITEM = 150
-"""Characters of a subject and its reason."""
+"""Most characters of a subject and its reason."""
 
 
 @dataclass(frozen=True)
 class Note:
-    """Something that was done with the description: what happened to whom.
+    """A note on something that was done with the description, and to which subject.
 
     `effect` says what that means for the torques, in words that fit one subject or several; it is empty where
     the torques are those of the description.
@@ -58,10 +58,10 @@ class Note:
 
 @dataclass(frozen=True)
 class Omission:
-    """A force or inertia that a file has, and that no torque holds: `what` it is, of which `subject`.
+    """A force or inertia of a file that the torques leave out: `what` it is, and its `subject`.
 
-    It acts while one of its joints or bodies moves, or always where it names none, and only while all that it
-    `needs` is carried along.
+    It acts while one of its joints or bodies moves, or always where it names none, and only while all bodies
+    that it `needs` are carried along.
     """
 
     what: str
@@ -72,19 +72,19 @@ class Omission:
     needs: tuple[str, ...] = ()
 
     def acts(self, joints: Collection[str], bodies: Collection[str]) -> bool:
-        """Whether it loads a joint, of the joints and bodies that move."""
+        """Return whether it loads a joint, given the joints and bodies that move."""
         if any(body not in bodies for body in self.needs):
             return False
         anywhere = not (self.joints or self.bodies)
         return anywhere or any(j in joints for j in self.joints) or any(b in bodies for b in self.bodies)
 
     def note(self) -> Note:
-        """Say it."""
+        """Return the omission as a note."""
         return Note("left out", self.subject, self.detail, f"{self.what} {LEFT_OUT}")
 
 
 def effects(notes: Iterable[Note], every: bool = False) -> tuple[str, ...]:
-    """Lines on what touches the torques: one for each effect, or one for `every` note that has one.
+    """Return lines on what affects the torques: one for each effect or, with `every`, one for each such note.
 
     A line for an effect names its first subjects and counts the others.
     """
@@ -99,12 +99,12 @@ def effects(notes: Iterable[Note], every: bool = False) -> tuple[str, ...]:
 
 
 def left_out(notes: Iterable[Note]) -> tuple[Note, ...]:
-    """One note for each kind of thing that was left out, with how often, in place of one for each joint."""
+    """Return one note, with a count, for each kind of thing that was left out, not one for each joint."""
     return _counted("left out", LEFT_OUT, notes)
 
 
 def kept_apart(notes: Iterable[Note]) -> tuple[Note, ...]:
-    """The same for what joints have of their own."""
+    """Return one note, with a count, for each kind of passive force or inertia of the joints."""
     return _counted("passive", APART, notes)
 
 

@@ -1,4 +1,4 @@
-"""Numbers in place of a description's named parameters."""
+"""Substitution of numbers for a description's named parameters."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What joints have of their own, beside the links that they carry: springs, damping, friction, rotors."""
+"""Passive properties of joints, beside the links that they carry: springs, damping, friction, rotors."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import astuple, replace
@@ -16,14 +16,17 @@ SHARES: dict[str, tuple[str, tuple[str, str]]] = {
     "friction": ("friction", ("N·m", "N")),
     "armature": ("armature", ("kg·m²", "kg")),
 }
-"""By what it is called, the number that says whether it is there, and its units about an axis and along."""
+"""Properties by name: the field of `Passive` that shows one, and its units about an axis and along it."""
 
 NEVER_NEGATIVE = ("damping", "friction", "armature")
-"""A spring may push away from its rest; none of these can give energy without end."""
+"""Properties that may not be negative, as they would then give energy without end.
+
+A spring may be: it then pushes away from its rest.
+"""
 
 
 def checked_passive(connections: Iterable[Connection], allow_unphysical: bool) -> None:
-    """Raise LinkwiseError, which names the joint, for a number that none has."""
+    """Raise LinkwiseError, which names the joint, for a passive value that no joint has."""
     for c in connections:
         if fault := unusable(*astuple(c.passive)):
             raise LinkwiseError(f"joint {c.name!r} has {fault} among its springs and losses; give numbers")
@@ -38,9 +41,9 @@ def checked_passive(connections: Iterable[Connection], allow_unphysical: bool) -
 def passive_axes(
     connections: Iterable[Connection], motion: Mapping[str, AxisRule]
 ) -> tuple[PassiveAxis, ...]:
-    """Return those of the moving joints of one axis that have something of their own, by coordinate.
+    """Return the moving joints of one axis that have passive properties, with their coordinates.
 
-    A joint at ratio · q + offset has its rest counted from the offset.
+    The rest of a joint at ratio · q + offset is counted from the offset.
     """
     found = []
     for c in connections:
@@ -52,7 +55,7 @@ def passive_axes(
 
 
 def passive_notes(connections: Iterable[Connection], axes: Iterable[PassiveAxis]) -> Iterator[Note]:
-    """Say what the joints have, kind by kind, with the file's numbers."""
+    """Yield a note on each passive property of each joint, kind by kind, with the file's numbers."""
     moving = {axis.joint for axis in axes}
     there = [c for c in connections if c.name in moving]
     for what, (name, units) in SHARES.items():

@@ -1,4 +1,4 @@
-"""Reading a robot, whatever describes it: a built-in name or a file."""
+"""Reading a robot from a built-in name or a file."""
 
 import re
 from collections.abc import Callable
@@ -28,7 +28,7 @@ from linkwise.robot.size import MOST_JOINTS
 
 Reader: TypeAlias = Callable[[Path], Description]
 XML: dict[str, Reader] = {"mujoco": read_mjcf, "sdf": read_sdf}
-"""What reads a file by its root element, which is a URDF file's if it is another."""
+"""Readers of XML files by root element; any other element is read as URDF."""
 
 
 def read_xml(path: Path) -> Description:
@@ -44,21 +44,21 @@ READERS: dict[str, Reader] = {
     ".mjcf": read_mjcf,
     ".osim": read_osim,
 }
-"""What reads a file, by the end of its name."""
+"""Readers of files, by the end of the file's name."""
 
 MOST_BYTES = {".toml": toml_table.LARGEST, ".osim": osim_document.LARGEST}
-"""Of a file that is read as no other XML, by the end of its name."""
+"""Largest size in bytes, by the end of the name, of files with a limit other than that of most XML."""
 
 FILES = ("puma560", "torso")
 """Built-in robots that are TOML files beside `planar`."""
 
 BUILT_IN = ("planar3", f"planarN (N from 1 to {MOST_JOINTS})", *FILES)
 DESCRIPTIONS = f"{', '.join(BUILT_IN)}, or a {', '.join(READERS)} or .py file; .xml is URDF, MJCF or SDFormat"
-"""All that a robot may be read from, in words."""
+"""All sources that a robot may be read from, in words."""
 
 
 def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
-    """Robot from a built-in name or a file; raises LinkwiseError naming the file and the remedy."""
+    """Return the robot of a built-in name or a file; raises LinkwiseError naming the file and the remedy."""
     options = options or Options()
     if not str(spec).strip():
         raise LinkwiseError(f"the robot's name is empty; give {DESCRIPTIONS}")
@@ -67,7 +67,7 @@ def read_robot(spec: str | Path, options: Options | None = None) -> Robot:
 
 
 def told_name(spec: str | Path) -> str:
-    """What a manifest calls a robot: its file without the folder, or the built-in name."""
+    """Return the name of a robot in a manifest: its file without the folder, or the built-in name."""
     return Path(spec).name if is_file(Path(spec)) else str(spec)
 
 
@@ -86,30 +86,31 @@ def _read_robot(spec: str | Path, options: Options) -> Robot:
 
 
 def reader_of(path: Path) -> Reader | None:
-    """What reads a file; None for one that is none of a robot."""
+    """Return the reader of a file; None for one that is not a robot's."""
     reader = READERS.get(path.suffix.lower())
     return XML.get(root_tag(path), read_urdf) if reader is read_xml else reader
 
 
 def most_bytes(path: str | Path) -> int:
-    """How many bytes of a file its reader takes at most."""
+    """Return the largest size in bytes of a file that its reader accepts."""
     return MOST_BYTES.get(Path(path).suffix.lower(), LARGEST)
 
 
 def is_built_in(spec: str | Path) -> bool:
-    """Whether a name is that of a built-in robot."""
+    """Return whether a name is that of a built-in robot."""
     return str(spec) in FILES or re.fullmatch(r"planar([1-9][0-9]*)", str(spec)) is not None
 
 
 def is_description(spec: str | Path) -> bool:
-    """Whether a name is that of a built-in robot, or ends as a robot's file does."""
+    """Return whether a name is that of a built-in robot, or ends as a robot's file does."""
     return is_built_in(spec) or Path(spec).suffix.lower() in READERS
 
 
 def robot_files(spec: str | Path, options: Options) -> tuple[Path, ...]:
-    """Files that a robot is read from, with those that they include; a built-in has none.
+    """Return the files that a robot is read from, with those that they include; a built-in robot has none.
 
-    Raises LinkwiseError, with the file, for XML that is malformed.
+    The file of constraints that `options` name is among them. Raises LinkwiseError, which names the file, for
+    malformed XML.
     """
     path = Path(spec)
     own: tuple[Path, ...] = () if is_built_in(spec) else (path,)
@@ -121,7 +122,7 @@ def robot_files(spec: str | Path, options: Options) -> tuple[Path, ...]:
 
 
 def _built(description: Description, options: Options) -> Robot:
-    """Robot of a description and of the constraints beside it."""
+    """Return the robot of a description and of the constraints beside it."""
     if options.constraints is not None:
         check_constraints(numeric(description))
         with within(options.constraints):

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, TypeAlias
 
 import sympy as sp
+from linkwise_runtime.rule.joint_tree import TreeTie
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.curve import Curve
@@ -22,7 +23,10 @@ Rotation: TypeAlias = tuple[tuple[float, float, float], ...]
 
 
 class _Position(sp.Symbol):  # type: ignore[misc]
-    """Symbols of different classes differ, whatever they are called: a joint may bear any name."""
+    """Symbol of a position.
+
+    Symbols of different classes differ even if their names agree, so a joint may have any name.
+    """
 
 
 class _Velocity(sp.Symbol):  # type: ignore[misc]
@@ -37,7 +41,7 @@ class _Acceleration(sp.Symbol):  # type: ignore[misc]
 class Coordinate:
     """A generalized coordinate: its name, and rad for an angle or m for a length.
 
-    One that is `coupled` turns no axis one to one; OpenSim's files then have it in radians, always.
+    A `coupled` one turns no axis one to one; OpenSim's files then always have it in radians.
     """
 
     name: str
@@ -51,18 +55,18 @@ class Coordinate:
 
     @property
     def qd(self) -> sp.Symbol:
-        """Its velocity as a SymPy symbol."""
+        """Velocity of the coordinate as a SymPy symbol."""
         return _Velocity(f"d({self.name})/dt", real=True)
 
     @property
     def qdd(self) -> sp.Symbol:
-        """Its acceleration as a SymPy symbol."""
+        """Acceleration of the coordinate as a SymPy symbol."""
         return _Acceleration(f"d²({self.name})/dt²", real=True)
 
 
 @dataclass(frozen=True)
 class Follower:
-    """A joint of the file that is no coordinate: a curve of one or, where that has no name, a number."""
+    """A joint of the file that is no coordinate: a curve of one or, where `coordinate` is empty, a number."""
 
     name: str
     unit: Literal["rad", "m"]
@@ -86,9 +90,9 @@ class Joint:
     coordinate: int
     """Index among the robot's coordinates; joints that follow one another share it."""
     rotation: Rotation
-    """From the link's axes at q = 0 to the parent's."""
+    """Rotation from the link's axes at q = 0 to the parent's axes."""
     translation: Vec3
-    """Of the link's origin, in m, in the parent's axes."""
+    """Position of the link's origin, in m, in the parent's axes."""
     ratio: float = 1.0
     curve: Curve | None = None
 
@@ -97,7 +101,7 @@ class Joint:
 class MovingJoint:
     """A joint of the file that moves, and its coordinates: fewer than its kind has where some are locked.
 
-    kind: as `FileJoint` in runtime.file_joints has it; pinocchio: its place among those of Pinocchio's model
+    kind: as in `FileJoint` of runtime.file_joints; pinocchio: index among the joints of Pinocchio's model
     """
 
     name: str
@@ -108,20 +112,21 @@ class MovingJoint:
 
 @dataclass(frozen=True)
 class Passive:
-    """What a joint of one axis has of its own, q being its position in rad or m.
+    """Passive properties of a joint of one axis, q being its position in rad or m.
 
-    It takes stiffness (q − rest) + damping q̇ + friction sign(q̇) + armature q̈ to move it, beside its links.
+    To move it takes stiffness (q − rest) + damping q̇ + friction sign(q̇) + armature q̈, beside its links'
+    share.
     """
 
     stiffness: float = 0.0
-    """In N·m/rad or N/m."""
+    """Stiffness of a spring, in N·m/rad or N/m."""
     rest: float = 0.0
     damping: float = 0.0
-    """In N·m·s/rad or N·s/m."""
+    """Viscous damping, in N·m·s/rad or N·s/m."""
     friction: float = 0.0
-    """Coulomb's, in N·m or N."""
+    """Coulomb friction, in N·m or N."""
     armature: float = 0.0
-    """Inertia of what turns behind a gear, as the joint feels it, in kg·m² or kg."""
+    """Inertia of what turns behind a gear, as seen by the joint, in kg·m² or kg."""
 
 
 NOTHING = Passive()
@@ -129,28 +134,28 @@ NOTHING = Passive()
 
 @dataclass(frozen=True)
 class Limits:
-    """What a joint of one axis may reach, as its file has it: infinite where that says nothing.
+    """Limits of a joint of one axis, as its file has them: infinite where it gives none.
 
-    Nothing here keeps to them; they are there for whoever drives the joint.
+    Nothing here enforces them; they are there for whoever drives the joint.
     """
 
     lower: float = -math.inf
-    """Of its position, in rad or m."""
+    """Lower limit of the position, in rad or m."""
     upper: float = math.inf
     velocity: float = math.inf
-    """Of its speed either way, in rad/s or m/s."""
+    """Limit of the speed in either direction, in rad/s or m/s."""
     effort: float = math.inf
-    """Of its torque or force either way, in N·m or N."""
+    """Limit of the torque or force in either direction, in N·m or N."""
 
 
 UNLIMITED = Limits()
 LIMITS = tuple(asdict(UNLIMITED))
-"""Kinds of limits, by name."""
+"""Names of the kinds of limits."""
 
 
 @dataclass(frozen=True)
 class PassiveAxis:
-    """What a joint at ratio · q of a coordinate has of its own."""
+    """Passive properties of a joint at ratio · q of a coordinate q."""
 
     joint: str
     coordinate: int
@@ -172,12 +177,12 @@ class Link:
     inertia: Mat3
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: what the link weighs, where, and on which joint it hangs."""
+        """Return the HTML that a notebook shows: the link's mass, centre of mass, inertia and joint."""
         return link_table(self)
 
     @property
     def massless(self) -> bool:
-        """Whether the link carries neither mass nor inertia, and so has no Lagrangian."""
+        """True if the link carries neither mass nor inertia, and so has no Lagrangian."""
         return self.mass == 0 and all(entry == 0 for row in self.inertia for entry in row)
 
 
@@ -185,7 +190,7 @@ class Link:
 class Frame:
     """A named frame that a link carries: a body of the file, also one that was merged away, or a site.
 
-    Of a point with coordinates x in the frame, those in the link's frame are `rotation` x + `translation`.
+    A point x in the frame is at `rotation` x + `translation` in the link's frame.
     """
 
     name: str
@@ -193,26 +198,10 @@ class Frame:
     """Index among the robot's links; None for the ground, whose frame is the world's."""
     rotation: Rotation
     translation: Vec3
-    """In m."""
+    """Position of the origin in the link's frame, in m."""
 
 
 TieKind = Literal["point", "hinge", "frame", "distance"]
-
-
-@dataclass(frozen=True)
-class Tie:
-    """A constraint between two frames, beside the tree.
-
-    point: their origins coincide; hinge: and their z axes; frame: and all axes; distance: their origins are
-    `length` apart, in m.
-    """
-
-    name: str
-    kind: TieKind
-    first: int
-    """Index among the robot's frames."""
-    second: int
-    length: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -222,12 +211,12 @@ class Coupling:
     name: str
     terms: tuple[tuple[int, tuple[float, ...]], ...]
     follower: int | None = None
-    """The coordinate that the others give wherever they are: the file's first, where its term is c_1 q."""
+    """Coordinate that the others determine in every state: the file's first, where its term is c_1 q."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that stays an argument: its value in the file, unit (empty: as the file has it), meaning."""
+    """A number that stays an argument: its value in the file, unit (empty: the file's own) and meaning."""
 
     name: str
     value: float
@@ -239,12 +228,12 @@ class Parameter:
 class Robot:
     """A tree of links, parents before children, moved by `coordinates`; gravity in m/s².
 
-    `request` tells what it was read from and how, as manifests keep it. `frames` are the file's own, one for
-    each link among them, or none.
+    `request` records the source that it was read from and the options, as manifests keep them. `frames` are
+    those of the file, one for each link among them, or none.
 
-    `ties` and `couplings` hold beside the tree. Under them the coordinates `independent` move all others, in
-    ascending order, and `closed_position` is one in which they hold; before they are found, `wanted` are
-    those asked for, by name, and `driven` those that actuators drive.
+    `ties` and `couplings` hold beside the tree. Under them the `independent` coordinates, in ascending order,
+    determine all others, and `closed_position` is one in which they hold; before these are found, `wanted`
+    are the names asked for as independent, and `driven` the coordinates that actuators drive.
     """
 
     name: str
@@ -256,14 +245,14 @@ class Robot:
     request: Mapping[str, Any] = field(default_factory=dict, compare=False)
     frames: tuple[Frame, ...] = ()
     passive: tuple[PassiveAxis, ...] = ()
-    ties: tuple[Tie, ...] = ()
+    ties: tuple[TreeTie, ...] = ()
     couplings: tuple[Coupling, ...] = ()
     wanted: tuple[str, ...] = ()
     driven: tuple[int, ...] = ()
     independent: tuple[int, ...] = ()
     closed_position: tuple[float, ...] = ()
     limits: tuple[Limits, ...] = ()
-    """Of each coordinate, or none at all; those of joints that follow another are no limits of that one."""
+    """Limits of each coordinate, or empty; limits of joints that follow another do not limit that one."""
     followers: tuple[Follower, ...] = ()
     file_joints: tuple[MovingJoint, ...] = ()
 
@@ -286,28 +275,28 @@ class Robot:
                     raise LinkwiseError(f"two {what}s are named {name!r}; rename one")
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: joints with unit and limits, links with mass and parent."""
+        """Return the HTML that a notebook shows: joints with unit and limits, links with mass and parent."""
         return description_table(self)
 
     @property
     def allow_unphysical(self) -> bool:
-        """Whether its parameters may take values that no body has."""
+        """True if the robot's parameters may take values that no body has."""
         return bool(self.request.get("allow_unphysical"))
 
     @property
     def joint_limits(self) -> tuple[Limits, ...]:
-        """The limits of each coordinate; of a robot that was given none, no limits."""
+        """Limits of each coordinate; unlimited for a robot that was given none."""
         return self.limits or (UNLIMITED,) * len(self.coordinates)
 
     @property
     def named_frames(self) -> tuple[Frame, ...]:
-        """The frames; of a robot that was given none, those of its links."""
+        """Frames of the robot; the frames of its links for a robot that was given none."""
         upright = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         own = (Frame(link.name, at, upright, (0.0, 0.0, 0.0)) for at, link in enumerate(self.links))
         return self.frames or tuple(own)
 
     def chain(self, link: int) -> tuple[int, ...]:
-        """Indices of the links from the root to `link`, itself included."""
+        """Return the indices of the links from the root to `link`, itself included."""
         chain: list[int] = []
         at: int | None = link
         while at is not None:
@@ -321,11 +310,11 @@ class Robot:
 
 
 LARGEST = 1e12
-"""Of a description's numbers, in SI units: three of them multiplied still fit single precision."""
+"""Largest number of a description, in SI units: the product of three still fits single precision."""
 
 
 def unusable(*values: Scalar) -> str:
-    """Return what is among the numbers that no robot has, in words, or an empty text; expressions pass."""
+    """Return the fault of numbers that no robot has, in words, or an empty string; expressions pass."""
     numbers = [value for value in values if isinstance(value, (int, float))]
     if not all(map(math.isfinite, numbers)):
         return "NaN or infinity"

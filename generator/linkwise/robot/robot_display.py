@@ -1,4 +1,4 @@
-"""Robots and links of a description as a notebook shows them."""
+"""HTML for robots and links of a description, as a notebook shows them."""
 
 from collections.abc import Iterable
 from dataclasses import astuple
@@ -7,11 +7,11 @@ from typing import Any
 from linkwise_runtime.html_tables import joint_table, page_part, table
 
 SHOWN = 30
-"""Letters of a formula."""
+"""Most letters of a formula that are shown."""
 
 
 def description_table(robot: Any) -> str:
-    """HTML of a `Robot`: joints with their limits, links with mass and parent, and constraints."""
+    """Return the HTML of a `Robot`: joints with their limits, links with mass and parent, and constraints."""
     names = [coordinate.name for coordinate in robot.coordinates]
     links = (
         (str(j), link.name, _number(link.mass), _on(robot, link), link.joint.name)
@@ -28,7 +28,7 @@ def description_table(robot: Any) -> str:
 
 
 def link_table(link: Any) -> str:
-    """HTML of a `Link`."""
+    """Return the HTML of a `Link`."""
     rows = [
         ("joint", f"{link.joint.name}, {link.joint.kind}"),
         ("mass, kg", _number(link.mass)),
@@ -54,6 +54,6 @@ def _numbers(values: Iterable[Any]) -> str:
 
 
 def _number(value: Any) -> str:
-    """A number as it is read, a formula in parameters as it stands."""
+    """Return a number as it is read, or a formula in parameters as it stands."""
     text = f"{float(value):.5g}" if getattr(value, "is_number", True) else str(value)
     return text if len(text) <= SHOWN else f"{text[: SHOWN - 1]}…"

@@ -1,15 +1,15 @@
-"""How many joints and constraints a robot may have, wherever it is described."""
+"""Limits on the number of joints and constraints of a robot, wherever it is described."""
 
 from linkwise.errors import LinkwiseError
 
 MOST_JOINTS = 1000
-"""An arm of N joints has some N³/3 coefficients of each order: 1000 are far beyond what can be generated."""
+"""Most joints: an arm of N has some N³/3 coefficients of each order; 1000 are far beyond what is feasible."""
 FOR_EACH = 10
-"""Constraints for each joint that moves: one that holds nothing that others leave free is redundant."""
+"""Most constraints for each joint that moves: one that holds nothing that others leave free is redundant."""
 
 
 def check_joints(count: int, mend: str) -> None:
-    """Raise LinkwiseError where more joints move than linkwise takes, with what to do about it."""
+    """Raise LinkwiseError where more joints move than linkwise accepts; `mend` is the remedy in words."""
     if count > MOST_JOINTS:
         raise LinkwiseError(
             f"{count:,} joints move, and {MOST_JOINTS:,} are the most, as the number of coefficients grows"
@@ -20,7 +20,8 @@ def check_joints(count: int, mend: str) -> None:
 def check_constraint_count(constraints: int, joints: int) -> None:
     """Raise LinkwiseError for far more constraints than joints that they could hold.
 
-    Where constraints close, and which follow from others, takes time that grows with their square at least.
+    To find where constraints close, and which follow from others, takes time that grows at least with the
+    square of their number.
     """
     most = min(FOR_EACH * joints, MOST_JOINTS)
     if constraints > most:

@@ -1,29 +1,30 @@
-"""Ties between bodies as ties between frames: frames for their ends, and what cutting and locking left."""
+"""Ties between bodies as ties between frames: frames for their ends, ties left after cutting and locking."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import sympy as sp
 from linkwise_runtime.chosen_names import nearest_first
+from linkwise_runtime.rule.joint_tree import TreeTie
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot import transforms
 from linkwise.robot.description import Anchor, AnchoredTie, Body, Description, Site
 from linkwise.robot.notes import LEFT_OUT, Note
-from linkwise.robot.robot import Frame, Scalar, Tie, unusable
+from linkwise.robot.robot import Frame, Scalar, unusable
 
 CLOSE = 1e-6
-"""In m, by which ends that move as one may miss a tie without a word."""
+"""Distance in m by which ends that move as one may miss a tie without a warning."""
 
 Ends = dict[str, tuple[str, str]]
-"""Names of the frames that a tie joins, by its name."""
+"""Names of the two frames that a tie joins, by the tie's name."""
 
 
 def anchor_frames(description: Description, taken: Iterable[str]) -> tuple[tuple[Site, ...], Ends]:
-    """Return the file's sites and those for ends of ties that are no frame yet, and the names of all ends.
+    """Return the file's sites and new ones for ends of ties that are no frame yet, and the names of all ends.
 
-    `taken` are names of other frames. A new one is called after its tie, pin_first say.
+    `taken` are names of other frames. A new site is named after its tie, for example pin_first.
     """
     bodies, sites = description.bodies, description.sites
     known = {Anchor(body.name): body.name for body in bodies if not body.invented}
@@ -51,9 +52,9 @@ def anchor_frames(description: Description, taken: Iterable[str]) -> tuple[tuple
 
 
 def check_ties(ties: Iterable[AnchoredTie], bodies: Iterable[Body], sites: Iterable[Site]) -> None:
-    """Raise LinkwiseError for links that the file doesn't have, and numbers that cannot be.
+    """Raise LinkwiseError for links that the file does not have, and for unusable numbers.
 
-    sites: those by whose names ends could have been given too
+    sites: sites whose names could have been given as ends too
     """
     known = {body.name for body in bodies}
     names = [*sorted(known), *(site.name for site in sites)]
@@ -85,13 +86,13 @@ def tied(
     ends: Ends,
     frames: Sequence[Frame],
     values: Mapping[sp.Symbol, float],
-) -> tuple[tuple[Tie, ...], list[Note]]:
+) -> tuple[tuple[TreeTie, ...], list[Note]]:
     """Return the ties between frames that move against each other, and notes on the others.
 
     Raises LinkwiseError for a tie to a link that was cut away.
     """
     at = {frame.name: index for index, frame in enumerate(frames)}
-    found: list[Tie] = []
+    found: list[TreeTie] = []
     notes: list[Note] = []
     for tie in ties:
         there = [frames[at[name]] for name in ends[tie.name] if name in at]
@@ -103,12 +104,12 @@ def tied(
             notes.append(_as_one(tie, there[0], there[1], values))
         else:
             first, second = (at[name] for name in ends[tie.name])
-            found.append(Tie(tie.name, tie.kind, first, second, _length(tie)))
+            found.append(TreeTie(tie.name, tie.kind, first, second, _length(tie)))
     return tuple(found), notes
 
 
 def _length(tie: AnchoredTie) -> float:
-    """Return the length as a number; raises LinkwiseError for a formula, which stays none."""
+    """Return the length in m; raises LinkwiseError for a formula, which generated code would not keep."""
     if isinstance(tie.length, float):
         return tie.length
     raise LinkwiseError(
@@ -126,7 +127,7 @@ def _torn(tie: AnchoredTie, there: list[bool]) -> str:
 
 
 def _as_one(tie: AnchoredTie, first: Frame, second: Frame, values: Mapping[sp.Symbol, float]) -> Note:
-    """Say that both ends move as one, and how far apart they are if that is not what the tie asks for."""
+    """Return a note that both ends move as one, with the distance by which they miss the tie, if they do."""
     apart = transforms.add(first.translation, transforms.minus(second.translation))
     off = abs(math.hypot(*(float(sp.sympify(x).xreplace(dict(values))) for x in apart)) - _length(tie))
     if off <= CLOSE:
@@ -135,8 +136,8 @@ def _as_one(tie: AnchoredTie, first: Frame, second: Frame, values: Mapping[sp.Sy
     return Note("ignored", tie.name, detail, f"constraints {LEFT_OUT}")
 
 
-def tied_places(ties: Iterable[Tie], frames: Sequence[Frame]) -> Iterator[tuple[str, Scalar]]:
-    """Numbers of ties in which parameters may be, each with what it is."""
+def tied_places(ties: Iterable[TreeTie], frames: Sequence[Frame]) -> Iterator[tuple[str, Scalar]]:
+    """Yield the numbers of ties that may contain parameters, each as (name, number)."""
     for tie in ties:
         for frame in (frames[tie.first], frames[tie.second]):
             for axis, value in zip("xyz", frame.translation, strict=True):

@@ -7,11 +7,11 @@ from operator import mul
 from linkwise.robot.robot import Mat3, Rotation, Scalar, Vec3
 
 SNAP, ROUNDING = 1e-12, 1e-15
-"""What files round away, and what computing does."""
+"""Tolerances for the rounding of numbers in files, and for that of arithmetic."""
 
 
 def times(number: float, value: Scalar) -> Scalar:
-    """number · value, without factors 0.0 and ±1.0 left in an expression."""
+    """Return number · value, without factors 0.0 and ±1.0 left in an expression."""
     if number == 0.0:
         return 0.0
     return value if number == 1.0 else -value if number == -1.0 else number * value
@@ -84,7 +84,7 @@ def about_z(angle: float) -> Rotation:
 
 
 def unit(axis: Sequence[float]) -> tuple[float, float, float] | None:
-    """Return the direction with length 1; none of a length below 1e-9."""
+    """Return the direction with length 1; None for a length below 1e-9."""
     length = math.hypot(*axis)
     if length < 1e-9:
         return None
@@ -108,9 +108,10 @@ def align_z(axis: Sequence[float]) -> Rotation:
 
 
 def snap(rows: Sequence[Sequence[float]]) -> Rotation:
-    """Round entries within 1e-12 of −1, 0 or 1, as far as rows stay orthonormal.
+    """Return the rows with entries within 1e-12 of −1, 0 or 1 rounded, as far as rows stay orthonormal.
 
-    ±90° turns then leave no 6e-17 behind; what a rounded angle, 1.570796 say, leaves is a turn of its own.
+    ±90° turns then leave no 6e-17 behind; what a rounded angle, 1.570796 for example, leaves is a turn of its
+    own.
     """
     near = _rounded(rows, SNAP)
     return near if _is_orthonormal(near) else _rounded(rows, ROUNDING)
@@ -136,7 +137,7 @@ def _is_orthonormal(rows: Rotation) -> bool:
 
 
 def total(terms: Iterable[Scalar]) -> Scalar:
-    """Sum in the order of the terms, which from Python 3.12 on `sum` rounds in another way than before."""
+    """Return the sum in the order of the terms; Python's `sum` rounds in another way from version 3.12 on."""
     result: Scalar = 0.0
     for term in terms:
         if isinstance(term, float) and term == 0.0:

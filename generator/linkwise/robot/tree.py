@@ -1,4 +1,4 @@
-"""The tree of a description: its one root, the walk from it, cutting parts off, and what is not a tree."""
+"""Tree of a description: its one root, the walk from it, the cutting of parts, and loops that are no tree."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -14,9 +14,9 @@ from linkwise.robot.robot import unusable
 
 
 def depth_first(description: Description) -> tuple[str, tuple[Connection, ...]]:
-    """Root link and the joints from it, parents first, siblings in the file's order.
+    """Return the root link and the joints from it, parents first, siblings in the file's order.
 
-    Raises LinkwiseError for two parents, several roots and loops.
+    Raises LinkwiseError for a link with two parents, for several roots and for loops.
     """
     parents = Counter(c.child for c in description.connections)
     for link, count in parents.items():
@@ -78,9 +78,10 @@ def _check_names(description: Description) -> None:
 
 
 def cut(description: Description, root: str | None, tip: str | None) -> Description:
-    """Keep link `root` and what it carries, of that only the chain to link `tip`; its notes say what went.
+    """Return the part from link `root` on, or only its chain to link `tip`, with notes on what was cut.
 
-    Raises LinkwiseError for names that are empty, double or unknown.
+    Raises LinkwiseError for names that are empty, double or unknown, and for a `tip` that is not below
+    `root`.
     """
     _check_names(description)
     known = {body.name for body in description.bodies}
@@ -118,9 +119,9 @@ def _below(description: Description, root: str) -> set[str]:
 
 
 def check_loops(loops: tuple[Loop, ...], carrier: Mapping[str, int | None]) -> None:
-    """Refuse what ties bodies together and is not modelled, unless they move as one or are cut away.
+    """Raise LinkwiseError for an unmodelled constraint, unless its bodies move as one or are cut away.
 
-    `carrier` names the moving link of each body that is there, None for the ground.
+    `carrier` is the index of the moving link of each body that is there, None for the ground.
     """
     for loop in loops:
         if not loop.pairs or any(_acts(pair, carrier, loop.of_joints) for pair in loop.pairs):
@@ -128,7 +129,7 @@ def check_loops(loops: tuple[Loop, ...], carrier: Mapping[str, int | None]) -> N
 
 
 def _acts(pair: tuple[str, str], carrier: Mapping[str, int | None], of_joint: bool) -> bool:
-    """Whether a tie between two bodies can load a moving link."""
+    """Return whether a constraint between two bodies can load a moving link."""
     there = [carrier[body] for body in pair if body in carrier]
     if len(there) < 2:
         return not of_joint and any(link is not None for link in there)

@@ -1,4 +1,4 @@
-"""Studies: many recordings, done by many processes or machines, and what they say together."""
+"""Studies: many recordings, run by many processes or machines, and their combined results."""
 
 from linkwise.study.process_pool import ProcessPool
 from linkwise.study.ray_cluster import RayCluster

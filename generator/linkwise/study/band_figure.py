@@ -1,4 +1,4 @@
-"""Figures for a paper: mean curves over the cycle with bands, or means by subject, by level of a factor."""
+"""Figures for a paper, by level of a factor: mean curves over the cycle with bands, or means by subject."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -17,15 +17,15 @@ from linkwise.study.subject_spread import Spread, columns_of_trials, spread, val
 from linkwise.study.trial_summary import TrialSummary
 
 MOST = 12
-"""Panels of a figure."""
+"""Most panels of a figure."""
 FORMATS = ("svg", "pdf")
 WIDE, HIGH = 3.4, 2.3
-"""Inches of a panel; two stand side by side."""
+"""Width and height of a panel in inches; two stand side by side."""
 
 
 @dataclass(frozen=True, eq=False)
 class BandPanel:
-    """A column, and its spread at each level."""
+    """A panel: a column, its spread at each level of the factor, and its tests."""
 
     column: str
     unit: str
@@ -36,7 +36,10 @@ class BandPanel:
 def band_figures(
     figures: Sequence[PaperFigure], trials: Sequence[TrialSummary], tests: Sequence[Compared]
 ) -> Iterator[tuple[str, bytes]]:
-    """Names and contents of all figures, each as SVG and as PDF; raises LinkwiseError for unknown columns."""
+    """Yield the name and content of all figures, each as SVG and as PDF.
+
+    Raises LinkwiseError for unknown columns.
+    """
     drawn_of = [panels_of(figure, trials, tests) for figure in figures]
     names = [
         figure.name or (panels[0].column if len(panels) == 1 else f"figure{number}")
@@ -52,7 +55,7 @@ def band_figures(
 def panels_of(
     figure: PaperFigure, trials: Sequence[TrialSummary], tests: Sequence[Compared]
 ) -> list[BandPanel]:
-    """The columns of a figure, and what is drawn of each."""
+    """Return a panel for each column of a figure."""
     known = columns_of_trials(trials)
     return [
         BandPanel(name, known[name], _levels(figure, trials, name), _about(figure, name, tests))
@@ -61,7 +64,10 @@ def panels_of(
 
 
 def figure_columns(figure: PaperFigure, names: Iterable[str]) -> list[str]:
-    """Those of these columns that a figure is of; raises LinkwiseError for unknown ones, and for too many."""
+    """Return those of the columns `names` that a figure shows.
+
+    Raises LinkwiseError for unknown columns, and for too many.
+    """
     found = fitting("[[figure]]", names, figure.columns)
     if len(found) > MOST:
         raise LinkwiseError(f"[[figure]]: {len(found)} columns; {MOST} are legible, so give fewer")

@@ -1,4 +1,4 @@
-"""Which columns a pattern is of: * stands for anything in one part of a name, ** for any parts."""
+"""Patterns of column names: * stands for anything in one part of a name, ** for any parts."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -10,13 +10,13 @@ from linkwise.escape import listed, short
 
 WILD = re.compile(r"(\*+)")
 LONGEST = 200
-"""Characters of a pattern that a message shows, and that names are compared with."""
+"""Most characters of a pattern that a message shows, and that names are compared with."""
 
 
 def fitting(place: str, names: Iterable[str], patterns: Sequence[str]) -> list[str]:
-    """The names that any pattern fits, in their order: tau/* is tau/knee, and not tau/knee/foot.
+    """Return the names that any pattern fits, in their order: tau/* fits tau/knee, and not tau/knee/foot.
 
-    Raises LinkwiseError, with the place of the study's file, for a pattern that fits none.
+    Raises LinkwiseError, with the place in the study's file, for a pattern that fits none.
     """
     names = list(names)
     found = set[str]()
@@ -33,10 +33,10 @@ def fitting(place: str, names: Iterable[str], patterns: Sequence[str]) -> list[s
 
 
 def _fits(pieces: Sequence[str], name: str) -> bool:
-    """Whether texts, and the stars between them, are all of a name.
+    """Return whether the pieces of a pattern, texts with stars between them, fit the whole name.
 
-    Goes along the pieces with all ends that what is before may have in the name. A regular expression tries
-    them one after the other, which takes for ever for a dozen stars.
+    The pieces are followed with all places in the name where the part before may end. A regular expression
+    tries them one after the other, which takes forever for a dozen stars.
     """
     first, *rest = pieces
     ends = {len(first)} if name.startswith(first) else set[int]()
@@ -49,6 +49,6 @@ def _fits(pieces: Sequence[str], name: str) -> bool:
 
 
 def _reached(name: str, end: int, over_parts: bool) -> range:
-    """Where what follows a star may begin."""
+    """Return the places where the text after a star may begin."""
     slash = -1 if over_parts else name.find("/", end)
     return range(end, (len(name) if slash < 0 else slash) + 1)

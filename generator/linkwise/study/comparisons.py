@@ -1,4 +1,4 @@
-"""Two levels of a factor held against each other: t tests over whole curves (SPM), or of means."""
+"""Comparison of two levels of a factor: t tests over whole curves (SPM), or of means."""
 
 import warnings
 from collections.abc import Iterable, Sequence
@@ -17,12 +17,12 @@ from linkwise.study.subject_spread import Spread, columns_of_trials, spread, val
 from linkwise.study.trial_summary import TrialSummary
 
 FEWEST = 3
-"""Subjects on a side that a test needs."""
+"""Fewest subjects on a side that a test needs."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cluster:
-    """A part of the cycle, in %, where curves differ, and its p; means differ over the whole."""
+    """A part of the cycle, in %, where curves differ, and its p; for means, the whole cycle."""
 
     start: float
     end: float
@@ -31,18 +31,18 @@ class Cluster:
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """What a test says of one column."""
+    """Result of a test of one column."""
 
     comparison: Comparison
     column: str
     unit: str
     sides: tuple[Spread, Spread]
     statistic: Array
-    """t at each point of the cycle, (points,); of means (1,)."""
+    """t at each point of the cycle, (points,); for means (1,)."""
     threshold: float
-    """|t| above which a curve differs by chance in `alpha` of all cases; of means NaN."""
+    """|t| above which a curve differs by chance in `alpha` of all cases; NaN for means."""
     p: float
-    """Of means; of curves NaN, as each of their parts has its own."""
+    """p of a test of means; NaN for curves, as each of their parts has its own."""
     clusters: tuple[Cluster, ...]
     """Parts that differ: each of some width, and of a p of its own below `alpha`."""
 
@@ -50,7 +50,7 @@ class Compared:
 def compared(
     comparison: Comparison, trials: Sequence[TrialSummary]
 ) -> tuple[list[Compared], tuple[str, ...]]:
-    """The test of every column that is asked for, and why some could not be made.
+    """Return the test of every column that is asked for, and why some could not be made.
 
     Raises LinkwiseError for unknown columns.
     """
@@ -66,7 +66,7 @@ def compared(
 
 
 def compared_columns(comparison: Comparison, names: Iterable[str]) -> list[str]:
-    """Those of these columns that are held against each other; raises LinkwiseError for unknown ones."""
+    """Return those of the columns `names` that are compared; raise LinkwiseError for unknown ones."""
     return fitting("[[compare]]", names, comparison.columns)
 
 
@@ -86,7 +86,7 @@ def _of_column(comparison: Comparison, trials: Sequence[TrialSummary], name: str
 
 
 def _paired(first: Spread, second: Spread) -> tuple[Spread, Spread]:
-    """Those subjects that are on both sides, in one order."""
+    """Return both sides with the subjects that are on both, in one order."""
     both = [subject for subject in first.subjects if subject in second.subjects]
     at = [[side.subjects.index(subject) for subject in both] for side in (first, second)]
     one, other = (
@@ -114,18 +114,18 @@ def _tested(comparison: Comparison, name: str, unit: str, first: Spread, second:
 
 
 def _that_differ(comparison: Comparison, parts: Sequence[Cluster]) -> tuple[Cluster, ...]:
-    """Those of some width and of a p below alpha.
+    """Return the parts that have some width and a p below alpha.
 
-    A curve may pass the threshold for so short a while that as short a while is found by chance more often.
+    A curve may exceed the threshold so briefly that an excess as brief occurs by chance more often.
     """
     return tuple(part for part in parts if part.start < part.end and part.p < comparison.alpha)
 
 
 def _of_means(is_paired: bool, first: Array, second: Array) -> tuple[float, float]:
-    """t and p; of unpaired subjects Welch's, whose variances need not be equal."""
+    """Return t and p; for unpaired subjects by Welch's test, whose variances need not be equal."""
     stats = extra("scipy.stats")
     with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of numbers that are nearly equal, as is told below
+        warnings.simplefilter("ignore")  # about numbers that are nearly equal, which is reported below
         test = (
             stats.ttest_rel(first, second) if is_paired else stats.ttest_ind(first, second, equal_var=False)
         )
@@ -135,11 +135,11 @@ def _of_means(is_paired: bool, first: Array, second: Array) -> tuple[float, floa
 
 
 def _of_curves(comparison: Comparison, first: Array, second: Array) -> tuple[Any, Any]:
-    """The field of t, and what is inferred from it; of unpaired subjects for variances that may differ."""
+    """Return the field of t, and the inference from it; for unpaired subjects, variances may differ."""
     stats = extra("spm1d").stats
     try:
         field = stats.ttest_paired(first, second) if comparison.paired else stats.ttest2(first, second)
         return field, field.inference(comparison.alpha, two_tailed=True)
-    except Exception as error:  # spm1d's own, of curves that do not vary somewhere
+    except Exception as error:  # spm1d's own error, for curves that do not vary somewhere
         reason = one_line(str(error).partition(":")[0], 200) or type(error).__name__
         raise LinkwiseError(f"spm1d: {reason}; leave the column out") from error

@@ -1,4 +1,4 @@
-"""Cycles of a trial, gait cycles say: where each begins and ends, and its samples over 0 to 100 %."""
+"""Cycles of a trial, such as gait cycles: where each begins and ends, and its samples over 0 to 100 %."""
 
 import csv
 from collections.abc import Callable, Sequence
@@ -20,12 +20,12 @@ from linkwise.study.study_plan import Cycles
 
 AT_ONCE = 1 << 18
 MARGIN = 3
-"""Samples beyond a cycle's ends that its splines see."""
+"""Samples beyond a cycle's ends that its splines use."""
 Span = tuple[float, float]
 
 
 def cycle_spans(cycles: Cycles, job: Job, trial: str) -> list[Span]:
-    """Beginning and end of each whole cycle in s; raises LinkwiseError where there is none."""
+    """Return the beginning and end of each whole cycle in s; raise LinkwiseError where there is none."""
     time = job.samples.time
     if cycles.table:
         found = written_cycles(cycles.table).get(trial, [])
@@ -50,7 +50,7 @@ def cycle_spans(cycles: Cycles, job: Job, trial: str) -> list[Span]:
 
 
 def _on(job: Job) -> NDArray[np.bool_]:
-    """At which samples the phase that tells of cycles is on."""
+    """Return at which samples the phase that defines the cycles is on."""
     (phase,) = (one for one in job.phases if one.name == "cycle")
     samples, robot = job.samples, job.decomposer.robot
     parts = []
@@ -62,7 +62,7 @@ def _on(job: Job) -> NDArray[np.bool_]:
 
 
 def written_cycles(table: str) -> dict[str, list[Span]]:
-    """Cycles of each trial in a table; raises LinkwiseError that names the row for what is none."""
+    """Return the cycles of each trial in a table; raise LinkwiseError, with the row, for an invalid one."""
     found: dict[str, list[Span]] = {}
     with opened_here(table) as path, path.open(newline="", encoding="utf-8-sig") as file:
         try:
@@ -91,9 +91,9 @@ def _span(start: str, end: str) -> Span:
 
 @dataclass
 class CycleSink:
-    """Takes blocks of samples in turn, and hands on each cycle at even shares of its time.
+    """Receiver of blocks of samples that passes on each cycle, at even shares of its time.
 
-    columns of blocks are in rows, the time first; spans ascend; take(number, rows) gets rows
+    Blocks have columns in rows, the time first; spans ascend; take(number, rows) receives rows
     (columns, points), the time among them
     """
 
@@ -116,11 +116,11 @@ class CycleSink:
             self._hand_on(MARGIN)
 
     def finish(self) -> None:
-        """Hand on cycles that end with the last samples."""
+        """Pass on the cycles that end with the last samples."""
         self._hand_on(0)
 
     def _hand_on(self, beyond: int) -> None:
-        """Hand on all cycles that end with so many samples beyond, and keep what later ones need."""
+        """Pass on all cycles that have `beyond` samples after their end, and keep what later ones need."""
         there = np.concatenate(self._kept, axis=1) if self._kept else np.empty((1, 0))
         while self._next < len(self.spans):
             start, end = self.spans[self._next]

@@ -1,4 +1,4 @@
-"""Fields of a path by a pattern: {FIELD} stands for anything in one part of the path, but for nothing."""
+"""Fields of a path by a pattern: {FIELD} stands for any text but an empty one in one part of the path."""
 
 import re
 from bisect import bisect_left, bisect_right
@@ -8,14 +8,14 @@ from linkwise.errors import LinkwiseError
 
 FIELD = re.compile(r"\{([A-Za-z_]\w*)\}")
 MOST = 10_000
-"""Places where fields may end that are tried for a path; of ordinary ones each is the right one."""
+"""Most ends of fields that are tried for a path; in ordinary paths each one tried is the right one."""
 
 Way = list[tuple[int, int]]
-"""From where to where in the path each field goes."""
+"""Start and end of each field in the path."""
 
 
 class FieldedPath:
-    """Texts, and the fields between them; a field that stands twice is the same text."""
+    """A pattern of texts, and the fields between them; a field that stands twice is the same text."""
 
     def __init__(self, pattern: str) -> None:
         self.texts, self.names = FIELD.split(pattern)[::2], FIELD.findall(pattern)
@@ -23,7 +23,7 @@ class FieldedPath:
         self._first = [at.setdefault(name, number) for number, name in enumerate(self.names)]
 
     def fields_of(self, path: str) -> dict[str, str]:
-        """Fields of a path that fits; none where it does not.
+        """Return the fields of a path that fits the pattern; empty if it does not fit.
 
         Raises LinkwiseError where it fits in two ways, and where too many would have to be tried.
         """
@@ -43,10 +43,10 @@ class FieldedPath:
         return {name: path[start:end] for name, (start, end) in zip(self.names, way, strict=True)}
 
     def _ends(self, path: str) -> list[list[int]]:
-        """Where each field may end, so that what follows fits to the path's end; nothing if it never does.
+        """Return where each field may end so that the rest fits to the path's end; empty if it never does.
 
-        Goes along the pattern once, from its end, with all places at a time. A regular expression tries one
-        after the other, which takes for ever for a dozen fields. A field that stands twice is any text here.
+        The pattern is followed once, from its end, with all places at a time. A regular expression tries one
+        after the other, which takes forever for a dozen fields. A field that stands twice is any text here.
         """
         ends = [len(path) - len(self.texts[-1])] if path.endswith(self.texts[-1]) else []
         found = [ends]
@@ -59,7 +59,10 @@ class FieldedPath:
         return found[::-1] if ends else []
 
     def _way(self, path: str, ends: list[list[int]], is_long: bool) -> Way | None:
-        """The way whose fields, one after the other, are as short or as long as they can be."""
+        """Return the way whose fields, one after the other, are as short or as long as they can be.
+
+        It is None where no way fits. Raises LinkwiseError where too many would have to be tried.
+        """
         way: Way = []
         tried = [self._tries(path, ends, way, is_long)]
         for _ in range(MOST):
@@ -79,7 +82,7 @@ class FieldedPath:
     def _tries(
         self, path: str, ends: list[list[int]], way: Sequence[tuple[int, int]], is_long: bool
     ) -> Iterator[tuple[int, int]]:
-        """Where the field after those of a way may go."""
+        """Yield the possible start and end of the next field after those of a way."""
         number = len(way)
         start = (way[-1][1] if way else 0) + len(self.texts[number])
         known = ends[number]

@@ -1,11 +1,11 @@
-"""Trials in processes of this machine; one that kills its process twice is told, and stops no other.
+"""Trials in processes of this machine; a trial that kills its process twice is reported and stops no other.
 
-A process may die by no fault of its trial, ended by somebody or where memory is short for a while; so each is
-tried once more, after all others, and no more often, as it may be the trial that takes the memory.
+A process may die through no fault of its trial: somebody ended it, or memory was short for a while. So each
+trial is tried once more, after all others, and no more often, as it may be the trial that takes the memory.
 
-Each process has a pipe of its own and shares nothing with the others: no lock dies with one of them, and
-whoever ends at any instant leaves nobody waiting. `concurrent.futures` keeps one queue for all, and takes
-the exit that a signal asks of a process for a result.
+Each process has a pipe of its own and shares nothing with the others: no lock dies with one of them, and a
+process that ends at any instant leaves nobody waiting. `concurrent.futures` keeps one queue for all, and
+takes a process's exit after a signal for a result.
 """
 
 import multiprocessing
@@ -24,27 +24,27 @@ from linkwise.output.workplace import ENDING, signals_held
 from linkwise.study.trial_work import TrialOutcome, TrialTask, run_trial
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""What keeps libraries from threads of their own: there is a process for every core."""
+"""Variables that keep libraries from threads of their own: there is a process for every core."""
 DIED = "its process died twice, as for want of memory; what is special about this log?"
 TIDYING = 3.0
-"""Seconds in which a process that is told to end removes what it has half written."""
+"""Seconds in which a process that is told to end removes its half-written files."""
 
 
 class ProcessPool:
-    """An engine of so many processes, one for each core unless given."""
+    """An engine of `workers` processes, one for each core unless given."""
 
     def __init__(self, workers: int | None = None) -> None:
         self.workers = workers or _cores()
 
     def outcomes(self, tasks: Sequence[TrialTask]) -> Generator[TrialOutcome]:
-        """Outcomes of all tasks, as they come; what is at work ends when nobody wants them any more."""
+        """Yield the outcomes of all tasks as they come; end running trials once the caller stops asking."""
         waiting, workers, again = list(reversed(tasks)), list[_Worker](), set[str]()
         if sys.platform != "win32":
-            resource_tracker.ensure_running()  # which lets signals pass, once, wherever it is begun
+            resource_tracker.ensure_running()  # its first start lets signals pass, so not below
         try:
             while waiting or workers:
                 while waiting and len(workers) < self.workers:
-                    with signals_held():  # one that comes meanwhile finds it among those that are ended
+                    with signals_held():  # a signal that comes now ends this one too
                         workers.append(_Worker())
                     workers[-1].give(waiting.pop())
                 ready = wait([worker.pipe for worker in workers])
@@ -67,7 +67,7 @@ class ProcessPool:
 
 
 class _Worker:
-    """A process that does one trial after another."""
+    """A process that runs one trial after another."""
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
@@ -75,15 +75,15 @@ class _Worker:
         self.process = context.Process(target=_work, args=(theirs,), daemon=True)
         with _born_apart():
             self.process.start()
-        theirs.close()  # the pipe ends where they do
+        theirs.close()  # so that the pipe ends when the process does
 
     def give(self, task: TrialTask) -> None:
         self.at_hand = task
-        with suppress(OSError):  # it is dead, as its outcome tells
+        with suppress(OSError):  # the process is dead, as its outcome shows
             self.pipe.send(task)
 
     def outcome(self) -> TrialOutcome | None:
-        """What became of the trial at hand; None where the process died."""
+        """Return the outcome of the current trial; None if the process died."""
         try:
             outcome: TrialOutcome = self.pipe.recv()
         except (EOFError, OSError):
@@ -93,7 +93,7 @@ class _Worker:
 
 
 def _end(workers: Sequence[_Worker]) -> None:
-    """End processes, in the midst of their work if need be; one that does not tidy up in time is killed."""
+    """End processes, even in the middle of their work; kill those that do not tidy up in time."""
     for worker in workers:
         worker.process.terminate()
     until = time.monotonic() + TIDYING
@@ -105,18 +105,18 @@ def _end(workers: Sequence[_Worker]) -> None:
 
 
 def _work(tasks: Connection) -> None:
-    """In a process: trials as they come, until it is told to end."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the matter of the one that began it
+    """Run trials as they come, in the worker's process, until it is told to end."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, *ENDING})
     _end_with_parent()
-    with suppress(EOFError, OSError):  # of the pipe, whose other end is gone: a trial tells its own
+    with suppress(EOFError, OSError):  # the pipe's other end is gone; a trial reports its own
         while True:
             tasks.send(run_trial(tasks.recv()))
 
 
 def _end_with_parent() -> None:
-    """In a process: end when the one that began it does, however that ends, and not after a trial more."""
+    """End this process when its parent ends, however that ends, without another trial."""
     if (parent := multiprocessing.parent_process()) is not None:
 
         def watch() -> None:
@@ -128,9 +128,9 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def _born_apart() -> Iterator[None]:
-    """Have a process that begins here know nothing of this one's program, and keep to one thread.
+    """Start processes that know nothing of this one's main program, and keep to one thread.
 
-    It would run a user's script again that has no `if __name__ == "__main__"`, and needs none of it.
+    A process would run a user's script again that has no `if __name__ == "__main__"`, and needs none of it.
     """
     main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
     unset = [name for name in ONE_THREAD if name not in os.environ]
@@ -144,6 +144,6 @@ def _born_apart() -> Iterator[None]:
 
 
 def _cores() -> int:
-    """Cores that this process may use."""
+    """Return the number of cores that this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)
     return len(affinity(0)) if affinity else os.cpu_count() or 1

@@ -1,7 +1,7 @@
-"""Trials on a cluster of Ray: the same work, on whatever node has a core free.
+"""Trials on a Ray cluster: the same work, on any node that has a core free.
 
-Who reaches a cluster runs code on it. One that is begun here is of this machine alone, so that it listens on
-the loopback interface and on no other.
+Anyone who reaches a cluster can run code on it. A cluster started here is for this machine alone, so it
+listens on the loopback interface and on no other.
 """
 
 import os
@@ -16,21 +16,21 @@ from linkwise.extras import extra
 from linkwise.study.trial_work import TrialOutcome, TrialTask, run_trial
 
 RETRIES = 3
-"""How often a trial is begun anew whose worker or node died."""
+"""Number of times that a trial is restarted after its worker or node died."""
 AHEAD = 4
-"""Trials handed out for each core, so that none waits for work."""
+"""Trials handed out for each core, so that no core waits for work."""
 OWN = "local"
-"""Ray's name for a cluster that is begun anew, whatever others run."""
+"""Ray's name for a new cluster, whatever others run."""
 JOINED = "RAY_ADDRESS"
-"""Ray's variable for the cluster that is meant where no address is given."""
+"""Ray's variable for the address of the cluster to use where none is given."""
 MANY_MACHINES = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
-"""Ray's variable, read when it is imported; at 0 its processes listen on loopback, as they do there."""
+"""Ray's variable, read at its import; at 0 its processes listen on loopback, as on Windows and macOS."""
 
 
 class RayCluster:
     """An engine of all cores of a cluster: the one at `address`, or else one of this machine alone.
 
-    address: HOST:PORT, "auto" for one that runs on this machine; of RAY_ADDRESS if not given
+    address: HOST:PORT, "auto" for one that runs on this machine; the value of RAY_ADDRESS if not given
     """
 
     def __init__(self, address: str | None = None) -> None:
@@ -40,9 +40,9 @@ class RayCluster:
         _require_answer(self._address)
 
     def outcomes(self, tasks: Sequence[TrialTask]) -> Generator[TrialOutcome]:
-        """Outcomes of all tasks, as they come.
+        """Yield the outcomes of all tasks as they come.
 
-        Raises LinkwiseError where no cluster is, and where Ray would listen beyond this machine.
+        Raises LinkwiseError where there is no cluster, and where Ray would listen beyond this machine.
         """
         ray = self._ray
         if not ray.is_initialized():
@@ -83,7 +83,7 @@ class RayCluster:
 
     @contextmanager
     def _kept_here(self) -> Iterator[None]:
-        """Have Ray, and what it begins, keep to this machine if the cluster is to be of it alone."""
+        """Keep Ray, and what it starts, on this machine if the cluster is for this machine alone."""
         former = os.environ.get(MANY_MACHINES)
         if self._address == OWN:
             os.environ[MANY_MACHINES] = "0"
@@ -96,7 +96,7 @@ class RayCluster:
 
 
 def _require_answer(address: str) -> None:
-    """Raise LinkwiseError where nothing listens at HOST:PORT, for which Ray would wait for minutes."""
+    """Raise LinkwiseError where nothing listens at HOST:PORT; Ray would wait for minutes."""
     host, sign, port = address.rpartition("://")[2].rpartition(":")
     if not sign:  # "auto" or "local"
         return

@@ -1,4 +1,4 @@
-"""Means, deviations and ranges over blocks that come one after the other."""
+"""Means, deviations and ranges over successive blocks."""
 
 import numpy as np
 
@@ -6,13 +6,14 @@ from linkwise.package.load import Array
 
 STATISTICS = ("mean", "std", "min", "max", "rms")
 AT_ONCE = 512
-"""Samples whose centred values stay in the cache."""
+"""Samples whose centred values fit in the cache."""
 
 
 class RunningMoments:
-    """Of rows of blocks, (rows, samples).
+    """Running statistics over the rows of blocks, (rows, samples).
 
-    Sums are of what differs from the first block's mean, so that a small deviation on a large mean is kept.
+    The sums are of differences from the first block's mean, so that a small deviation on a large mean is
+    kept.
     """
 
     def __init__(self, rows: int) -> None:
@@ -21,7 +22,7 @@ class RunningMoments:
         self._min, self._max = np.full(rows, np.inf), np.full(rows, -np.inf)
 
     def __call__(self, block: Array) -> None:
-        """Take a block in."""
+        """Add a block (rows, samples)."""
         if not self.count and block.shape[1]:
             self._about = block.mean(axis=1)
         for at in range(0, block.shape[1], AT_ONCE):
@@ -35,7 +36,7 @@ class RunningMoments:
 
     @property
     def table(self) -> Array:
-        """STATISTICS of each row, (statistics, rows); the deviation is that of the samples themselves."""
+        """STATISTICS of each row, (statistics, rows); the deviation is divided by the number of samples."""
         count = max(1, self.count)
         apart = self._sums / count
         mean = self._about + apart

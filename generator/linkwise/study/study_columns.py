@@ -1,4 +1,4 @@
-"""Columns that a study asks for, held against those of a trial before any begins."""
+"""Check of the columns that a study asks for, against those of a trial before any begins."""
 
 from collections.abc import Collection
 
@@ -16,8 +16,8 @@ from linkwise.study.trial_work import prepared_trial
 def check_columns(plan: StudyPlan, before: Collection[str]) -> None:
     """Raise LinkwiseError for columns that the first trial whose log can be read does not have.
 
-    before: names of trials that are done. Where there are none, and no trial can be begun, it is the study's
-    fault, and the reason of the first is raised.
+    before: names of trials that are done. If there are none, and no trial can begin, the study is at fault,
+    and the error of the first trial is raised.
     """
     with within(str(plan.file)):
         columns = _columns(plan, before)
@@ -31,7 +31,7 @@ def check_columns(plan: StudyPlan, before: Collection[str]) -> None:
 
 
 def _columns(plan: StudyPlan, before: Collection[str]) -> tuple[Column, ...]:
-    """Of the first trial that can be prepared; what is wrong with others is told in their turn."""
+    """Return the columns of the first trial that can be prepared; faults of others are reported later."""
     reasons: list[LinkwiseError] = []
     for trial in plan.trials:
         if trial.name in before:

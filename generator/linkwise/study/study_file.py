@@ -25,7 +25,7 @@ COLUMNS = (
     *("trial", "cycle", "percent", "time", "column", "unit", "statistic", "subjects", "trials"),
     *(f"{over}{name}" for over in ("", "trials_") for name in STATISTICS),
 )
-"""What columns of tables are called beside factors."""
+"""Names of columns of tables, besides the factors."""
 TOP = [
     "schema",
     "name",
@@ -42,16 +42,16 @@ TOP = [
 
 
 def read_study(path: Path, trust_python: bool = False) -> StudyPlan:
-    """Read a study; raises LinkwiseError, in one line with the file, for what cannot be.
+    """Read a study; raise LinkwiseError, in one line with the file, for an invalid one.
 
-    trust_python: whether robots that are Python files are run, once they are asked for
+    trust_python: whether robots that are Python files are run, once they are needed
     """
     with within(str(path)):
         require_file(path)
         data = known_keys("the file", toml_data(path), TOP)
         factors = _factors(data.get("factors", []))
         chosen = filled(AnalysisChoices, "[analysis]", data.get("analysis", {}))
-        folder = path.parent.absolute()  # workers may be in folders of their own
+        folder = path.parent.absolute()  # workers may run in other folders
         trials = tuple(trials_of(data, factors, chosen, folder))
         plan = StudyPlan(
             given_text(data, "name", path.stem),
@@ -78,7 +78,7 @@ def _factors(given: Any) -> tuple[str, ...]:
             f"'factors' is {given!r}; give names such as \"condition\", letters, digits and _"
         )
     taken = {name for name in (*OWN, *asdict(AnalysisChoices()), *COLUMNS) if name != SUBJECT}
-    lower = [name.lower() for name in given]  # DuckDB's columns are the same in any case
+    lower = [name.lower() for name in given]  # DuckDB ignores the case of columns
     for name in given:
         is_another = name.lower() == SUBJECT and name != SUBJECT
         if name.lower() in taken or is_another or lower.count(name.lower()) > 1:
@@ -107,7 +107,7 @@ def _cycles(data: Mapping[str, Any], folder: Path) -> Cycles | None:
 
 
 def _check(plan: StudyPlan) -> None:
-    """Raise LinkwiseError for trials that cannot be told apart, files that are not there, and odd levels."""
+    """Raise LinkwiseError for trials of one name, missing files, and levels that no trial has."""
     if not plan.trials:
         raise LinkwiseError("there is no trial; add [[trial]] with a log and a robot")
     counts = Counter(trial.name for trial in plan.trials)

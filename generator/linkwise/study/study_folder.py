@@ -1,4 +1,4 @@
-"""The folder of a study: what is where in it, and whose it is."""
+"""The folder of a study: where its files are, and which study it belongs to."""
 
 import os
 import re
@@ -19,28 +19,28 @@ from linkwise.study.trial_ledger import MARK, is_trial
 
 TRIALS, LOCK = "trials", ".lock"
 ADDRESS = re.compile(r"\w{2,}:/")
-"""Of a store, as `Path` shortens it; one letter is a disk of Windows."""
+"""Address of a store, as `Path` shortens it; a single letter is a drive of Windows."""
 
 
 def trial_folders(out: Path, plan: StudyPlan) -> dict[str, Path]:
-    """The folder of each trial, by its name."""
+    """Return the folder of each trial, by its name."""
     names = [trial.name for trial in plan.trials]
     folders = file_names(map(_folder_name, names))
     return {name: out / TRIALS / folder for name, folder in zip(names, folders, strict=True)}
 
 
 def _folder_name(name: str) -> str:
-    """Of a trial; those that begin with . or _ are passed over by who reads all tables of a folder."""
+    """Return a trial's folder name, without a leading . or _, which readers of a folder's tables skip."""
     folder = file_name(name)
     return f"trial{folder}" if folder[:1] in ("", ".", "_") else folder
 
 
 @contextmanager
 def held_study(out: Path) -> Iterator[None]:
-    """Keep other processes away from a study's folder; raises LinkwiseError where one is at work there.
+    """Keep other processes away from a study's folder; raise LinkwiseError where one is at work there.
 
-    So it does where what is to be locked is no regular file: a pipe would keep who opens it waiting.
-    What killed ones left, of this study and of its copies of files, goes before and after.
+    It also raises LinkwiseError where the lock is not a regular file: opening a pipe would wait. Leftovers of
+    killed processes, of this study and of its copies of files, are removed before and after.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -65,7 +65,7 @@ def _sweep(out: Path) -> None:
 
 
 def _locked(descriptor: int) -> bool:
-    """Whether no other holds it, as far as the file system knows."""
+    """Take the lock; return False if another process holds it, as far as the file system knows."""
     try:
         return system_here().lock(descriptor)
     except (ImportError, OSError):
@@ -90,7 +90,7 @@ def refuse_unless_study(out: Path, plan: StudyPlan) -> None:
 
 
 def sweep_trials(out: Path, folders: Mapping[str, Path]) -> None:
-    """Take away trials that are none of the study's any more."""
+    """Remove the folders of trials that no longer belong to the study."""
     kept = set(folders.values())
     for folder in (out / TRIALS).glob("*"):
         if folder not in kept and is_trial(folder):

@@ -1,4 +1,4 @@
-"""`study.json`: what a study was asked, and what came of it."""
+"""`study.json`: the request of a study, and its outcome."""
 
 import json
 import os
@@ -24,11 +24,11 @@ SUMMARIES, GROUPS, MEAN_CURVES, TESTS = (
     "curves.parquet",
     "tests.parquet",
 )
-"""Names of what is in the folder beside trials and figures."""
+"""Names of files in the folder besides trials and figures."""
 
 
 def is_of_study(name: str) -> bool:
-    """Whether a study calls one of its files so, or a figure."""
+    """Return whether a study gives this name to one of its files, or to a figure."""
     return name in (STUDY_PAGE, SUMMARIES, GROUPS, MEAN_CURVES, TESTS) or name.endswith(
         tuple(f".{kind}" for kind in FORMATS)
     )
@@ -36,40 +36,40 @@ def is_of_study(name: str) -> bool:
 
 @dataclass(frozen=True)
 class StudyMark:
-    """The content of the file."""
+    """Content of `study.json`."""
 
     study: str
-    """Its name."""
+    """Name of the study."""
     state: Literal["begun", "done"]
     factors: tuple[str, ...]
     trials: Mapping[str, Mapping[str, str]]
     """Level of each factor, by the trial's name."""
     broken: Mapping[str, str]
-    """Reasons, by the trial's name."""
+    """Reasons of the trials that failed, by the trial's name."""
     key: str
-    """Hash of all that `files` are made of; empty while they are not made."""
+    """Hash of everything that `files` depend on; empty while they are not made."""
     files: tuple[str, ...]
-    """Names of what is in the folder beside trials."""
+    """Names of the files in the folder, besides trials."""
 
     @classmethod
     def begun(cls, plan: StudyPlan, files: Sequence[str]) -> "StudyMark":
-        """That of a study at work, whose folder has files of a former run."""
+        """Return the mark of a study at work, whose folder has files of a former run."""
         return cls(plan.name, "begun", plan.factors, _trials(plan), {}, "", tuple(files))
 
     @classmethod
     def done(
         cls, plan: StudyPlan, broken: Sequence[TrialOutcome], key: str, files: Sequence[str]
     ) -> "StudyMark":
-        """That of a study whose trials are done or broken."""
+        """Return the mark of a study whose trials are done or broken."""
         reasons = {one.name: one.reason for one in broken}
         return cls(plan.name, "done", plan.factors, _trials(plan), reasons, key, tuple(files))
 
     @classmethod
     def read(cls, out: Path) -> "StudyMark | None":
-        """That of a study's folder, None where there is none.
+        """Return the mark of a study's folder, None where there is none.
 
-        Raises LinkwiseError for a damaged one, and for what is no regular file in the place of one of its
-        files: those that are not made again are removed.
+        Raises LinkwiseError for a damaged mark, and where one of its files is not a regular file: those that
+        are not made again are removed.
         """
         path = out / MARK
         if not is_file(path):
@@ -89,11 +89,11 @@ class StudyMark:
         return mark
 
     def files_in(self, out: Path) -> tuple[Path, ...]:
-        """Paths of its files, and of its own."""
+        """Return the paths of its files, and of the mark itself."""
         return tuple(out / name for name in (*self.files, MARK))
 
     def text(self) -> bytes:
-        """As JSON."""
+        """Return the mark as JSON."""
         return f"{json.dumps(asdict(self), indent=1, ensure_ascii=False)}\n".encode()
 
 

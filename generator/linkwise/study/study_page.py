@@ -1,4 +1,4 @@
-"""`study.html`: bands of a study's groups, its tests, and the way to each trial's own page."""
+"""`study.html`: bands of a study's groups, its tests, and links to each trial's own page."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -7,10 +7,10 @@ from urllib.parse import quote
 import numpy as np
 
 from linkwise.analysis.show.packed_page import encoded, packed, plotly_parts
-from linkwise.emit.render import render
 from linkwise.escape import printable, script_data
 from linkwise.package.load import Array
 from linkwise.plotstyle import COLOURS, ON_DARK
+from linkwise.render import render
 from linkwise.study.comparisons import Compared
 from linkwise.study.study_folder import TRIALS
 from linkwise.study.study_plan import StudyPlan
@@ -20,9 +20,9 @@ from linkwise.study.trial_summary import TrialSummary
 from linkwise.study.trial_work import TrialOutcome
 
 NUMBERS = 3_000_000
-"""What a page holds at most, in float32; columns at the end are left out, and it says so."""
+"""Most numbers on a page, in float32; columns at the end are left out, and the page says so."""
 FIRST = ("tau/", "q/")
-"""What columns begin with that are shown first."""
+"""Beginnings of the names of columns that are shown first."""
 TEMPLATE = "study/study.html.j2"
 
 
@@ -33,7 +33,7 @@ def study_page(
     tests: Sequence[Compared],
     broken: Sequence[TrialOutcome],
 ) -> str:
-    """HTML of the page; links in it are relative to the study's folder."""
+    """Return the page as HTML; its links are relative to the study's folder."""
     columns, left_out = _columns(trials)
     labels = {trial.name: dict(trial.labels) for trial in plan.trials}
     data = {
@@ -56,7 +56,7 @@ def study_page(
 
 
 def _columns(trials: Sequence[TrialSummary]) -> tuple[dict[str, str], str]:
-    """Columns by name with their units, those of torques first, and what is said of those left out."""
+    """Return columns by name with their units, torques first, and a note on those left out."""
     known = columns_of_trials(trials)
     points = max((len(curve) for trial in trials for curve in trial.curves.values()), default=1)
     most = max(1, NUMBERS // (points * len(trials)))
@@ -70,7 +70,7 @@ def _columns(trials: Sequence[TrialSummary]) -> tuple[dict[str, str], str]:
 
 
 def _values(trials: Sequence[TrialSummary], names: Sequence[str]) -> Array:
-    """(trials, columns, points), NaN where a trial has no such column."""
+    """Return values (trials, columns, points), NaN where a trial has no such column."""
     by_name = {name: values_of(trials, name) for name in names}
     points = max((len(curve) for some in by_name.values() for curve in some.values()), default=1)
     out = np.full((len(trials), len(names), points), np.nan)

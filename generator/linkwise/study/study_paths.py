@@ -1,7 +1,7 @@
-"""Paths of a study: files beside it, or addresses, s3://bucket/walk.mot, that fsspec reads.
+"""Paths of a study: files beside it, or addresses such as s3://bucket/walk.mot that fsspec reads.
 
-Of what fsspec knows, only stores that hand out bytes are asked: others open files of this machine, hand an
-address on to another kind, or run what a file says.
+Of the kinds that fsspec knows, only stores that return bytes are asked: others open files of this machine,
+pass an address on to another kind, or run what a file says.
 """
 
 import errno
@@ -26,29 +26,29 @@ STORES = ("s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "oss", "http", "https
 """Kinds of addresses that are read."""
 LOCAL = "file://"
 UNSAID = 1 << 30
-"""Bytes that are fetched at most of a file of which the store does not say how many there are."""
+"""Most bytes that are fetched of a file whose size the store does not say."""
 CHAINED = "::"
-"""Between addresses of which fsspec opens one inside the other."""
+"""Separator of addresses of which fsspec opens one inside the other."""
 MISSING = (HTTPStatus.NOT_FOUND, HTTPStatus.GONE)
-"""How a server says that it has no such file."""
+"""Statuses by which a server says that it has no such file."""
 INSTEAD = "another --out, or remove it"
-"""What to give where something is in the place of a study's own file."""
+"""Advice where something is in the place of a study's own file."""
 STARS = re.compile(r"\*[^/]*\*")
-"""From the first to the last in one part of a path."""
+"""Stars in one part of a path, from the first to the last."""
 LARGEST = 64 << 20
-"""Bytes of the largest file that is read back as a whole; a trial has some hundreds in it."""
+"""Most bytes of a file that is read back as a whole; a trial's has some hundreds."""
 
 
 def is_address(path: str) -> bool:
-    """Whether a path is one that fsspec reads, and not of this machine's disks."""
+    """Return whether a path is an address that fsspec reads, and not on this machine's disks."""
     return "://" in path
 
 
 def resolved(path: str, folder: Path) -> str:
-    """An address itself; of other paths, file:// before them or not, those from a folder on.
+    """Return an address itself; else the path from a folder on, with file:// removed.
 
     Raises LinkwiseError for an address inside another that names its first kind alone, `reference::log.csv`,
-    unless a file is called so.
+    unless a file has that name.
     """
     whole = placed(path, folder)
     if CHAINED in path and not is_address(whole) and not os.path.lexists(whole):
@@ -57,16 +57,16 @@ def resolved(path: str, folder: Path) -> str:
 
 
 def placed(path: str, folder: Path) -> str:
-    """The same of a path with a pattern in it, which no file is called."""
+    """Return an address itself; else the path from a folder on, unchecked, as it may have a pattern."""
     path = path.removeprefix(LOCAL)
     return path if is_address(path) else (folder / path).as_posix()
 
 
 def found_by_pattern(parts: Sequence[str]) -> list[str]:
-    """Files by the parts of their paths between which anything may stand, sorted; of a store perhaps more.
+    """Return the files whose paths have these parts with anything between, sorted; of a store perhaps more.
 
-    fsspec looks by a regular expression, which takes for ever for a dozen stars, and takes two beside each
-    other for something else: it is asked for one star in each part of the path, which finds all of it.
+    fsspec matches by a regular expression, which takes forever for a dozen stars, and gives two adjacent
+    stars another meaning: it is asked for one star in each part of the path, which finds all files.
     """
     if not is_address(parts[0]):
         return sorted(glob("*".join(map(escape, parts))))
@@ -85,13 +85,13 @@ def require_there(path: str, or_folder: bool = False) -> None:
             raise LinkwiseError(f"{path}: {error}") from error
         return
     files, name = _system(path)
-    # Not `isfile`, which says no for whatever keeps the store from answering, too.
+    # Not `isfile`, which is also False for anything that keeps the store from answering.
     if _asked(path, lambda: files.info(name))["type"] != "file":
         raise LinkwiseError(f"{path}: no such file")
 
 
 def version_of(path: str) -> str:
-    """What changes when a file does, cheap to ask for."""
+    """Return a text that changes when a file does, and is cheap to get."""
     if not is_address(path):
         found = Path(path).stat()
         return f"{found.st_size} {found.st_mtime_ns} {found.st_ctime_ns} {found.st_ino}"
@@ -101,11 +101,11 @@ def version_of(path: str) -> str:
 
 @contextmanager
 def opened_here(path: str, most_of_robot: int | None = None) -> Iterator[Path]:
-    """The file itself, or a copy that goes when the work is done.
+    """Give the file itself, or a copy that is removed when the work is done.
 
-    most_of_robot: bytes that are fetched at most, of what describes a robot
-    Raises LinkwiseError where there is none; what is raised of the copy is told of the address, which is all
-    that anybody can look at afterwards.
+    most_of_robot: most bytes that are fetched, for a robot's description
+    Raises LinkwiseError where there is no file; errors about the copy name the address instead, which is all
+    that a user can look at afterwards.
     """
     if not is_address(path):
         yield Path(path)
@@ -123,15 +123,15 @@ def opened_here(path: str, most_of_robot: int | None = None) -> Iterator[Path]:
 
 
 def told_of(path: str, copy: Path, text: str) -> str:
-    """What is told of a file's copy, as told of the file: no text of a user's names the copy's folder."""
+    """Return a message about a file's copy as one about the file; no user's text names the copy's folder."""
     return text.replace(str(copy), path)
 
 
 def copied_here(address: str, copy: Path, most_of_robot: int | None = None) -> None:
-    """Fetch a file; raises LinkwiseError, with the address, where that fails, and where too much comes.
+    """Fetch a file; raise LinkwiseError, with the address, where that fails, and where too much arrives.
 
-    That is more than the store says there is, or than a robot's description may have: a server may send
-    without an end, and fill the disk.
+    Too much is more than the store announces, or than a robot's description may have: a server may send
+    without end, and fill the disk.
     """
     files, name = _system(address)
     copy.parent.mkdir(parents=True, exist_ok=True)
@@ -150,26 +150,27 @@ def copied_here(address: str, copy: Path, most_of_robot: int | None = None) -> N
         hold(None, 0)
         callback = extra("fsspec.callbacks").Callback(hooks={"bound": hold})  # after each part
         files.get_file(name, str(copy), callback=callback)
-        hold(None, copy.stat().st_size)  # some stores call nothing back
+        hold(None, copy.stat().st_size)  # some stores call no callback
 
     _asked(address, fetch)
 
 
 def beside(address: str, name: str) -> str:
-    """The address of a file by its path from the folder of another."""
+    """Return the address of a file by its path from the folder of another address."""
     return f"{address.rpartition('/')[0]}/{name}"
 
 
 def require_own(path: Path) -> None:
-    """Raise LinkwiseError, with the path, for what is no regular file where a study has one of its own."""
+    """Raise LinkwiseError, with the path, where a study's own file is not a regular file."""
     with within(str(path)):
         require_file(path, wanted=INSTEAD)
 
 
 def read_back(path: Path) -> str:
-    """Text of a file that a study wrote into its own folder; raises UnicodeDecodeError for what is none.
+    """Return the text of a file that a study wrote into its own folder.
 
-    Raises LinkwiseError, with the path, for what is no regular file by now, or far too large a one.
+    Raises UnicodeDecodeError for what is not text, and LinkwiseError, with the path, for what is no longer a
+    regular file, or far too large.
     """
     require_own(path)
     with path.open("rb") as file:
@@ -182,12 +183,12 @@ def read_back(path: Path) -> str:
 
 
 def removed(folder: Path) -> None:
-    """Take away a folder and all in it, if it is there."""
+    """Remove a folder and all in it, if it is there."""
     shutil.rmtree(folder, ignore_errors=True)
 
 
 def _system(path: str) -> tuple[Any, str]:
-    """What serves an address, and its path there; raises LinkwiseError for kinds that are not read."""
+    """Return the file system of an address, and its path there; raise LinkwiseError for unsupported kinds."""
     if path.partition("://")[0] not in STORES or CHAINED in path:
         _refuse(path)
     try:
@@ -205,17 +206,17 @@ def _refuse(path: str) -> NoReturn:
 
 
 def _asked(path: str, question: Any) -> Any:
-    """What a file system answers; its failures are told with the path."""
+    """Return the answer of a file system; raise its failures as LinkwiseError with the path."""
     try:
         return question()
-    except Exception as error:  # of whatever library serves it
+    except Exception as error:  # from whatever library serves it
         raise LinkwiseError(f"{path}: {_reason(error)}") from error
 
 
 def _reason(error: BaseException) -> str:
-    """What an error of a file system says, in words."""
+    """Return what an error of a file system says, in words."""
     if isinstance(error, FileNotFoundError):
-        # Of HTTP that is said for every failure, which is then the cause.
+        # Over HTTP every failure raises this; the real one is then its cause.
         if error.__cause__ is None or getattr(error.__cause__, "status", None) in MISSING:
             return "no such file"
         error = error.__cause__

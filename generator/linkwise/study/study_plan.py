@@ -1,4 +1,4 @@
-"""What a study consists of, as its file says it."""
+"""Content of a study, as its file describes it."""
 
 import math
 from dataclasses import dataclass, field
@@ -11,19 +11,19 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot import Options
 
 SUBJECT = "subject"
-"""The factor that every study has, and the first."""
+"""Factor that every study has, and the first."""
 OF_FILES = ("loads", "contact_loads")
 """Choices that are paths of files."""
 POINTS = 101
-"""Of a cycle, 0 to 100 %."""
+"""Number of points of a cycle, 0 to 100 %."""
 
 
 @dataclass(frozen=True)
 class Cycles:
-    """What a trial is cut into: `start` begins a cycle each time, `during` is one as long as it lasts.
+    """Cycles of a trial: `start` begins a cycle each time, `during` is one as long as it lasts.
 
-    Both are written as a phase's WHAT of `linkwise analyze`. `table` is a CSV of trial, start, end in s.
-    Cycles shorter or longer than these, in s, are left out.
+    Both are written as a phase's WHAT of `linkwise analyze`. `table` is a CSV file of trial, start, end in s.
+    Cycles shorter than `shortest` or longer than `longest`, in s, are left out.
     """
 
     start: str = ""
@@ -46,13 +46,13 @@ class Cycles:
 
     @property
     def what(self) -> str:
-        """What says when a cycle is."""
+        """Condition that defines when a cycle is; empty with a table."""
         return self.start or self.during
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two levels of a factor that are held against each other by statistics, in these columns."""
+    """Two levels of a factor that are compared by statistics, in these columns."""
 
     factor: str
     between: tuple[str, ...]
@@ -85,29 +85,29 @@ class PaperFigure:
 
 @dataclass(frozen=True)
 class Trial:
-    """One recording: its name, labels by factor, files, and what is chosen for it alone."""
+    """One recording: its name, labels by factor, files, and the choices for it alone."""
 
     name: str
     labels: tuple[tuple[str, str], ...]
-    """Of every factor, the subject first."""
+    """Label of every factor, the subject first."""
     log: str
     robot: str
     choices: AnalysisChoices
-    """With the paths of its loads as they are opened."""
+    """Choices of the analysis, with the paths of its loads as they are opened."""
 
     def label(self, factor: str) -> str:
-        """Its level of a factor."""
+        """Return the trial's level of a factor."""
         return dict(self.labels)[factor]
 
 
 @dataclass(frozen=True)
 class StudyPlan:
-    """A study whose file has been read and found right."""
+    """A study whose file has been read and checked."""
 
     name: str
     file: Path
     factors: tuple[str, ...]
-    """The subject first."""
+    """Names of the factors, the subject first."""
     trials: tuple[Trial, ...]
     options: Options = field(default_factory=Options)
     cycles: Cycles | None = None
@@ -117,4 +117,4 @@ class StudyPlan:
     figures: tuple[PaperFigure, ...] = ()
     pages: bool = field(kw_only=True)
     trust_python: bool = field(kw_only=True, repr=False)
-    """Whether robots that are Python files are run; no result depends on it."""
+    """True if robots that are Python files are run; no result depends on it."""

@@ -1,4 +1,4 @@
-"""The files of a study that are of all its trials."""
+"""Files of a study that cover all its trials."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,7 +20,10 @@ from linkwise.study.trial_work import TrialOutcome
 def study_files(
     plan: StudyPlan, folders: Mapping[str, Path], broken: Sequence[TrialOutcome], progress: Progress
 ) -> tuple[dict[str, bytes], tuple[str, ...]]:
-    """Contents by name, and what could not be made; tables, tests and figures are of the trials there are."""
+    """Return contents by name, and what could not be made.
+
+    Tables, tests and figures cover the trials that exist.
+    """
     trials = summaries(plan, folders)
     if not trials:
         return {}, ()
@@ -54,7 +57,7 @@ def study_files(
 
 
 def _rows(tests: Sequence[Compared]) -> list[dict[str, object]]:
-    """A row for each part of a cycle that differs, and one without for a column that does not."""
+    """Return a row for each part of a cycle that differs, and one for a column without such a part."""
     rows: list[dict[str, object]] = []
     for test in tests:
         a, b = test.comparison.between

@@ -1,4 +1,4 @@
-"""The robots of a study: each is generated before any trial begins, and all are of one kind."""
+"""Robots of a study: each is generated before any trial begins, and all are of one kind."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,11 +20,11 @@ from linkwise.study.study_paths import is_address, opened_here, require_there, t
 from linkwise.study.study_plan import StudyPlan
 
 ROBOTS = 4
-"""Robots that a worker keeps in memory: trials of one subject follow one another."""
+"""Most robots that a worker keeps in memory: trials of one subject follow one another."""
 
 
 def check_robots(plan: StudyPlan, progress: Progress) -> tuple[str, ...]:
-    """Make the packages of all robots; what touches their torques, in lines.
+    """Make the packages of all robots; return the warnings that concern their torques, in lines.
 
     Raises LinkwiseError for what cannot be read or generated, and for a robot whose joints or links are not
     those of the others.
@@ -50,10 +50,10 @@ def _owner(plan: StudyPlan, robot: str) -> str:
 
 
 def package_of(robot: str, plan: StudyPlan) -> KeptPackage:
-    """The package of a trial's robot: itself, or the one that is kept of its file, address or name.
+    """Return the package of a trial's robot: itself, or the cached one of its file, address or name.
 
-    Raises LinkwiseError, before it is fetched or run, for a Python file that is not there or that nobody
-    vouches for, and before it is run for a package of another version.
+    Raises LinkwiseError, before it is fetched or run, for a Python file that does not exist or is not
+    trusted, and before it is run, for a package of another version.
     """
     if Path(robot).suffix == PYTHON:
         _refuse_untrusted(robot, plan)
@@ -82,7 +82,7 @@ def _refuse_untrusted(robot: str, plan: StudyPlan) -> None:
 
 
 def _refuse_unread(robot: str, package: Path) -> None:
-    """Raise LinkwiseError for a package whose runtime is another linkwise's: it would run as it is."""
+    """Raise LinkwiseError for a package whose runtime is of another linkwise: it would run as it is."""
     version = Manifest.read(package).generator.get("linkwise")
     if version != VERSION:
         raise LinkwiseError(
@@ -92,14 +92,14 @@ def _refuse_unread(robot: str, package: Path) -> None:
 
 
 def loaded_robot(robot: str, plan: StudyPlan) -> LoadedRobot:
-    """A trial's robot, ready to be asked; those of the last trials are kept in memory."""
+    """Return a trial's robot, loaded; those of the last trials are kept in memory."""
     directory = package_of(robot, plan).directory
     return _loaded(directory, version_of(str(directory / FILE)))
 
 
 @lru_cache(ROBOTS)
 def _loaded(directory: Path, version: str) -> LoadedRobot:
-    """The robot of a package whose manifest is of that version."""
+    """Return the robot of a package whose manifest is of that version."""
     return load_robot(directory)
 
 

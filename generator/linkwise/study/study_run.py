@@ -1,4 +1,4 @@
-"""`run_study`: from a study's file to a folder of trials and what they say together."""
+"""`run_study`: from a study's file to a folder of trials and their combined results."""
 
 import json
 from collections.abc import Generator, Mapping, Sequence
@@ -25,21 +25,21 @@ from linkwise.study.trial_work import TrialOutcome, TrialTask
 
 
 class Engine(Protocol):
-    """What does trials, in any order."""
+    """Interface of an engine that runs trials, in any order."""
 
     def outcomes(self, tasks: Sequence[TrialTask]) -> Generator[TrialOutcome]:
-        """Outcomes of all tasks, as they come; closed before its end, it lets the rest be."""
+        """Yield the outcomes of all tasks as they come; if closed before the end, drop the rest."""
 
 
 @dataclass(frozen=True)
 class StudyOutcome:
-    """What became of a study."""
+    """Outcome of a study."""
 
     plan: StudyPlan
     done: tuple[str, ...]
-    """Names of the trials that are there."""
+    """Names of the trials that have results."""
     fresh: int
-    """How many of them were done now."""
+    """Number of trials that were run now."""
     samples: int
     broken: tuple[TrialOutcome, ...]
     warnings: tuple[str, ...]
@@ -53,16 +53,16 @@ def run_study(
     progress: Progress = silent,
     trust_python: bool = False,
 ) -> StudyOutcome:
-    """Do what of a study is not done yet, and say what all trials say together.
+    """Run the trials of a study that are not done yet, and write the combined results of all.
 
     file: its TOML; out: its folder; engine: a `ProcessPool` with all cores if not given
     trust_python: run robots that are Python files of this machine, which are refused otherwise
-    Raises LinkwiseError, before any trial begins, for a file, a robot or a folder that cannot be.
+    Raises LinkwiseError, before any trial begins, for an invalid file, robot or folder.
     """
     plan, out = read_study(Path(file), trust_python), Path(out)
     refuse_unless_study(out, plan)
     require_writable(out)
-    out = out.absolute()  # workers may be in folders of their own
+    out = out.absolute()  # workers may run in other folders
     warnings = check_robots(plan, progress)
     before = done_before(plan, trial_folders(out, plan))
     check_columns(plan, before)
@@ -93,7 +93,7 @@ def _done(
         for outcome in coming:
             outcomes.append(outcome)
             if outcome.reason and is_trial(folders[outcome.name]):
-                removed(folders[outcome.name])  # it is of other inputs
+                removed(folders[outcome.name])  # its results are of other inputs
             progress("trials", len(before) + len(outcomes), len(plan.trials))
     broken = tuple(sorted((one for one in outcomes if one.reason), key=lambda one: one.name))
     failed = {one.name for one in broken}
@@ -110,7 +110,7 @@ def _done(
             write_files(out, {MARK: former.text()})
         return StudyOutcome(plan, done, 0, 0, broken, warnings, there)
     content, lacking = study_files(plan, {name: folders[name] for name in done}, broken, progress)
-    # What is lacking, a library say, may be there next time; till then it is told each time.
+    # What is missing, such as a library, may be there next time; until then it is reported each time.
     mark = StudyMark.done(plan, broken, "" if lacking else key, list(content))
     files = write_files(out, {**content, MARK: mark.text()})
     for file in set(there) - set(files):
@@ -122,7 +122,7 @@ def _done(
 def _key(
     plan: StudyPlan, folders: Mapping[str, Path], done: Sequence[str], broken: Sequence[TrialOutcome]
 ) -> str:
-    """Hash of all that tables, tests, figures and the page are made of."""
+    """Return the hash of all that tables, tests, figures and the page depend on."""
     records = [TrialRecord.read(folders[name]) for name in done]
     keys = [record.key for record in records if record is not None]
     return sha256(json.dumps([repr(plan), keys, repr(broken), fingerprint()]).encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""What all trials of a study say together: means, deviations and ranges over trials and over subjects."""
+"""Tables of all trials of a study: means, deviations and ranges over trials and over subjects."""
 
 import io
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,11 +13,11 @@ from linkwise.study.subject_spread import Spread, columns_of_trials, groups_of, 
 from linkwise.study.trial_summary import TrialSummary
 
 AT_ONCE = 50_000
-"""Rows of a table."""
+"""Rows of a table that are written at a time."""
 
 
 def summary_rows(trials: Sequence[TrialSummary]) -> Iterator[dict[str, Any]]:
-    """STATISTICS of each column of each trial."""
+    """Yield STATISTICS of each column of each trial."""
     for trial in trials:
         for name, numbers in trial.statistics.items():
             if name != "time":
@@ -26,7 +26,7 @@ def summary_rows(trials: Sequence[TrialSummary]) -> Iterator[dict[str, Any]]:
 
 
 def group_rows(trials: Sequence[TrialSummary]) -> Iterator[dict[str, Any]]:
-    """Of each group and column, each of STATISTICS over subjects."""
+    """Yield, for each group and column, each of STATISTICS over subjects."""
     for group, members in groups_of(trials).items():
         for name, unit in columns_of_trials(members).items():
             there = {one.name: one.statistics[name] for one in members if name in one.statistics}
@@ -41,7 +41,7 @@ def group_rows(trials: Sequence[TrialSummary]) -> Iterator[dict[str, Any]]:
 
 
 def curve_rows(trials: Sequence[TrialSummary], points: int) -> Iterator[dict[str, Any]]:
-    """Of each group and column, its curve over subjects."""
+    """Yield, for each group and column, its curve over subjects, one point a row."""
     percent = np.linspace(0, 100, points)
     for group, members in groups_of(trials).items():
         for name, unit in columns_of_trials(members).items():
@@ -63,7 +63,7 @@ def _counts(found: Spread) -> dict[str, int]:
 
 
 def parquet(rows: Iterable[dict[str, Any]]) -> bytes:
-    """A table of rows, one or more, in a Parquet file; so many at a time as memory has no trouble with."""
+    """Return a table of one or more rows as a Parquet file, written in chunks that fit in memory."""
     out, coming = io.BytesIO(), iter(rows)
     table = extra("pyarrow").Table
     first = table.from_pylist(list(islice(coming, AT_ONCE)))

@@ -1,4 +1,4 @@
-"""Means, deviations and ranges over subjects, each of whom is the mean of its trials."""
+"""Means, deviations and ranges over subjects; a subject's value is the mean of its trials."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ MEAN = STATISTICS.index("mean")
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """Of values or curves over subjects, each the mean of its trials: arrays of one shape."""
+    """Spread of values or curves over subjects, each the mean of its trials: arrays of one shape."""
 
     subjects: tuple[str, ...]
     every: Array
-    """Of trials, (trials, …)."""
+    """Values of trials, (trials, …)."""
     each: Array
-    """Of subjects, (subjects, …)."""
+    """Means of subjects, (subjects, …)."""
 
     @property
     def mean(self) -> Array:
@@ -31,12 +31,12 @@ class Spread:
 
     @property
     def deviation(self) -> Array:
-        """Standard deviation of subjects, as of a sample; NaN for one subject."""
+        """Standard deviation over subjects, as of a sample; NaN for one subject."""
         return _deviation(self.each)
 
     @property
     def rows(self) -> dict[str, Array]:
-        """Mean, deviation and range over subjects, then over trials whosever they are."""
+        """Mean, deviation and range over subjects, then over all trials of any subject."""
         return {
             "mean": self.mean,
             "std": self.deviation,
@@ -57,11 +57,11 @@ def _deviation(values: Array) -> Array:
 
 
 Group = tuple[tuple[str, str], ...]
-"""Levels by factor, of all but the subject."""
+"""Levels by factor, for all factors but the subject."""
 
 
 def groups_of(trials: Sequence[TrialSummary]) -> dict[Group, list[TrialSummary]]:
-    """Trials that share all their levels, in the order in which these come."""
+    """Return the trials by the levels that they share, in the order in which these occur."""
     found: dict[Group, list[TrialSummary]] = {}
     for trial in trials:
         levels = tuple((factor, level) for factor, level in trial.labels.items() if factor != SUBJECT)
@@ -70,7 +70,7 @@ def groups_of(trials: Sequence[TrialSummary]) -> dict[Group, list[TrialSummary]]
 
 
 def spread(trials: Sequence[TrialSummary], values: Mapping[str, Array]) -> Spread:
-    """Of arrays by trial, over subjects."""
+    """Return the spread over subjects of arrays by trial."""
     by_subject: dict[str, list[Array]] = {}
     for trial in trials:
         if trial.name in values:
@@ -80,7 +80,7 @@ def spread(trials: Sequence[TrialSummary], values: Mapping[str, Array]) -> Sprea
 
 
 def columns_of_trials(trials: Sequence[TrialSummary]) -> dict[str, str]:
-    """Every column that any trial has, with its unit, but the time."""
+    """Return every column that any trial has, with its unit, except the time."""
     found: dict[str, str] = {}
     for trial in trials:
         found |= {name: unit for name, unit in trial.units.items() if name != "time"}
@@ -88,7 +88,7 @@ def columns_of_trials(trials: Sequence[TrialSummary]) -> dict[str, str]:
 
 
 def values_of(trials: Sequence[TrialSummary], name: str) -> dict[str, Array]:
-    """A column's curve of each trial; of trials without cycles its mean, (1,)."""
+    """Return a column's curve of each trial, or if none has curves, its mean, (1,)."""
     return {one.name: one.curves[name] for one in trials if name in one.curves} or {
         one.name: one.statistics[name][MEAN : MEAN + 1] for one in trials if name in one.statistics
     }

@@ -1,4 +1,4 @@
-"""The cycles of one trial as they come, and their mean and deviation at the end."""
+"""Cycles of one trial as they arrive, and at the end their mean and deviation."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +15,7 @@ from linkwise.study.trial_ledger import CURVES
 
 
 class TrialCycles:
-    """Hands each cycle to `write`, by its number; none where a study has no cycles."""
+    """Receiver of samples that passes each cycle to `write`, with its number; none without cycles."""
 
     def __init__(self, plan: StudyPlan, job: Job, write: Callable[[int, Array], None]) -> None:
         self._write, self._names = write, [column.name for column in job.decomposer.columns]
@@ -27,7 +27,7 @@ class TrialCycles:
 
     @property
     def count(self) -> int:
-        """Cycles so far."""
+        """Number of cycles so far."""
         return self._moments.count
 
     def _take(self, number: int, rows: Array) -> None:
@@ -37,7 +37,7 @@ class TrialCycles:
         self._moments(shifted.reshape(-1, 1))
 
     def finish(self, draft: Path) -> None:
-        """Take what is left, and write the curves."""
+        """Take the remaining cycles, and write the curves."""
         if not self._points:
             return
         self.sink.finish()

@@ -1,4 +1,4 @@
-"""The trials of a study's file: each with its labels, files and what is chosen for it alone."""
+"""Trials of a study's file: each with its labels, files and the choices for it alone."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
@@ -14,13 +14,13 @@ from linkwise.study.trial_patterns import expanded
 from linkwise.study.typed_tables import filled, given_text, known_keys
 
 OWN = ("name", "subject", "log", "robot")
-"""Keys of a trial beside factors and what is chosen for it alone."""
+"""Keys of a trial besides factors and choices."""
 
 
 def trials_of(
     data: dict[str, Any], factors: Sequence[str], chosen: AnalysisChoices, folder: Path
 ) -> Iterator[Trial]:
-    """The trials of a study's file; raises LinkwiseError that names the one for what cannot be."""
+    """Yield the trials of a study's file; raise LinkwiseError that names an invalid one."""
     for number, entry in enumerate(tables(data, "trial"), 1):
         place = f"trial {entry.get('name', number)!r}"
         known = tuple(dict.fromkeys((*OWN, *factors, *asdict(chosen))))
@@ -53,7 +53,7 @@ def _trial(
 
 
 def _robot(given: str, folder: Path) -> str:
-    """A built-in robot by name; a file or package from the study's folder on."""
+    """Return a built-in robot's name, or the path of a file or package from the study's folder on."""
     there = resolved(given, folder)
     return (
         given if not is_address(given) and not Path(there).exists() and Path(given).name == given else there

@@ -1,4 +1,4 @@
-"""The files that a trial is made of, and copies of those at addresses while it is at work."""
+"""Files that a trial depends on, and copies of those at addresses while it runs."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -14,7 +14,7 @@ from linkwise.study.study_plan import StudyPlan, Trial
 
 
 def trial_files(plan: StudyPlan, trial: Trial) -> Iterator[str]:
-    """All files that a trial's numbers depend on."""
+    """Yield all files that a trial's numbers depend on."""
     yield from _inside(trial.log)
     for path in (*trial.choices.loads, *trial.choices.contact_loads):
         yield path
@@ -31,7 +31,7 @@ def trial_files(plan: StudyPlan, trial: Trial) -> Iterator[str]:
 
 @contextmanager
 def trial_here(trial: Trial) -> Iterator[Trial]:
-    """The trial with its log and loads on this machine; copies keep their names, and go with the block."""
+    """Give the trial with its log and loads on this machine; copies keep their names until the block ends."""
     with ExitStack() as copies:
 
         def here(path: str) -> str:
@@ -50,7 +50,7 @@ def trial_here(trial: Trial) -> Iterator[Trial]:
 
 
 def _inside(path: str) -> Iterator[str]:
-    """The file itself; of a folder, as bags are, all files in it."""
+    """Yield the file itself; of a folder, such as a bag, all files in it."""
     if not is_address(path) and Path(path).is_dir():
         yield from sorted(str(file) for file in Path(path).rglob("*") if file.is_file())
     else:
@@ -58,7 +58,10 @@ def _inside(path: str) -> Iterator[str]:
 
 
 def _data_of(path: str) -> list[str]:
-    """Files of numbers that OpenSim's loads name; none where these cannot be read, as the analysis tells."""
+    """Return the files of numbers that an OpenSim file of loads names.
+
+    It is empty if the file cannot be read, which the analysis reports.
+    """
     if not path.lower().endswith(".xml"):
         return []
     with opened_here(path) as copy:

@@ -1,4 +1,4 @@
-"""What a trial's result depends on, as one hash: its files by content, its choices, and linkwise itself."""
+"""Hash of all that a trial's result depends on: its files by content, its choices, and linkwise itself."""
 
 import hashlib
 import json
@@ -25,7 +25,7 @@ class SeenFile:
 
 
 class TrialKey(NamedTuple):
-    """The hash, and the files that it is of, by path."""
+    """Hash of a trial, and the files that it covers, by path."""
 
     key: str
     files: dict[str, SeenFile]
@@ -34,7 +34,7 @@ class TrialKey(NamedTuple):
 def trial_key(
     plan: StudyPlan, trial: Trial, known: Mapping[str, SeenFile], here: Trial | None = None
 ) -> TrialKey:
-    """The key of a trial; files whose version is known are not read again.
+    """Return the key of a trial; files whose version is known are not read again.
 
     here: the same trial with its files on this machine
     """
@@ -48,13 +48,13 @@ def trial_key(
     told = [
         trial.name,
         trial.labels,
-        trial.robot if is_built_in(trial.robot) else "",  # which has no file that could tell it
+        trial.robot if is_built_in(trial.robot) else "",  # a built-in robot has no file to hash
         {**asdict(trial.choices), **{key: len(getattr(trial.choices, key)) for key in OF_FILES}},
         plan.options.request(),
         None if plan.cycles is None else {**asdict(plan.cycles), "table": bool(plan.cycles.table)},
         plan.columns,
         plan.pages,
-        # A file's ending says how it is read; the rest of its name is free.
+        # A file's suffix says how it is read; the rest of its name does not matter.
         [(Path(path).suffix.lower(), seen.sha256) for path, seen in files.items()],
         fingerprint(),
     ]

@@ -1,4 +1,4 @@
-"""Which trials of a study are done: a folder for each, whose record says of what it is."""
+"""Ledger of the trials of a study that are done: a folder for each, with a record of what it depends on."""
 
 import json
 import platform
@@ -14,7 +14,7 @@ from linkwise.study.study_plan import StudyPlan, Trial
 from linkwise.study.trial_key import SeenFile, trial_key
 
 MARK = "study.json"
-"""In the folder of a study, what tells that it is one."""
+"""File in the folder of a study that marks it as one."""
 RECORD, TABLE, CURVES, SUMMARY, PAGE = (
     "_record.json",
     "samples.parquet",
@@ -22,12 +22,12 @@ RECORD, TABLE, CURVES, SUMMARY, PAGE = (
     "_summary.npz",
     "_report.html",
 )
-"""In a trial's folder; names with _ are passed over by who reads all tables of the folder above."""
+"""Files in a trial's folder; names with _ are skipped by readers of all tables of the folder above."""
 
 
 @dataclass(frozen=True)
 class TrialRecord:
-    """What is known of a trial that is done."""
+    """Record of a trial that is done."""
 
     name: str
     key: str
@@ -41,14 +41,14 @@ class TrialRecord:
     """Bytes of the other files of its folder, by name."""
 
     def text(self) -> str:
-        """As JSON."""
+        """Return the record as JSON."""
         return json.dumps(asdict(self), indent=1) + "\n"
 
     @classmethod
     def read(cls, folder: Path) -> "TrialRecord | None":
-        """That of a folder; None where there is none that can be read, or one of other types.
+        """Return the record of a folder; None if there is none, or it cannot be read or has other types.
 
-        Raises LinkwiseError for what is no file of a record's size.
+        Raises LinkwiseError for a record that is not a regular file, or far too large.
         """
         try:
             if not (folder / RECORD).exists():
@@ -62,7 +62,7 @@ class TrialRecord:
 
 
 def done_before(plan: StudyPlan, folders: Mapping[str, Path]) -> dict[str, TrialRecord]:
-    """Records of trials that are done, of the same inputs; raises LinkwiseError as `read` does."""
+    """Return the records of trials that are done with the same inputs; raise as `TrialRecord.read` does."""
     found = {}
     for trial in plan.trials:
         record = TrialRecord.read(folders[trial.name])
@@ -77,20 +77,20 @@ def done_before(plan: StudyPlan, folders: Mapping[str, Path]) -> dict[str, Trial
 
 
 def outputs_in(folder: Path) -> dict[str, int]:
-    """Bytes of the regular files of a trial's folder, by name, but for its record."""
+    """Return the bytes of the regular files of a trial's folder, by name, without its record."""
     return {
         path.name: path.stat().st_size for path in folder.iterdir() if path.name != RECORD and is_file(path)
     }
 
 
 def is_trial(folder: Path) -> bool:
-    """Whether a folder holds what trials do, and nothing else."""
+    """Return whether a folder holds files of a trial, and nothing else."""
     there = {path.name for path in folder.iterdir()} if folder.is_dir() else set[str]()
     return bool(there) and there <= {RECORD, TABLE, CURVES, SUMMARY, PAGE}
 
 
 def _key(plan: StudyPlan, trial: Trial, record: TrialRecord) -> str:
-    """The key as it is now; empty where an input cannot be read."""
+    """Return the key as it is now; empty if an input cannot be read."""
     try:
         return trial_key(plan, trial, record.files).key
     except (LinkwiseError, OSError):
@@ -98,7 +98,7 @@ def _key(plan: StudyPlan, trial: Trial, record: TrialRecord) -> str:
 
 
 def require_seen(folder: Path) -> None:
-    """Raise LinkwiseError where this machine does not see the study that a trial's folder is to be in."""
+    """Raise LinkwiseError if this machine does not see the study that a trial's folder is to be in."""
     out = folder.parents[1]
     if not (out / MARK).is_file():
         raise LinkwiseError(
@@ -107,7 +107,7 @@ def require_seen(folder: Path) -> None:
 
 
 def refuse_unless_trial(folder: Path) -> None:
-    """Raise LinkwiseError for a folder in the place of a trial's that is none."""
+    """Raise LinkwiseError for a folder in the place of a trial's that is not a trial."""
     is_empty = folder.is_dir() and not any(folder.iterdir())
     if not is_empty and not is_trial(folder):
         raise LinkwiseError(f"{folder}: exists and is not a trial of a study; move it away")

@@ -1,4 +1,4 @@
-"""One entry for many trials: {FIELD} in the path of a log is what differs, and fills the other keys."""
+"""Entries for many trials: {FIELD} in the path of a log is what differs, and fills the other keys."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -11,11 +11,12 @@ from linkwise.study.study_paths import found_by_pattern, placed
 
 
 def expanded(entry: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]]:
-    """The entry itself, or one for each log that its pattern finds, by name.
+    """Yield the entry itself, or one for each log that its pattern finds, sorted by name.
 
-    Fields that no key is called are filled in and gone. Raises LinkwiseError where the pattern finds nothing,
-    for a path that fits in two ways,
-    and for a field of another key that the log's path does not have.
+    Each field is filled into the other keys, and becomes a key itself where the entry has none of its name;
+    `trials_of` drops those that no key of a trial is called. Raises LinkwiseError where the pattern finds
+    nothing, for a path that fits in two ways, and for a field of another key that the log's path does not
+    have.
     """
     log = entry.get("log")
     fields = dict.fromkeys(FIELD.findall(log)) if isinstance(log, str) else {}
@@ -35,7 +36,7 @@ def expanded(entry: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]]
 
 
 def _with(value: Any, fields: Mapping[str, str], key: str) -> Any:
-    """A value with fields filled in, in texts and lists of them."""
+    """Return a value with fields filled in, in texts and lists of them."""
     if isinstance(value, list):
         return [_with(item, fields, key) for item in value]
     if not isinstance(value, str):

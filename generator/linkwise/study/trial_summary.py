@@ -1,4 +1,4 @@
-"""What is kept of each trial for what all say together."""
+"""Summary of each trial, kept for the combined results of a study."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -16,19 +16,19 @@ from linkwise.study.trial_ledger import CURVES, SUMMARY
 
 @dataclass(frozen=True, eq=False)
 class TrialSummary:
-    """One trial: its labels, and of each column, by name, its unit, STATISTICS and mean curve over cycles."""
+    """Summary of a trial: its labels, and by column the unit, STATISTICS and mean curve over cycles."""
 
     name: str
     labels: dict[str, str]
     units: dict[str, str]
     statistics: dict[str, Array]
     curves: dict[str, Array]
-    """(points,) each; none without cycles."""
+    """Mean curve of each column, (points,); empty without cycles."""
     cycles: int
 
     @classmethod
     def read(cls, name: str, labels: Mapping[str, str], folder: Path) -> "TrialSummary":
-        """What a trial left in its folder; raises LinkwiseError for what is not as it was left."""
+        """Return the summary that a trial left in its folder; raise LinkwiseError if it was damaged."""
         with _arrays(folder / SUMMARY) as data:
             names = data["names"].tolist()
             units = dict(zip(names, data["units"].tolist(), strict=True))
@@ -44,14 +44,14 @@ class TrialSummary:
 
 @contextmanager
 def _arrays(path: Path) -> Iterator[Mapping[str, Array]]:
-    """Arrays of a trial's own file; raises LinkwiseError where they cannot be read."""
+    """Open the arrays of a trial's own file; raise LinkwiseError where they cannot be read."""
     require_own(path)
     with read_as("a trial's file of arrays", path, "remove its folder"), np.load(path) as data:
         yield data
 
 
 def summaries(plan: StudyPlan, folders: Mapping[str, Path]) -> list[TrialSummary]:
-    """Summaries of the trials that are there, in the study's order."""
+    """Return the summaries of the trials that exist, in the study's order."""
     return [
         TrialSummary.read(trial.name, dict(trial.labels), folders[trial.name])
         for trial in plan.trials

@@ -1,4 +1,4 @@
-"""The table of a trial: its labels, its samples or cycles, and the columns that a study keeps."""
+"""Table of a trial: its labels, its samples or cycles, and the columns that a study keeps."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,14 +16,17 @@ CYCLE, PERCENT = "cycle", "percent"
 
 
 def kept_columns(columns: Sequence[Column], patterns: Sequence[str]) -> list[int]:
-    """Numbers of columns that patterns fit, the time first; raises LinkwiseError for one that fits none."""
+    """Return the numbers of columns that patterns fit, the time first.
+
+    Raises LinkwiseError for a pattern that fits none.
+    """
     names = [column.name for column in columns]
     kept = {"time", *fitting("'columns'", names, patterns)}
     return [at for at, name in enumerate(names) if name in kept]
 
 
 class TrialTable:
-    """A Parquet file of one trial; texts that are the same in every row cost next to nothing."""
+    """A Parquet file of one trial; texts that are the same in every row take almost no space."""
 
     def __init__(
         self, path: Path, labels: Mapping[str, str], columns: Sequence[Column], is_of_cycles: bool
@@ -53,7 +56,7 @@ class TrialTable:
         self._writer.close()
 
     def __call__(self, rows: Array, cycle: int | None = None) -> None:
-        """Write rows (columns, samples); those of a cycle are at even shares of it."""
+        """Write rows (columns, samples); the samples of a cycle are at even shares of it."""
         arrow, count = self._arrow, rows.shape[1]
         codes = np.zeros(count, dtype=np.int32)
         arrays = [

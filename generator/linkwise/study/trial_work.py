@@ -1,4 +1,4 @@
-"""One trial of a study, from its log to its folder: what every engine's workers do."""
+"""One trial of a study, from its log to its folder: the work of every engine's workers."""
 
 import time
 from contextlib import ExitStack
@@ -39,21 +39,21 @@ from linkwise.study.trial_table import TrialTable, kept_columns
 
 @dataclass(frozen=True)
 class TrialTask:
-    """A trial to be done, and the folder that it becomes."""
+    """A trial to be run, and the folder for its results."""
 
     plan: StudyPlan
-    """Of this trial alone."""
+    """Plan of this trial alone."""
     folder: Path
 
     @property
     def trial(self) -> Trial:
-        """The trial."""
+        """Trial to be run."""
         return self.plan.trials[0]
 
 
 @dataclass(frozen=True)
 class TrialOutcome:
-    """What became of a trial: its samples, or why there are none."""
+    """Outcome of a trial: its samples, or why there are none."""
 
     name: str
     samples: int = 0
@@ -61,7 +61,7 @@ class TrialOutcome:
 
 
 def run_trial(task: TrialTask) -> TrialOutcome:
-    """Do a trial; its folder appears whole, or not at all where it is broken."""
+    """Run a trial and return its outcome; its folder appears whole, or not at all if it fails."""
     try:
         require_seen(task.folder)
         with whole_directory(task.folder, refuse_unless_trial) as draft:
@@ -71,7 +71,7 @@ def run_trial(task: TrialTask) -> TrialOutcome:
         return TrialOutcome(task.trial.name, reason=str(error))
     except MemoryError:
         return TrialOutcome(task.trial.name, reason="there is not enough memory; cut the log")
-    except Exception as error:  # of linkwise: it stops no other trial
+    except Exception as error:  # a fault of linkwise; it stops no other trial
         fault = f"a fault of linkwise, please report it: {type(error).__name__}: {short(str(error), 300)}"
         return TrialOutcome(task.trial.name, reason=fault)
     return TrialOutcome(task.trial.name, record.samples)
@@ -130,7 +130,7 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
 
 
 def prepared_trial(plan: StudyPlan, trial: Trial, buffer: Path) -> Job:
-    """Read and filter a trial whose files are on this machine; raises LinkwiseError for what cannot be.
+    """Read and filter a trial whose files are on this machine; raise LinkwiseError for an invalid one.
 
     buffer: a directory that keeps the samples
     """

@@ -1,4 +1,4 @@
-"""Tables of a study's file as dataclasses: every key of its annotated type, none unknown."""
+"""Tables of a study's file as dataclasses: every key has its annotated type, and none is unknown."""
 
 from collections.abc import Iterable, Mapping
 from types import UnionType
@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 def filled(kind: type[T], place: str, data: Any, defaults: Mapping[str, Any] | None = None) -> T:
-    """A dataclass of a table's keys; `defaults` stand where the table says nothing.
+    """Return a dataclass of a table's keys; `defaults` apply where the table has no key.
 
     Raises LinkwiseError, which names place and key, for what is unknown, missing or of another type.
     """
@@ -28,7 +28,7 @@ def filled(kind: type[T], place: str, data: Any, defaults: Mapping[str, Any] | N
 
 
 def known_keys(place: str, data: Any, known: Iterable[str]) -> dict[str, Any]:
-    """The table itself; raises LinkwiseError for what is none, and for unknown keys."""
+    """Return the table itself; raise LinkwiseError for what is no table, and for unknown keys."""
     if not isinstance(data, dict):
         raise LinkwiseError(f"{place} must be a table")
     for key in data:
@@ -39,7 +39,7 @@ def known_keys(place: str, data: Any, known: Iterable[str]) -> dict[str, Any]:
 
 
 def given_text(data: Mapping[str, Any], key: str, default: str | None = None) -> str:
-    """A text of a table; raises LinkwiseError for another thing, and for none without a default."""
+    """Return a text of a table; raise LinkwiseError for another type, and for none without a default."""
     value = data.get(key, default)
     if not isinstance(value, str) or not value.strip():
         raise LinkwiseError(f"{key!r} is {value!r}; give a text" if key in data else f"needs {key!r}")
@@ -47,7 +47,7 @@ def given_text(data: Mapping[str, Any], key: str, default: str | None = None) ->
 
 
 def given_flag(data: Mapping[str, Any], key: str) -> bool:
-    """True or false, true if not given; raises LinkwiseError for another thing."""
+    """Return the flag of a table, true if not given; raise LinkwiseError for another type."""
     value = data.get(key, True)
     if not isinstance(value, bool):
         raise LinkwiseError(f"{key!r} is {value!r}; give true or false")
@@ -55,7 +55,7 @@ def given_flag(data: Mapping[str, Any], key: str) -> bool:
 
 
 def given_texts(data: Mapping[str, Any], key: str, default: tuple[str, ...]) -> tuple[str, ...]:
-    """A list of texts; raises LinkwiseError for another thing."""
+    """Return a list of texts of a table; raise LinkwiseError for another type."""
     value = data.get(key, list(default))
     if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
         raise LinkwiseError(f"{key!r} is {value!r}; give a list of texts")

@@ -1,4 +1,4 @@
-"""D_i L_j in SymPy by the explicit chain rule: readable for a small robot, an oracle for the rest.
+"""D_i L_j in SymPy by the explicit chain rule: readable for a small robot, a reference for the rest.
 
 D_i L = Σ_s ∂²L/∂q̇_i∂q_s q̇_s + Σ_s ∂²L/∂q̇_i∂q̇_s q̈_s − ∂L/∂q_i
 """
@@ -10,7 +10,7 @@ from linkwise.symbolic.system import System
 
 
 def lagrangian(system: System, link: int) -> sp.Expr:
-    """L_j with the named definitions written out; grows with the chain, so for small robots only."""
+    """Return L_j with the named definitions written out; it grows with the chain: for small robots only."""
     twist: dict[sp.Symbol, sp.Expr] = {}
     height: dict[sp.Symbol, sp.Expr] = {}
     energies = link_energies(system)
@@ -23,7 +23,7 @@ def lagrangian(system: System, link: int) -> sp.Expr:
 
 
 def partial_torques(system: System, link: int) -> dict[int, sp.Expr]:
-    """τ_ij for every coordinate i on the path of link j, unsimplified."""
+    """Return τ_ij for every coordinate i on the path of link j, unsimplified."""
     value, path = lagrangian(system, link), system.path(link)
     c = system.coordinates
     torques = {}

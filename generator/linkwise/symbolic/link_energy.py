@@ -35,7 +35,7 @@ class Steps:
 
 @dataclass(frozen=True)
 class StepwiseEnergy:
-    """One link's kinetic and potential energy in J, in steps that keep every expression short.
+    """Kinetic and potential energy of one link in J, in steps that keep every expression short.
 
     `kinetic` may use the symbols of `twist`, `potential` those of `height`: they continue the exports of link
     `parent`, so that a long chain is never written out. Energies that a user wrote have no steps.
@@ -60,11 +60,11 @@ class _FrameState:
 
 
 class _Named(sp.Symbol):  # type: ignore[misc]
-    """Symbol of a definition, which no parameter of the same name equals."""
+    """Symbol of a definition; no parameter of the same name equals it."""
 
 
 class _Namer:
-    """Collects definitions: `name` returns a symbol for anything but a number."""
+    """Collector of definitions: `name` returns a symbol for anything but a number."""
 
     def __init__(self) -> None:
         self.definitions: list[Definition] = []
@@ -87,7 +87,7 @@ class _Namer:
 
 
 def link_energies(system: System) -> tuple[StepwiseEnergy, ...]:
-    """Energy of every link; that of a rigid link continues its parent's steps and does not repeat them.
+    """Return the energy of every link; a rigid link continues its parent's steps and does not repeat them.
 
     Raises LinkwiseError for joints that follow curves.
     """
@@ -127,7 +127,7 @@ def link_energies(system: System) -> tuple[StepwiseEnergy, ...]:
 
 
 def lineage(energies: Sequence[StepwiseEnergy], link: int) -> tuple[StepwiseEnergy, ...]:
-    """Return the energies whose steps that of link `link` builds on, oldest first, itself last."""
+    """Return the energies on whose steps that of link `link` builds, oldest first, itself last."""
     chain: list[StepwiseEnergy] = []
     at: int | None = link
     while at is not None:
@@ -137,13 +137,13 @@ def lineage(energies: Sequence[StepwiseEnergy], link: int) -> tuple[StepwiseEner
 
 
 def exact(a: Sequence[Scalar]) -> Vec3:
-    """Fractions for floats, as they print: 0.6 · 0.125 is then 0.075 and not the float beside it."""
+    """Return fractions for floats, as they print: 0.6 · 0.125 is then 0.075 and not the float beside it."""
     x, y, z = (sp.Rational(repr(float(e))) if isinstance(e, (int, float)) else e for e in a)
     return x, y, z
 
 
 def letters(index: int) -> str:
-    """a, b, …, z, ba, …: tells massless joints before one link apart."""
+    """Return a, b, …, z, ba, … for 0, 1, …: they distinguish the massless joints before one link."""
     head, last = divmod(index, 26)
     return (letters(head) if head else "") + chr(ord("a") + last)
 
@@ -187,7 +187,7 @@ def _step(
 
 
 def _turned(namer: _Namer, label: str, angle: sp.Expr, a: Vec3) -> Vec3:
-    """Rz(angle)ᵀ a."""
+    """Return Rz(angle)ᵀ a."""
     if a[0] == 0 and a[1] == 0:
         return a
     s, c = _Named(f"s{label}", real=True), _Named(f"c{label}", real=True)
@@ -197,7 +197,7 @@ def _turned(namer: _Namer, label: str, angle: sp.Expr, a: Vec3) -> Vec3:
 
 
 def _kinetic(state: _FrameState, m: Scalar, c: Vec3, inertia: Mat3) -> sp.Expr:
-    """½ m v·v + m v·(ω × c) + ½ ω·I ω, I = inertia about the frame's origin (parallel axes)."""
+    """Return ½ m v·v + m v·(ω × c) + ½ ω·I ω, I = inertia about the frame's origin (parallel axes)."""
     w, v = state.omega, state.v
     cc = _dot(c, c)
     about_origin = [

@@ -1,4 +1,4 @@
-"""Names that a Python file of energies defines for nobody: linkwise does not read them, nor does the file."""
+"""Names that a Python file of energies defines and that neither linkwise nor the file reads."""
 
 import ast
 from collections.abc import Iterator, Mapping
@@ -10,19 +10,19 @@ from linkwise_runtime.chosen_names import nearest_first
 from linkwise.errors import LinkwiseError
 
 READ = ("coordinates", "links", "parameters", "name")
-"""What linkwise reads of a file."""
+"""Names that linkwise reads from a file."""
 SCOPES = (ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
-"""Whose names are their own."""
+"""Syntax with names of its own."""
 ASSIGNMENTS = (ast.Assign, ast.AnnAssign, ast.AugAssign)
 
 
 def refuse_passed_over(source: bytes, defined: Mapping[str, object]) -> None:
-    """Raise LinkwiseError for what the file defines by a name of its own, and neither reads nor loads.
+    """Raise LinkwiseError for a name that the file defines and that neither it nor linkwise reads.
 
-    Such as `dissipation`, which would count for nothing. What is imported, looped over, a symbol that stands
-    nowhere, or what begins with _ may be left over.
+    An example is `dissipation`, which would count for nothing. Imports, variables of loops, symbols that are
+    not used, and names that begin with _ may be left over.
 
-    defined: what the file had by its names when it had run
+    defined: values by name, after the file has run
     """
     tree = ast.parse(source)
     filled = {id(node) for statement in ast.walk(tree) for node in _own_loads(statement)}
@@ -42,7 +42,7 @@ def _is_load(node: ast.AST) -> TypeGuard[ast.Name]:
 
 
 def _own_loads(statement: ast.AST) -> Iterator[ast.Name]:
-    """Where an assignment reads what it assigns to, or has an element of: whom that serves is not said."""
+    """Yield the reads of a name in an assignment to it or to an element of it: they do not count as a use."""
     if not isinstance(statement, ASSIGNMENTS):
         return
     targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
@@ -57,7 +57,7 @@ def _own_loads(statement: ast.AST) -> Iterator[ast.Name]:
 
 
 def _definitions(tree: ast.AST) -> Iterator[tuple[str, int]]:
-    """Names and lines of assignments, functions and classes, outside of functions and classes."""
+    """Yield names and lines of assignments, functions and classes, outside of functions and classes."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             yield node.name, node.lineno

@@ -1,7 +1,7 @@
-"""What every description becomes: coordinates, links and run-time parameters.
+"""Systems that every description becomes: coordinates, links and run-time parameters.
 
 A rigid link and a link of hand-written energies are two types, and so are the systems made of them. Both
-systems answer `name`, `coordinates`, `links`, `link_names`, `parameters`, `notes`, `request` and `path`.
+systems have `name`, `coordinates`, `links`, `link_names`, `parameters`, `notes`, `request` and `path`.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ from linkwise.robot.robot import Coordinate, Joint, Mat3, Robot, Scalar, Vec3
 class RigidLink:
     """A rigid body that carries mass, and the joints between it and the base.
 
-    chain: indices of the robot's links from the root to this one; joints: theirs
+    chain: indices of the robot's links from the root to this one; joints: the joints of these links
     mass in kg, com in m, inertia about it in kg·m², in the axes of the last joint's frame
     """
 
@@ -34,7 +34,7 @@ class RigidLink:
 
 @dataclass(frozen=True)
 class LinkEnergy:
-    """One link's kinetic and potential energy in J, as a user writes them; L_j = kinetic − potential."""
+    """Kinetic and potential energy of one link in J, as a user writes them; L_j = kinetic − potential."""
 
     name: str
     kinetic: sp.Expr
@@ -43,13 +43,13 @@ class LinkEnergy:
 
 @dataclass(frozen=True)
 class RigidSystem:
-    """A robot, and those of its links that carry mass; made by `rigid_system`."""
+    """A robot, and its links that carry mass; made by `rigid_system`."""
 
     robot: Robot
     links: tuple[RigidLink, ...]
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the robot."""
+        """Return the HTML that a notebook shows: the robot."""
         return self.robot._repr_html_()
 
     @property
@@ -64,12 +64,12 @@ class RigidSystem:
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What was done with the robot's description."""
+        """Notes on what was done with the robot's description."""
         return self.robot.notes
 
     @property
     def request(self) -> Mapping[str, Any]:
-        """What the robot was read from and how, as manifests keep it."""
+        """Source that the robot was read from, and the options, as manifests keep them."""
         return self.robot.request
 
     @property
@@ -79,7 +79,7 @@ class RigidSystem:
 
     @property
     def curved(self) -> bool:
-        """Whether a joint follows a curve of its coordinate."""
+        """True if a joint follows a curve of its coordinate."""
         return any(link.joint.curve for link in self.robot.links)
 
     @property
@@ -88,7 +88,7 @@ class RigidSystem:
         return tuple(link.name for link in self.links)
 
     def path(self, link: int) -> tuple[int, ...]:
-        """path(j): the coordinates that move link `link`, in ascending order."""
+        """Return path(j): the coordinates that move link `link`, in ascending order."""
         return tuple(sorted({joint.coordinate for joint in self.links[link].joints}))
 
 
@@ -102,10 +102,10 @@ class EnergySystem:
     parameters: Mapping[sp.Symbol, float] = field(default_factory=dict)
     notes: tuple[Note, ...] = ()
     request: Mapping[str, Any] = field(default_factory=dict, compare=False)
-    """What it was read from and how, as manifests keep it."""
+    """Source that it was read from, and the options, as manifests keep them."""
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: coordinates, and links with those that move them."""
+        """Return the HTML that a notebook shows: coordinates, and links with the coordinates moving them."""
         names = [c.name for c in self.coordinates]
         moved = [", ".join(names[k] for k in self.path(j)) for j in range(len(self.links))]
         links = [(str(j), *row) for j, row in enumerate(zip(self.link_names, moved, strict=True))]
@@ -118,14 +118,14 @@ class EnergySystem:
         return tuple(link.name for link in self.links)
 
     def path(self, link: int) -> tuple[int, ...]:
-        """path(j): the coordinates that the energy of link `link` depends on, in ascending order."""
+        """Return path(j): the coordinates that the energy of link `link` depends on, in ascending order."""
         energy = self.links[link]
         used = energy.kinetic.free_symbols | energy.potential.free_symbols
         return tuple(k for k, c in enumerate(self.coordinates) if used & {c.q, c.qd})
 
 
 System: TypeAlias = RigidSystem | EnergySystem
-"""All that derivation and emission know of a robot."""
+"""System of either kind: all that derivation and emission know of a robot."""
 
 
 def refuse_curves(system: System) -> None:
@@ -139,7 +139,10 @@ def refuse_curves(system: System) -> None:
 
 
 def rigid_system(robot: Robot) -> RigidSystem:
-    """System of a robot's links; those without mass have no Lagrangian and are only passed through."""
+    """Return the system of a robot's links.
+
+    Links without mass have no Lagrangian and are only passed through.
+    """
     links = []
     for index, link in enumerate(robot.links):
         if not link.massless:

@@ -18,7 +18,7 @@ from linkwise.symbolic.passed_over import refuse_passed_over
 from linkwise.symbolic.system import EnergySystem, LinkEnergy
 
 MOST_EXPANDED = 50
-"""Largest power of velocities that is multiplied out: a larger one may never be."""
+"""Largest power of velocities that is multiplied out: a larger one may never finish."""
 
 
 def energy_system(
@@ -28,7 +28,7 @@ def energy_system(
     parameters: Mapping[sp.Symbol, float] | None = None,
     symbolic: bool = False,
 ) -> EnergySystem:
-    """System from link energies, checked: every symbol known, degree at most 2 in the velocities.
+    """Return the system of link energies, checked: every symbol known, degree at most 2 in the velocities.
 
     `parameters` gives each other symbol its value; they become numbers unless `symbolic`, and
     those that no energy has are left out. Velocity terms of the potential count as kinetic, terms of the
@@ -51,9 +51,10 @@ def energy_system(
 
 
 def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
-    """Run a Python file that defines `coordinates`, `links`, and perhaps `parameters` and `name`.
+    """Return the system of a Python file that defines `coordinates`, `links`, and optionally other names.
 
-    Raises LinkwiseError as `energy_system` does, and for a name that nobody reads.
+    The file is run; the other names are `parameters` and `name`. Raises LinkwiseError as `energy_system`
+    does, and for a name that nobody reads.
     """
     try:
         scope: dict[str, Any] = runpy.run_path(str(path))
@@ -76,7 +77,7 @@ def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
 
 
 def _said(error: BaseException, path: str) -> str:
-    """The last line of the user's file that an error passed through, and what the error is."""
+    """Return in words the last line of the user's file that an error passed through, and the error."""
     said = _text_of(error)
     lines = [at for frame, at in walk_tb(error.__traceback__) if frame.f_code.co_filename == path]
     if isinstance(error, SyntaxError) and error.filename == path:
@@ -117,7 +118,7 @@ def _check_names(name: str, coordinates: tuple[Coordinate, ...], links: tuple[Li
 def _values(
     parameters: Mapping[sp.Symbol, float], coordinates: tuple[Coordinate, ...]
 ) -> dict[sp.Symbol, float]:
-    """Parameters with their values as floats; one symbol a name, as generated code knows names only."""
+    """Return the parameters with float values; one symbol a name, as generated code knows names only."""
     if not isinstance(parameters, Mapping) or not all(isinstance(s, sp.Symbol) for s in parameters):
         raise LinkwiseError("`parameters` must be a dictionary of SymPy symbols and their values")
     for name, count in Counter(symbol.name for symbol in parameters).items():
@@ -191,9 +192,9 @@ def _expression(what: str, energy: object) -> sp.Expr:
 
 
 def _whole(energy: sp.Expr) -> sp.Expr:
-    """The energy with exponents such as 2.0 or 1.5 as the fractions that they are.
+    """Return the energy with exponents such as 2.0 or 1.5 as the fractions that they are.
 
-    Others are powers of the base's logarithm, which negative numbers do not have.
+    Other exponents are powers by the base's logarithm, which negative numbers do not have.
     """
 
     def with_a_point(part: sp.Basic) -> bool:
@@ -230,7 +231,7 @@ def _check_real(*energies: sp.Expr) -> None:
 
 
 def _numbers(expr: sp.Basic) -> Iterator[sp.Expr]:
-    """The largest parts of an expression that are numbers."""
+    """Yield the largest parts of an expression that are numbers."""
     if isinstance(expr, sp.Expr) and expr.is_number:
         yield expr
     else:

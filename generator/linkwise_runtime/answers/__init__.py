@@ -1,1 +1,1 @@
-"""From packed values to answers: spread, summed over links, solved for accelerations."""
+"""Answers made from packed values: spread, summed over links, solved for accelerations."""

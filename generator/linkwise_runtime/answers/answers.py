@@ -1,4 +1,4 @@
-"""The table's calls of `Dynamics` as one back end answers them, for motion that has been read."""
+"""Calls of `Dynamics` as one back end answers them, for motion that has been read."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -17,15 +17,17 @@ from .namespace import hidden, namespace, side_by_side
 from .packed_tables import PackedTables
 
 AT_ONCE = 1 << 22
-"""Packed numbers of one chunk of samples, each at n unit velocities; of one sample at some of them."""
+"""Most packed numbers of a chunk of samples, each at n unit velocities, or of one sample at some of them."""
 
 Shapes = tuple[tuple[int, ...], ...]
 
 
 def answer_shapes(structure: Structure, frames: int = 0) -> dict[str, Shapes]:
-    """Shapes for one sample of each call's results, by its key; without those that hang on what is asked.
+    """Return the shapes of each call's results for one sample, by its key.
 
-    frames: how many there are, where that is known
+    Calls whose shapes depend on the arguments are left out.
+
+    frames: the number of frames, where it is known
     """
     axes = axes_of(structure.joint_names, structure.joint_units, structure.link_names)
     sizes = {axis: len(named.names) for axis, named in axes.items()}
@@ -38,10 +40,10 @@ def answer_shapes(structure: Structure, frames: int = 0) -> dict[str, Shapes]:
 
 
 class Answers:
-    """Rows of the table by their keys: each takes motion (..., n) in one shape, and answers with arrays."""
+    """Rows of the table by their keys: methods on motion (..., n), in one shape, that return arrays."""
 
     contiguous = False
-    """Whether what `out` says must be contiguous."""
+    """True if `out` must be contiguous."""
 
     def __init__(self, engine: PackedEngine) -> None:
         self._engine, self._structure = engine, engine.structure
@@ -49,122 +51,122 @@ class Answers:
 
     @cached_property
     def shapes(self) -> dict[str, Shapes]:
-        """Of each call's results for one sample."""
+        """Shapes of each call's results for one sample."""
         return answer_shapes(self._structure)
 
     def compute_into(self, call: str, motion: Sequence[Numbers], into: Sequence[Numbers]) -> None:
-        """Compute a call's results where these arrays or tensors lie."""
+        """Compute a call's results and write them into these arrays or tensors."""
         for place, value in zip(into, getattr(self, call)(*motion), strict=True):
             place[...] = value
 
     def packed(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """c2, c1, g, tau, h1."""
+        """Return packed c2, c1, g, tau and h1, (..., count) each."""
         return self._engine.decomposition(q, qd, qdd)
 
     def packed_torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """tau on the paths."""
+        """Return tau on the paths, (..., count)."""
         return (self._engine.torque(q, qd, qdd),)
 
     def partial_torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """tau_ij."""
+        """Return tau_ij, (..., n, N)."""
         return (self._tables.spread(self._engine.torque(q, qd, qdd), "torque"),)
 
     def inverse_dynamics(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """tau_i."""
+        """Return tau_i, (..., n)."""
         return (self._tables.summed(self._engine.torque(q, qd, qdd)),)
 
     def passive_torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """Spring, damping, friction, armature."""
+        """Return the torques for spring, damping, friction and armature, (..., n) each."""
         return passive_torques(self._engine, self._structure.passive_sums, q, qd, qdd)
 
     def coefficients(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
-        """c2, c1, g."""
+        """Return c2, c1 (..., n, N, n) and g (..., n, N)."""
         c2, c1, g, _, _ = self.packed(q, qd, self._rest(q))
         spread = self._tables.spread
         return spread(c2, "acceleration"), spread(c1, "velocity"), spread(g, "gravity")
 
     def propagation(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """c2_ijk qdd_k, c1_ijk qd_k, g_ij."""
+        """Return c2_ijk qdd_k, c1_ijk qd_k (..., n, N, n) and g_ij (..., n, N)."""
         c2, c1, g, _, _ = self.packed(q, qd, qdd)
         return self._propagated(c2, self._tables.spread(c1, "velocity"), g, qd, qdd)
 
     def gradient_propagation(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """The same with c1 = d(tau_ij)/d(qd_k)."""
+        """Return `propagation` with c1 = d(tau_ij)/d(qd_k)."""
         c2, c1, g, _, h1 = self.packed(q, qd, qdd)
         return self._propagated(c2, self._slopes(c1, h1), g, qd, qdd)
 
     def natural_impedance(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """c2, 2 c1 - h1, c0."""
+        """Return c2, 2 c1 - h1 and c0, (..., n, N, n) each."""
         c2, c1, _, _, h1 = self.packed(q, qd, qdd)
         (stiffness,) = self.position_gradient(q, qd, qdd)
         return self._tables.spread(c2, "acceleration"), self._slopes(c1, h1), stiffness
 
     def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """c0."""
+        """Return c0, (..., n, N, n)."""
         return (self._tables.spread(self._engine.position_gradient(q, qd, qdd), "velocity"),)
 
     def masked(self, q: Numbers, qd: Numbers, qdd: Numbers, weights: Numbers) -> Sequence[Numbers]:
-        """sum over m, k of w_mk c_m,ijk q_k^(m), w of shape (3, n)."""
+        """Return sum over m, k of w_mk c_m,ijk q_k^(m), (..., n, N), w of shape (3, n)."""
         acceleration, velocity, _ = self.coefficients(q, qd)
         total = velocity @ (weights[1] * qd)[..., None, :, None]
         total = total + acceleration @ (weights[2] * qdd)[..., None, :, None]
-        # A tensor of numbers that nobody may look at yet, as under vmap, might ask for positions too.
+        # The numbers of a tensor may be hidden, as under vmap, and may weigh positions too.
         if not isinstance(weights, np.ndarray) or weights[0].any():
             (stiffness,) = self.position_gradient(q, qd, qdd)
             total = total + stiffness @ (weights[0] * q)[..., None, :, None]
         return (total[..., 0],)
 
     def regressor(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """Y of tau_ij."""
+        """Return Y of tau_ij, (..., n, N, 10)."""
         return (self._tables.spread_rows(self._engine.regressor(q, qd, qdd), "torque"),)
 
     def coefficient_regressors(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
-        """Y of c2, c1, g."""
+        """Return Y of c2 and c1 (..., n, N, n, 10) and of g (..., n, N, 10)."""
         rows = self._engine.coefficient_regressors(q, qd, self._rest(q))
         fields = ("acceleration", "velocity", "gravity")
         return tuple(self._tables.spread_rows(a, field) for a, field in zip(rows, fields, strict=True))
 
     def mass_matrix(self, q: Numbers) -> Sequence[Numbers]:
-        """M_ik = sum_j c2_ijk."""
+        """Return M_ik = sum_j c2_ijk, (..., n, n)."""
         rest = self._rest(q)
         return (self._tables.matrices(self.packed(q, rest, rest)[0], "acceleration"),)
 
     def mass_matrix_by_link(self, q: Numbers) -> Sequence[Numbers]:
-        """c2."""
+        """Return c2, (..., n, N, n)."""
         return self.coefficients(q, self._rest(q))[:1]
 
     def coriolis_matrix(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
-        """C_ik = sum_j c1_ijk."""
+        """Return C_ik = sum_j c1_ijk, (..., n, n)."""
         return (self._tables.matrices(self.packed(q, qd, self._rest(q))[1], "velocity"),)
 
     def coriolis_matrix_by_link(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
-        """c1."""
+        """Return c1, (..., n, N, n)."""
         return self.coefficients(q, qd)[1:2]
 
     def gravity_torque(self, q: Numbers) -> Sequence[Numbers]:
-        """g_i = tau_i at rest."""
+        """Return g_i = tau_i at rest, (..., n)."""
         rest = self._rest(q)
         return self.inverse_dynamics(q, rest, rest)
 
     def gravity_torque_by_link(self, q: Numbers) -> Sequence[Numbers]:
-        """g_ij = tau_ij at rest."""
+        """Return g_ij = tau_ij at rest, (..., n, N)."""
         rest = self._rest(q)
         return self.partial_torque(q, rest, rest)
 
     def forward_dynamics_of_links(self, q: Numbers, qd: Numbers, tau: Numbers) -> Sequence[Numbers]:
-        """Solve M qdd = tau - (h + g)."""
+        """Solve M qdd = tau - (h + g) for qdd, (..., n)."""
         mass, bias = self.equations(q, qd)
         return (solved(mass, tau - bias, self._structure.joint_names),)
 
     def forward_dynamics(self, q: Numbers, qd: Numbers, tau: Numbers) -> Sequence[Numbers]:
-        """Solve (M + armature) qdd = tau - spring - damping - friction - (h + g)."""
+        """Solve (M + armature) qdd = tau - spring - damping - friction - (h + g) for qdd, (..., n)."""
         mass, bias = self.equations(q, qd, passive=True)
         return (solved(mass, tau - bias, self._structure.joint_names),)
 
     def equations(self, q: Numbers, qd: Numbers, passive: bool = False) -> tuple[Numbers, Numbers]:
-        """M (..., n, n) and h + g (..., n) of M qdd + h + g = tau.
+        """Return M (..., n, n) and h + g (..., n) of M qdd + h + g = tau.
 
-        passive: whether what joints have of their own is among them
+        passive: whether the joints' springs, damping, friction and armature are included
         """
         rest = self._rest(q)
         c2, _, _, bias, _ = self.packed(q, qd, rest)
@@ -177,31 +179,34 @@ class Answers:
         return mass + armature, force + (spring + damping + friction)
 
     def sums(self, q: Numbers, qd: Numbers) -> tuple[Numbers, Numbers, Numbers]:
-        """M, C (..., n, n) and g (..., n)."""
+        """Return M, C (..., n, n) and g (..., n)."""
         c2, c1, g, _, _ = self.packed(q, qd, self._rest(q))
         matrices = self._tables.matrices
         return matrices(c2, "acceleration"), matrices(c1, "velocity"), self._tables.summed(g)
 
     def energy(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
-        """K_j and P_j."""
+        """Return K_j and P_j, (..., N) each."""
         return [side_by_side(values) for values in self._engine.energies(q, qd)]
 
     def power(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """c2_ijk qdd_k qd_i, c1_ijk qd_k qd_i, g_ij qd_i."""
+        """Return c2_ijk qdd_k qd_i, c1_ijk qd_k qd_i (..., n, N, n) and g_ij qd_i (..., n, N)."""
         acceleration, velocity, gravity = self.propagation(q, qd, qdd)
         rate = qd[..., :, None, None]
         return acceleration * rate, velocity * rate, gravity * rate[..., 0]
 
     def christoffel(self, q: Numbers) -> Sequence[Numbers]:
-        """The sums over j of the next."""
+        """Return Gamma_ikl, the sum over j of Gamma_ijkl of `christoffel_by_link`, (..., n, n, n)."""
         return self._christoffel(q, lambda c1: self._tables.matrices(c1, "velocity"))
 
     def christoffel_by_link(self, q: Numbers) -> Sequence[Numbers]:
-        """Gamma_ijkl = c1_ijk at qd = e_l, less c1 at rest, which terms of energies linear in qd leave."""
+        """Return Gamma_ijkl = c1_ijk at qd = e_l less c1_ijk at rest, (..., n, N, n, n).
+
+        c1 at rest comes from terms of energies linear in qd.
+        """
         return self._christoffel(q, lambda c1: self._tables.spread(c1, "velocity"))
 
     def check_regresses(self) -> None:
-        """Raise ValueError where rows of the table that are for rigid links are not there."""
+        """Raise ValueError where the back end lacks the calls that are for rigid links."""
         if not self._engine.regresses:
             raise ValueError(
                 f"{self._structure.name} on {self._engine.name} has no regressors, which come from the rule "
@@ -209,7 +214,7 @@ class Answers:
             )
 
     def _slopes(self, c1: Numbers, h1: Numbers) -> Numbers:
-        """d(tau_ij)/d(qd_k) = 2 c1 - h1."""
+        """Return d(tau_ij)/d(qd_k) = 2 c1 - h1, (..., n, N, n)."""
         slopes = 2.0 * self._tables.spread(c1, "velocity")
         return slopes - self._tables.spread(h1, "velocity_linear") if self._structure.linear else slopes
 
@@ -240,7 +245,7 @@ class Answers:
         return (side_by_side(whole.reshape(*batch, *whole.shape[1:])),)
 
     def _of_units(self, q: Numbers, units: Numbers, made: Callable[[Numbers], Numbers]) -> Numbers:
-        """What is made of c1 at some unit velocities e_l, for samples (..., n); l is the last axis."""
+        """Return what `made` makes of c1 at unit velocities e_l, for samples (..., n); l is the last axis."""
         rates = units.reshape(len(units), *[1] * (q.ndim - 1), units.shape[-1]) + 0.0 * q
         values = self.packed(q + 0.0 * rates, rates, 0.0 * rates)[1]
         if self._structure.linear:
@@ -256,7 +261,7 @@ class Answers:
 
 
 def _pieces(rows: Numbers, most: int) -> list[Numbers]:
-    """Rows (count, n), so many at a time; one piece of none where there are none."""
+    """Return rows (count, n) in pieces of at most `most` rows; one empty piece where there are no rows."""
     return [rows[at : at + most] for at in range(0, max(1, len(rows)), most)]
 
 

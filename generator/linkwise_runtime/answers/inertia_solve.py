@@ -1,8 +1,8 @@
-"""Accelerations from the mass matrix, M qdd = f, which joints make it singular, and how much rounding leaves.
+"""Accelerations from the mass matrix, M qdd = f, joints that make it singular, and digits lost to rounding.
 
-A mass matrix with ones on its diagonal, of least eigenvalue l, answers with a relative error of about
-epsilon / l. Of joint c, (M_cc (M^-1)_cc)^-1 is the part of its own inertia that is left when all others move
-freely, at least l: C asks the same of its factors (elimination.h).
+For a mass matrix with ones on its diagonal and the least eigenvalue l, the relative error of the answer is
+about epsilon / l. For joint c, (M_cc (M^-1)_cc)^-1 is the part of its own inertia that is left when all
+others move freely, at least l: C asks the same of its factors (elimination.h).
 """
 
 import sys
@@ -21,35 +21,35 @@ if TYPE_CHECKING:
     from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
 
 CLEAR = 1e5
-"""Roundings; a matrix with ones on its diagonal whose least pivot is as large is far from singular."""
+"""Number of roundings: a matrix with ones on its diagonal and a larger least pivot is far from singular."""
 ROUNDINGS = 4.0
-"""By so many for each joint, rounding moves eigenvalues of a matrix with ones on its diagonal."""
+"""Number of roundings for each joint by which eigenvalues of a matrix with ones on its diagonal may move."""
 SHARE = 1e-3
-"""Joints that move less than this part of the one that moves most in a motion without mass are left out."""
+"""Share of the largest move, in a motion without mass, below which joints are left out."""
 
 
 class Told(NamedTuple):
-    """Whose accelerations are known by how many digits, in messages."""
+    """Accelerations that are known by few digits, for messages."""
 
     what: str
     names: Sequence[str]
-    """Of joints or, of a frame, of rows."""
+    """Names of the joints or, for a frame, of its rows."""
     of_frame: bool = False
     beside: str = ""
-    """What is less known yet."""
+    """Further text on what is known by even fewer digits."""
 
 
 def solved(mass: Numbers, force: Numbers, joint_names: Sequence[str]) -> Numbers:
-    """M^-1 f (..., n), of matrices (..., n, n) and forces (..., n); raises as `solved_columns` does."""
+    """Return M^-1 f (..., n), for matrices (..., n, n) and forces (..., n); raise as `solved_columns`."""
     return solved_columns(mass, force[..., None], joint_names)[..., 0]
 
 
 def solved_columns(mass: Numbers, forces: Numbers, joint_names: Sequence[str]) -> Numbers:
-    """M^-1 F (..., n, X), of matrices (..., n, n) and columns of forces (..., n, X).
+    """Return M^-1 F (..., n, X), for matrices (..., n, n) and columns of forces (..., n, X).
 
-    Rows and columns are scaled to ones on the diagonal first: a hand's inertia is not lost beside a body's.
-    Raises ValueError for a singular matrix, with the sample and the joints, and warns of samples whose
-    answer is known to fewer than half of the digits of its dtype; where nobody may look at numbers, as under
+    Rows and columns are first scaled to ones on the diagonal, so that a hand's inertia is not lost beside a
+    body's. Raises ValueError for a singular matrix, with the sample and the joints, and warns of samples
+    whose answer is known to fewer than half of the digits of its dtype; where numbers are hidden, as under
     vmap, the answer of a singular matrix is not finite.
     """
     xp = namespace(mass)
@@ -79,7 +79,7 @@ def _quotient(scaled: Numbers, columns: Numbers) -> Numbers:
 
 
 def _lightest(scaled: Numbers, joint_names: Sequence[str]) -> Numbers:
-    """The joint of which, those before it moving freely, the least part of its inertia is left (...,).
+    """Return the joint (...,) with the least part of its inertia left when the joints before it move freely.
 
     Raises ValueError for the first singular matrix of (..., n, n); what is not finite stays so.
     """
@@ -108,7 +108,10 @@ def _are_clear(pivots: Numbers) -> bool:
 
 
 def _lightest_of_any(scaled: NDArray[np.floating], joint_names: Sequence[str]) -> NDArray[np.intp]:
-    """The same of matrices that may not be positive: the joint that moves most with the least mass."""
+    """Return the joint (...,) that moves most with the least mass, for matrices that may not be positive.
+
+    Raises ValueError for the first singular matrix.
+    """
     finite = np.isfinite(scaled).all((-2, -1))
     values, vectors = np.linalg.eigh(np.where(finite[..., None, None], scaled, np.eye(scaled.shape[-1])))
     least = np.abs(values).argmin(-1)[..., None]
@@ -128,7 +131,7 @@ def _lightest_of_any(scaled: NDArray[np.floating], joint_names: Sequence[str]) -
 
 
 def _unit_of(joint: Numbers, like: Numbers) -> Numbers:
-    """Zeros (..., n), and one at this joint (...,)."""
+    """Return zeros (..., n), with a one at this joint (...,)."""
     if isinstance(like, np.ndarray):
         return np.asarray(joint[..., None] == np.arange(like.shape[-1]), like.dtype)
     torch, device = sys.modules["torch"], cast("Tensor", like).device
@@ -138,7 +141,7 @@ def _unit_of(joint: Numbers, like: Numbers) -> Numbers:
 
 
 def can_move(motion: NDArray[np.floating], joint_names: Sequence[str], share: float = SHARE) -> str:
-    """Which joints move in a motion (n,) by this share of the one that moves most, in words."""
+    """Return in words which joints move in a motion (n,) by more than this share of the largest move."""
     moving = moving_most(motion, joint_names, share)
     if len(moving) > 1:
         return f"the joints {listed(moving)} can move together"
@@ -146,7 +149,7 @@ def can_move(motion: NDArray[np.floating], joint_names: Sequence[str], share: fl
 
 
 def moving_most(motion: NDArray[np.floating], names: Sequence[str], share: float) -> list[str]:
-    """The names of those that move in a motion (n,) by this share of the one that moves most."""
+    """Return the names of those that move in a motion (n,) by more than this share of the largest move."""
     still = np.abs(motion)
     return [names[i] for i in np.flatnonzero(still > share * still.max()).tolist()]
 
@@ -155,7 +158,7 @@ def warn_of_vague(scaled: Numbers, mobility: Numbers, about: Told) -> None:
     """Warn where fewer than half of the digits of an answer are known.
 
     scaled: matrices with ones on their diagonals, (..., n, n); mobility: the largest (M_cc (M^-1)_cc) that
-    was found of each, (...,)
+    was found for each, (...,)
     """
     epsilon = epsilon_of(scaled)
     vague = (epsilon**0.5 * mobility > 1.0) & (mobility < float("inf"))

@@ -1,4 +1,4 @@
-"""The library that some numbers belong to, their precision, and how they lie in memory."""
+"""Library that numbers belong to, their precision, and how they lie in memory."""
 
 import sys
 from collections.abc import Mapping
@@ -14,16 +14,19 @@ if TYPE_CHECKING:
 
 NUMPY = cast(Namespace, np)
 MODULES = cast(Mapping[str, Namespace], sys.modules)
-"""What is imported already: whoever has a tensor has torch."""
+"""Modules that are imported already: wherever there is a tensor, torch is."""
 
 
 def namespace(values: object) -> Namespace:
-    """NumPy for an array, torch for a tensor; it is there already, and not imported."""
+    """Return NumPy for an array, torch for a tensor; torch is imported already then."""
     return NUMPY if isinstance(values, np.ndarray) else MODULES["torch"]
 
 
 def hidden(values: Numbers) -> bool:
-    """Whether nobody may look at the numbers: a compiler or a transformation such as vmap follows them."""
+    """Return whether the numbers cannot be looked at.
+
+    That is so where a compiler or a transformation such as vmap follows them, and where they have no data.
+    """
     if isinstance(values, np.ndarray):
         return False
     torch = sys.modules["torch"]
@@ -35,24 +38,24 @@ def hidden(values: Numbers) -> bool:
 
 
 def side_by_side(values: Numbers) -> Numbers:
-    """The numbers in C's order, without gaps."""
+    """Return the numbers in C's order, without gaps in memory."""
     if isinstance(values, np.ndarray):
         return np.ascontiguousarray(values)
     return cast("Tensor", values).contiguous()
 
 
 def array_of(values: Numbers) -> NDArray[np.floating]:
-    """An array, or what a tensor holds."""
+    """Return an array as it is, or the numbers of a tensor as an array."""
     if isinstance(values, np.ndarray):
         return values
     return np.asarray(values.detach().cpu() if hasattr(values, "detach") else values)
 
 
 def kind_of(values: Numbers) -> np.dtype[np.floating]:
-    """The dtype of floats, of an array or a tensor."""
+    """Return NumPy's dtype of floats for an array or a tensor."""
     return np.dtype(np.float64 if values.dtype.itemsize == 8 else np.float32)
 
 
 def epsilon_of(values: Numbers) -> float:
-    """The rounding of its dtype."""
+    """Return the relative rounding of the dtype of an array or a tensor."""
     return float(np.finfo(kind_of(values)).eps)

@@ -15,20 +15,20 @@ if TYPE_CHECKING:
 
 
 class SumTable(NamedTuple):
-    """Which packed values a matrix of joints sums: first those of its first entry, row by row."""
+    """Packed values that a matrix of joints sums up: first those of its first entry, row by row."""
 
     values: Numbers
-    """Position of each summand."""
+    """Positions of the summands."""
     entries: Numbers
-    """Entry of the matrix, flat, that it belongs to."""
+    """Flat index of the matrix entry to which each of them belongs."""
     starts: Numbers
-    """Where the summands of each entry begin that has any."""
+    """Places where the summands begin of each entry that has any."""
     filled: Numbers
-    """These entries."""
+    """Flat indices of these entries."""
 
 
 class PackedTables:
-    """Spreads and sums packed values of one robot, with tables of constants kept for each device."""
+    """Tables of constants, for each device, by which packed values of one robot are spread and summed."""
 
     def __init__(self, engine: PackedEngine) -> None:
         structure = engine.structure
@@ -51,7 +51,7 @@ class PackedTables:
             self._joint_sums(like)
 
     def spread(self, values: Numbers, field: str) -> Numbers:
-        """Values (..., count) of a field of `Layout` over (..., n, N) or (..., n, N, n), zeros elsewhere."""
+        """Return a field of `Layout` (..., count) as (..., n, N) or (..., n, N, n), zeros elsewhere."""
         table, batch = self._table(field, values), values.shape[:-1]
         if isinstance(values, np.ndarray):
             padded = np.zeros((*batch, values.shape[-1] + 1), values.dtype)
@@ -63,7 +63,7 @@ class PackedTables:
         return dense
 
     def spread_rows(self, values: Numbers, field: str) -> Numbers:
-        """Rows of 10 (..., 10 count) of a field over (..., n, N[, n], 10), zeros elsewhere."""
+        """Return rows of 10 (..., 10 count) of a field in (..., n, N[, n], 10), zeros elsewhere."""
         padded = self._engine.concatenate([values, self._engine.zeros(values, PARAMETERS)])
         rows = padded.reshape(*values.shape[:-1], len(getattr(self._layout, field)) + 1, PARAMETERS)
         entries = rows[..., self._table(field, values), :]
@@ -71,12 +71,12 @@ class PackedTables:
         return dense
 
     def summed(self, tau: Numbers) -> Numbers:
-        """Packed torques (..., count), summed over the links: (..., n)."""
+        """Return packed torques (..., count) summed over the links, (..., n)."""
         return tau @ self._joint_sums(tau)
 
     def matrices(self, values: Numbers, field: str) -> Numbers:
-        """Sums sum_j c_ijk (..., n, n) of values (..., count) of a field with rows (i, j, k)."""
-        # Any: of arrays or of tensors, as the values are.
+        """Return the sums sum_j c_ijk (..., n, n) of values (..., count) of a field with rows (i, j, k)."""
+        # Any: a table of arrays or of tensors, as the values are.
         table: Any = self._sum_table(field, values)
         size = self._n * self._n
         sums = self._engine.zeros(values, size)
@@ -99,7 +99,7 @@ class PackedTables:
         return self._places[key]
 
     def _joint_sums(self, like: Numbers) -> Numbers:
-        """Ones (count, n) where a packed torque is on a joint."""
+        """Return zeros (count, n), with ones where a packed torque is on a joint."""
         key = like.dtype, getattr(like, "device", None)
         if key not in self._places:
             rows = self._layout.torque
@@ -116,7 +116,7 @@ class PackedTables:
         return self._sums[key]
 
     def _positions(self, field: str) -> Indices:
-        """For each entry of the dense tensor its packed position, or that of the zero behind them."""
+        """Return for each entry of the dense tensor its packed position, or that of the zero behind."""
         rows: Indices = getattr(self._layout, field)
         positions = np.full(self._shapes[field], len(rows), dtype=np.intp)
         positions[tuple(rows.T)] = np.arange(len(rows))
@@ -126,7 +126,7 @@ class PackedTables:
 
 
 def sum_table(layout: Layout, field: str, n: int) -> tuple[NDArray[np.intp], ...]:
-    """The `SumTable` of a field; of c2, whose half i <= k is listed, the other half too."""
+    """Return the fields of the `SumTable` of a field; for c2, listed for i <= k, with the other half too."""
     rows: Indices = getattr(layout, field)
     i, k = rows[:, 0], rows[:, 2]
     values, entries = np.arange(len(rows)), i * n + k

@@ -1,4 +1,4 @@
-"""What back ends have in common: the answers that are made of their packed values, and a tree's numbers."""
+"""Base of the back ends: answers made of their packed values, and the numbers of the tree of joints."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
@@ -19,22 +19,24 @@ from .array_kernels import known_kernel, operations
 
 
 class ArrayBackend(PackedEngine):
-    """Base of the back ends; each computes with one library, and is an `PackedEngine` of it."""
+    """Base of the back ends, each of which is a `PackedEngine` that computes with one library."""
 
     takes_tensors: ClassVar[bool]
-    """Whether motion is given as torch tensors only."""
+    """True if the back end computes with torch tensors."""
     face: ClassVar[type | None] = None
-    """Class of the robots that compute with it; None for `Dynamics`."""
+    """Class of the robots that compute with this back end; None for `Dynamics`."""
     direct: Mapping[str, Callable[..., object]] = {}
-    """Calls by name that are quicker than the table's, given first a robot; they take arrays alone."""
+    """Calls by name that are faster than those of the table; their first argument is a robot, and they accept
+    arrays alone."""
     at_once: Callable[[str, Sequence[object]], Sequence[Numbers] | None] | None = None
-    """Results of a row for what is plainly one sample, before it is read; None where one has to look."""
+    """Function that returns the results of a row for what is plainly one sample, before it is read, or None
+    where the arguments have to be read."""
     threads_set: int | None = None
-    """Threads that somebody has set; None where nobody has."""
+    """Number of threads that was set; None where none was."""
     parameters: Mapping[str, float | Numbers]
     """Values of the run-time parameters by name."""
     bodies: Bodies[Numbers] | None
-    """In place of the tree's."""
+    """Bodies in place of the tree's; None for the tree's own."""
 
     def __init__(
         self,
@@ -46,11 +48,12 @@ class ArrayBackend(PackedEngine):
         reads: Callable[[str, object], Numbers] = as_array,
         tree: JointTree | None = None,
     ) -> None:
-        """`links` are the closed forms, `rule` the vectorised rule: a package has one of them, or both.
+        """Set up the back end with closed forms `links`, the vectorised `rule`, or both.
 
-        bodies: in place of the tree's, whose numbers are read so; tree: where frames are, without the rule
+        bodies: in place of the tree's; reads: makes numbers of them; tree: that of the frames, where there is
+        no rule
 
-        Raises ValueError for a kernel that cannot be, and as `checked_bodies` does.
+        Raises ValueError for a kernel that cannot be used, and as `checked_bodies` does.
         """
         self.structure = structure
         self.links = links or ()
@@ -64,7 +67,7 @@ class ArrayBackend(PackedEngine):
 
     @property
     def threads(self) -> int:
-        """Threads that a large batch may use; raises AttributeError where the library has them by itself."""
+        """Number of threads that a large batch may use; AttributeError where the library has its own."""
         raise AttributeError(f"{self.name} has no threads of its own; native has")
 
     @threads.setter
@@ -73,28 +76,31 @@ class ArrayBackend(PackedEngine):
 
     @property
     def samples(self) -> tuple[int, ...]:
-        """Shape of the samples that have a parameter or a body each; () where they are the same for all."""
+        """Shape of the samples that have a parameter or a body each; () where all samples share them."""
         shapes = [shape_of(value) for value in self.parameters.values()]
         if self.bodies is not None:
             shapes += [shape_of(a)[: -1 - own] for own, a in enumerate(self.bodies)]
         try:
             return np.broadcast_shapes(*shapes)
-        except ValueError:  # which the first call tells by name
+        except ValueError:  # which the first call reports by name
             return max(shapes, key=len)
 
     @property
     def ties_joints(self) -> bool:
-        """Whether the robot's file ties joints."""
+        """True if the robot's file ties joints."""
         return self.tree is not None and self.tree.tied
 
     @cached_property
     def answers(self) -> Answers:
-        """Rows of the table, of motion that has been read."""
+        """Answers of the table's rows, for motion that has been read."""
         return Answers(self)
 
     @cached_property
     def frames(self) -> FrameAnswers:
-        """The same of frames; raises ValueError for links of energies."""
+        """Answers of the calls on frames, for motion that has been read.
+
+        Raises ValueError for links given by energies.
+        """
         if self.tree is None:
             raise ValueError(
                 f"the links of {self.structure.name} are energies, which do not say where anything is; "
@@ -105,39 +111,39 @@ class ArrayBackend(PackedEngine):
     def read(
         self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
     ) -> tuple["ArrayBackend", Sequence[Numbers]]:
-        """What computes, and `arrays` as it computes with them."""
+        """Return this back end, which computes, and `arrays` as it computes with them."""
         return self, self.arrays(named, n, beside)
 
     def arrays(
         self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
     ) -> Sequence[Numbers]:
-        """Motion (..., n), then what is beside it, checked and of one shape of samples.
+        """Return the motion (..., n), then what is beside it, checked and in one shape of samples.
 
         Errors name the argument.
         """
         raise NotImplementedError
 
     def read_beside_motion(self) -> Iterable[object]:
-        """Arrays or tensors that results hang on, beside the motion."""
+        """Return the arrays or tensors, beside the motion, that results depend on."""
         return self.parameters.values()
 
     def controller(self, joints: object, frame: object) -> TorqueOfOne | None:
-        """Functions of one sample for targets of joints, and of a frame or None; None without any."""
+        """Return functions for one sample, for targets of joints and of a frame or None; None without."""
         return None
 
     def module(self, robot: object, call: str, fixed: Mapping[str, object]) -> object:
-        """One call of a robot on this back end as a torch module; raises TypeError without any."""
+        """Return one call of a robot on this back end as a torch module; raise TypeError if it has none."""
         raise TypeError(f"{self.name} has no torch modules; load torch or autograd")
 
     def tree_numbers(self, own: tuple[TreeArrays, Numbers], q: Numbers) -> TreeArrays:
-        """The tree's numbers for the parameters and the bodies; see `given_numbers`."""
-        assert self.tree is not None  # FrameAnswers has seen to it
+        """Return the tree's numbers for the parameters and the bodies; see `given_numbers`."""
+        assert self.tree is not None  # `frames` has checked it
         return given_numbers(self.xp, self.tree, own, self._values(q), self._bodies(q), tuple(q.shape[:-1]))
 
     def _values(self, q: Numbers) -> Mapping[str, Numbers]:
-        """Values of the run-time parameters, to compute with `q`."""
+        """Return the values of the run-time parameters, to compute with `q`."""
         raise NotImplementedError
 
     def _bodies(self, q: Numbers) -> Bodies[Numbers] | None:
-        """Bodies in place of the tree's, to compute with `q`; None for its own."""
+        """Return the bodies in place of the tree's, to compute with `q`; None for its own."""
         raise NotImplementedError

@@ -1,10 +1,10 @@
-"""Which of its two kernels a back end of arrays takes: closed forms, straight on, or the vectorised rule.
+"""Choice between the two kernels of a back end of arrays: straight closed forms, or the vectorised rule.
 
-Closed forms do the fewest additions and multiplications, one array operation each: thousands, whose calls
-cost more than their work unless the batch is large. The rule does more in a hundred or so, with few samples
-in spatial matrices, with many of them innermost. Which is quicker hangs on the operations of the closed forms
-and on the batch; `tests/benchmarks/kernel_crossing.py` measures it and prints the tables that the back ends
-keep.
+Closed forms need the fewest additions and multiplications, one array operation each: thousands, whose calls
+cost more than their work unless the batch is large. The rule needs more of them in a hundred or so array
+operations, on spatial matrices for few samples, and with samples innermost for many. Which one is faster
+depends on the operations of the closed forms and on the batch; `tests/benchmarks/kernel_crossing.py` measures
+it and prints the tables that the back ends keep.
 """
 
 import math
@@ -14,23 +14,24 @@ from typing import NamedTuple
 from ..interface import ClosedForms
 
 Rows = tuple[tuple[int, int], ...]
-"""(size of a robot, largest batch in which something is quicker), by rising sizes."""
+"""(size of a robot, largest batch for which something is faster), by rising sizes."""
 
 
 def largest_batch(rows: Rows, size: int) -> int:
-    """The largest batch for a robot of a size: that of the last row not above it; 0 below the first."""
+    """Return the largest batch for a robot of a size, from the last row not above it; 0 below the first."""
     return next((most for least, most in reversed(rows) if least <= size), 0)
 
 
 class Crossing(NamedTuple):
-    """Where the rule is quicker than closed forms; robots are measured by the operations of these."""
+    """Range in which the rule is faster than closed forms, by the number of operations of these."""
 
     alone: int
-    """From so many on, for one sample of shape (n,): then they are operations on numbers, not arrays."""
+    """Number of operations from which on the rule is faster for one sample of shape (n,): closed forms then
+    compute with numbers, not arrays."""
     batches: Rows
 
     def rule_is_quicker(self, operations: int, batch: tuple[int, ...]) -> bool:
-        """Whether it is for closed forms of so many operations and samples of shape `batch`."""
+        """Return whether the rule is faster for so many operations and samples of shape `batch`."""
         if not batch:
             return operations >= self.alone
         return math.prod(batch) <= largest_batch(self.batches, operations)
@@ -40,7 +41,7 @@ KERNELS = ("auto", "straight", "rule")
 
 
 def known_kernel(kernel: str, straight: bool, rule: bool, bodies: bool) -> str:
-    """The kernel to take, auto where both remain; raises ValueError for one that cannot be.
+    """Return the kernel to use, auto where both remain; raise ValueError for one that cannot be used.
 
     straight, rule: whether the package has closed forms and the rule; bodies: whether bodies are given
     """
@@ -79,6 +80,6 @@ def refuse_learning(backend: str, requires_grad: object) -> None:
 
 
 def operations(links: Sequence[ClosedForms]) -> Mapping[str, int]:
-    """Operations of each call of the closed forms."""
+    """Return the number of operations of each call of the closed forms."""
     calls = ("decomposition", "torque", "position_gradient")
     return {call: sum(link.OPERATIONS[call] for link in links) for call in calls}

@@ -34,13 +34,16 @@ CROSSINGS = {
     "torque": Crossing(618, ((618, 32), (1441, 64), (1985, 128), (21901, 256))),
     "position_gradient": Crossing(1217, ((1217, 32), (2044, 64), (4990, 128), (29453, 512))),
 }
-"""Where the rule is quicker, see `array_kernels`."""
+"""Limits up to which the rule is faster, see `array_kernels`."""
 MATRICES = 128
-"""Links times samples up to which the rule is quicker in spatial matrices than with its samples innermost."""
+"""Links times samples up to which the rule is faster in spatial matrices than with samples innermost."""
 
 
 class NumpyBackend(ArrayBackend):
-    """Answers with NumPy arrays of the caller's dtype; parameters may be arrays (...): one value a sample."""
+    """Back end that answers with NumPy arrays of the caller's dtype.
+
+    Parameters may be arrays (...), with one value for each sample.
+    """
 
     name: ClassVar = "numpy"
     takes_tensors: ClassVar = False
@@ -57,7 +60,7 @@ class NumpyBackend(ArrayBackend):
         kernel: str = "auto",
         bodies: object = None,
     ) -> None:
-        """Raises ValueError for a kernel that cannot be and for bodies of a wrong shape."""
+        """Set up the back end; raise ValueError for an impossible kernel and for bodies of a wrong shape."""
         super().__init__(structure, links, rule, kernel, bodies)
         self._numbers = {k: as_array(f"parameter {k!r}", v).astype(float) for k, v in parameters.items()}
         self.parameters = self._numbers
@@ -70,7 +73,7 @@ class NumpyBackend(ArrayBackend):
     def arrays(
         self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
     ) -> Sequence[Numbers]:
-        """Motion (..., n), then what is beside it, checked and of one shape of samples."""
+        """Return the motion (..., n), then what is beside it, checked and in one shape of samples."""
         motion = [*named.values()]
         first = motion[0]
         if type(first) is np.ndarray and first.dtype in FLOATS and first.shape[-1:] == (n,):
@@ -97,7 +100,7 @@ class NumpyBackend(ArrayBackend):
             batch = np.broadcast_shapes(*batches)
         except ValueError:
             raise no_common_shape(arrays, n, beside) from None
-        except RuntimeError:  # of more than 32 axes
+        except RuntimeError:  # more axes than NumPy has
             raise too_many_axes(arrays, n) from None
         return [
             a if own == batch else np.broadcast_to(a, (*batch, *a.shape[len(own) :]))
@@ -105,7 +108,7 @@ class NumpyBackend(ArrayBackend):
         ]
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
+        """Return c2, c1, g, tau and h1, each (..., count) in the order of `Layout`."""
         p = self._values(q)
         if rule := self._rule("decomposition", q):
             return [*rule.decomposition(self, (q, qd, qdd), p, self._bodies(q)), self.zeros(q, 0)]
@@ -117,17 +120,17 @@ class NumpyBackend(ArrayBackend):
         return [columns.array() for columns in packed]
 
     def torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
-        """tau (..., count) in the order of `Layout.torque`."""
+        """Return tau (..., count), in the order of `Layout.torque`."""
         p = self._values(q)
         if rule := self._rule("torque", q):
             return rule.torque(self, (q, qd, qdd), p, self._bodies(q))
         columns = _Columns(q, self.structure.sizes.tau)
-        for link in self.links:  # whose values lend their memory to the next one's
+        for link in self.links:  # the memory of one link's values is used for the next's
             columns.fill(link.torque(np, q, qd, qdd, p))
         return columns.array()
 
     def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
-        """c0 (..., count) in the order of `Layout.velocity`."""
+        """Return c0 (..., count), in the order of `Layout.velocity`."""
         p = self._values(q)
         if rule := self._rule("position_gradient", q):
             return rule.position_gradient(self, (q, qd, qdd), p, self._bodies(q))
@@ -137,7 +140,7 @@ class NumpyBackend(ArrayBackend):
         return columns.array()
 
     def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
-        """Kinetic and potential energies of the links in J, (..., N) each."""
+        """Return the kinetic and potential energies of the links in J, (..., N) each."""
         p = self._values(q)
         if self.rule:
             return self.rule.energies(self, (q, qd), p, self._bodies(q))
@@ -148,45 +151,45 @@ class NumpyBackend(ArrayBackend):
         return both[..., 0::2], both[..., 1::2]
 
     def regressor(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
-        """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
-        assert self.rule is not None  # Answers has seen to it
+        """Return the rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
+        assert self.rule is not None  # Answers has checked it
         return self.rule.regressor(self, (q, qd, qdd), self._values(q))
 
     def coefficient_regressors(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
-        assert self.rule is not None  # Answers has seen to it
+        """Return the rows of 10 of c2, c1 and g in the order of `Layout`, flat: (..., 10 count) each."""
+        assert self.rule is not None  # Answers has checked it
         return self.rule.coefficient_regressors(self, (q, qd, qdd), self._values(q))
 
     def constant(self, values: ArrayLike, like: Numbers) -> Numbers:
-        """A table of numbers, to compute with `like`."""
+        """Return a table of numbers, to compute with `like`."""
         return np.asarray(values, dtype=cast(Dtype, like.dtype))
 
     def index(self, values: ArrayLike, like: Numbers) -> Numbers:
-        """A table of positions, to take from `like`."""
+        """Return a table of positions, to index `like` with."""
         return np.asarray(values, dtype=np.intp)
 
     def weights(self, name: str, value: object, like: Numbers) -> Numbers:
-        """Real numbers in anything array-like, in the dtype of `like`; errors name the argument."""
+        """Return real numbers, from anything array-like, in the dtype of `like`; errors name the argument."""
         return as_array(name, as_weights(name, value)).astype(cast(Dtype, like.dtype))
 
     def zeros(self, like: Numbers, count: int) -> Numbers:
-        """Zeros of shape (..., count) for `like` of shape (..., m)."""
+        """Return zeros of shape (..., count) for `like` of shape (..., m)."""
         return np.zeros((*like.shape[:-1], count), cast(Dtype, like.dtype))
 
     def concatenate(self, parts: Iterable[Numbers]) -> Numbers:
-        """The parts joined along the last axis."""
+        """Return the parts joined along the last axis."""
         return np.concatenate(cast("list[NDArray[np.floating]]", list(parts)), -1)
 
     def few(self, samples: int, links: int) -> bool:
-        """Whether spatial matrices are quicker for so many samples of a robot of so many links."""
+        """Return whether spatial matrices are faster for so many samples of a robot of so many links."""
         return samples * links <= MATRICES
 
     def chunk(self, motion: Sequence[Numbers], most: int) -> int | None:
-        """Samples to compute at once: as many as stay in the cache."""
+        """Return the number of samples to compute at once: as many as stay in the cache."""
         return most
 
     def _rule(self, call: str, q: Numbers) -> RigidRule | None:
-        """The rule where it is to be taken, None for closed forms."""
+        """Return the rule where it is to be used, None for closed forms."""
         if self.kernel == "auto":
             if q.ndim == 1:
                 return self._alone[call]
@@ -207,7 +210,7 @@ class NumpyBackend(ArrayBackend):
 
 
 class _Columns:
-    """An array (..., count) like q, filled from its first column on; of one sample made in the end."""
+    """An array (..., count) like q, filled from its first column on; for one sample it is made in the end."""
 
     def __init__(self, q: Numbers, count: int) -> None:
         self._dtype, self._next = cast(Dtype, q.dtype), 0

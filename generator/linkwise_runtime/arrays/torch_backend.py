@@ -39,13 +39,16 @@ CROSSINGS = {
     "torque": Crossing(618, ((618, 256), (1985, 512), (21901, 1024))),
     "position_gradient": Crossing(1217, ((1217, 128), (2044, 256), (4990, 512), (12905, 1024))),
 }
-"""Where the rule is quicker on a processor, see `array_kernels`; elsewhere it always is."""
+"""Limits up to which the rule is faster on a processor, see `array_kernels`; elsewhere it always is."""
 MATRICES = 128
-"""Links times samples up to which the rule is quicker in spatial matrices than with its samples innermost."""
+"""Links times samples up to which the rule is faster in spatial matrices than with samples innermost."""
 
 
 class TorchBackend(ArrayBackend):
-    """Answers with tensors of the caller's dtype and device; gradients flow through motion and parameters."""
+    """Back end that answers with tensors of the caller's dtype and device.
+
+    Gradients flow through motion and parameters.
+    """
 
     name: ClassVar = "torch"
     takes_tensors: ClassVar = True
@@ -54,7 +57,7 @@ class TorchBackend(ArrayBackend):
     )
     xp: ClassVar[Namespace] = cast(Namespace, torch)
     traced: ClassVar[bool] = True
-    """Whether torch.jit.trace sees all operations."""
+    """True if torch.jit.trace sees all operations."""
     parameters: Mapping[str, Tensor]
 
     def __init__(
@@ -67,13 +70,13 @@ class TorchBackend(ArrayBackend):
         bodies: object = None,
         tree: JointTree | None = None,
     ) -> None:
-        """Raises ValueError for a kernel that cannot be and for bodies of a wrong shape."""
+        """Set up the back end; raise ValueError for an impossible kernel and for bodies of a wrong shape."""
         super().__init__(structure, links, rule, kernel, bodies, _tensor, tree)
         self.parameters = {
             k: v if torch.is_tensor(v) else torch.as_tensor(v, dtype=torch.float64)
             for k, v in parameters.items()
         }
-        # What torch.compile would trace otherwise: how numbers are summed up, and how tables are made.
+        # Otherwise torch.compile would trace how numbers are summed up, and how tables are made.
         _ = structure.passive_sums, self.answers
         if self.rule and self.kernel != "straight":
             for like in self.examples:
@@ -82,7 +85,7 @@ class TorchBackend(ArrayBackend):
     def arrays(
         self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
     ) -> Sequence[Numbers]:
-        """Motion (..., n), then what is beside it, checked and of one shape of samples."""
+        """Return the motion (..., n), then what is beside it, checked and in one shape of samples."""
         self.check_untraced()
         given = as_given(named, beside)
         check_dense(given)
@@ -105,27 +108,27 @@ class TorchBackend(ArrayBackend):
         ]
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
+        """Return c2, c1, g, tau and h1, each (..., count) in the order of `Layout`."""
         p = self._values(q)
         if rule := self._rule("decomposition", q):
             return [*rule.decomposition(self, (q, qd, qdd), p, self._bodies(q)), self.zeros(q, 0)]
         groups: list[list[Numbers]] = [[] for _ in self.structure.sizes]
         for link in self.links:
-            # Link by link, so that one link's values lend their memory to the next one's. A link without
+            # Link by link, so that the memory of one link's values is used for the next's. A link without
             # energy terms linear in the velocities has no h1.
             for group, entries in zip(groups, link.decomposition(torch, q, qd, qdd, p), strict=False):
                 group.append(_stacked(q, entries))
         return [self.concatenate(group) if group else self.zeros(q, 0) for group in groups]
 
     def torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
-        """tau (..., count) in the order of `Layout.torque`."""
+        """Return tau (..., count), in the order of `Layout.torque`."""
         p = self._values(q)
         if rule := self._rule("torque", q):
             return rule.torque(self, (q, qd, qdd), p, self._bodies(q))
         return self.concatenate(_stacked(q, link.torque(torch, q, qd, qdd, p)) for link in self.links)
 
     def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
-        """c0 (..., count) in the order of `Layout.velocity`."""
+        """Return c0 (..., count), in the order of `Layout.velocity`."""
         p = self._values(q)
         if rule := self._rule("position_gradient", q):
             return rule.position_gradient(self, (q, qd, qdd), p, self._bodies(q))
@@ -134,7 +137,7 @@ class TorchBackend(ArrayBackend):
         )
 
     def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
-        """Kinetic and potential energies of the links in J, (..., N) each."""
+        """Return the kinetic and potential energies of the links in J, (..., N) each."""
         p = self._values(q)
         if self.rule:
             return self.rule.energies(self, (q, qd), p, self._bodies(q))
@@ -143,13 +146,13 @@ class TorchBackend(ArrayBackend):
         return both[..., 0::2], both[..., 1::2]
 
     def regressor(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
-        """Rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
-        assert self.rule is not None  # Answers has seen to it
+        """Return the rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""
+        assert self.rule is not None  # Answers has checked it
         return self.rule.regressor(self, (q, qd, qdd), self._values(q))
 
     def coefficient_regressors(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """Rows of 10 of c2, c1, g in the order of `Layout`, flat: (..., 10 count) each."""
-        assert self.rule is not None  # Answers has seen to it
+        """Return the rows of 10 of c2, c1 and g in the order of `Layout`, flat: (..., 10 count) each."""
+        assert self.rule is not None  # Answers has checked it
         return self.rule.coefficient_regressors(self, (q, qd, qdd), self._values(q))
 
     def check_untraced(self) -> None:
@@ -161,20 +164,23 @@ class TorchBackend(ArrayBackend):
             )
 
     def module(self, robot: object, call: str, fixed: Mapping[str, object]) -> CallModule:
-        """One call of a robot on this back end as a torch module."""
+        """Return one call of a robot on this back end as a torch module."""
         return CallModule(cast(ReloadableRobot, robot), call, fixed)
 
     def constant(self, values: ArrayLike, like: Numbers) -> Numbers:
-        """A table of numbers, to compute with `like`."""
+        """Return a table of numbers, to compute with `like`."""
         tensor = cast(Tensor, like)
         return _kept(values, tensor.dtype, tensor.device)
 
     def index(self, values: ArrayLike, like: Numbers) -> Numbers:
-        """A table of positions, to take from `like`."""
+        """Return a table of positions, to index `like` with."""
         return _kept(values, torch.long, cast(Tensor, like).device)
 
     def weights(self, name: str, value: object, like: Numbers) -> Numbers:
-        """Real numbers in anything array-like, as `like` in dtype and device; errors name the argument."""
+        """Return real numbers, from anything array-like, with the dtype and device of `like`.
+
+        Errors name the argument.
+        """
         if not torch.compiler.is_dynamo_compiling():  # which knows no dtypes of arrays
             value = as_weights(name, value)
             value = value if torch.is_tensor(value) else np.array(value, dtype=float)
@@ -182,33 +188,36 @@ class TorchBackend(ArrayBackend):
         return torch.as_tensor(value, dtype=tensor.dtype, device=tensor.device)
 
     def zeros(self, like: Numbers, count: int) -> Numbers:
-        """Zeros of shape (..., count) for `like` of shape (..., m)."""
+        """Return zeros of shape (..., count) for `like` of shape (..., m)."""
         return cast(Tensor, like).new_zeros((*like.shape[:-1], count))
 
     def concatenate(self, parts: Iterable[Numbers]) -> Numbers:
-        """The parts joined along the last axis."""
+        """Return the parts joined along the last axis."""
         return torch.cat(cast("list[Tensor]", list(parts)), -1)
 
     @property
     def fuses(self) -> bool:
-        """Whether a compiler makes one loop of many operations, to which a matrix product is a wall."""
+        """True if a compiler makes one loop of many operations, which a matrix product would split."""
         return torch.compiler.is_dynamo_compiling()
 
     def few(self, samples: int, links: int) -> bool:
-        """Whether spatial matrices are quicker for so many samples of a robot of so many links."""
+        """Return whether spatial matrices are faster for so many samples of a robot of so many links."""
         return not _watched() and samples * links <= MATRICES
 
     def chunk(self, motion: Sequence[Numbers], most: int) -> int | None:
-        """Samples to compute at once: all, but on a CPU, with nothing recorded, what stays in its cache."""
+        """Return the number of samples to compute at once; None for all.
+
+        On a CPU, with nothing recorded, these are as many as stay in its cache.
+        """
         tensors = cast("Sequence[Tensor]", motion)
         given = (*tensors, *self.parameters.values(), *filter(torch.is_tensor, self.bodies or ()))
         if _watched() or tensors[0].device.type != "cpu":
             return None
-        # An operation of torch costs some four times what one of NumPy costs: it has to do so much more.
+        # An operation of torch costs some four times what one of NumPy costs, so each has to do more.
         return None if torch.is_grad_enabled() and any(t.requires_grad for t in given) else 4 * most
 
     def _rule(self, call: str, q: Numbers) -> RigidRule | None:
-        """The rule where it is to be taken, None for closed forms."""
+        """Return the rule where it is to be used, None for closed forms."""
         if self.kernel == "auto" and not _watched() and cast(Tensor, q).device.type == "cpu":
             quicker = CROSSINGS[call].rule_is_quicker(self.operations[call], tuple(q.shape[:-1]))
             return self.rule if quicker else None
@@ -228,18 +237,18 @@ class TorchBackend(ArrayBackend):
 
 
 def _kept(values: ArrayLike, dtype: torch.dtype, device: torch.device) -> Tensor:
-    """A tensor that is kept: a later call may need its gradient, or not be one that torch.export traces."""
+    """Return a tensor that is kept: later calls may need its gradient, or not be traced by torch.export."""
     if torch.compiler.is_dynamo_compiling():
         return torch.as_tensor(values, dtype=dtype, device=device)
     with torch.inference_mode(False), disable_proxy_modes_tracing(), unset_fake_temporarily(), _unrecorded():
-        # In memory of its own, and side by side: torch.export.save warns of anything else.
+        # In memory of its own, and contiguous: torch.export.save warns of anything else.
         kept = torch.as_tensor(values, dtype=dtype, device=device)
         return kept.clone(memory_format=torch.contiguous_format)
 
 
 @contextmanager
 def _unrecorded() -> Iterator[None]:
-    """Let torch.jit.trace not see what is made: it makes a graph twice, and wants the same."""
+    """Hide from torch.jit.trace what is made inside: it makes a graph twice, and expects the same."""
     tracing: Any = torch._C
     state = tracing._get_tracing_state()
     tracing._set_tracing_state(None)
@@ -250,17 +259,17 @@ def _unrecorded() -> Iterator[None]:
 
 
 def _watched() -> bool:
-    """Whether a compiler or a transformation records operations: it hides how many samples there are."""
+    """Return whether a compiler or a transformation records operations, which hides the number of samples."""
     return torch.compiler.is_compiling() or torch._C._are_functorch_transforms_active()
 
 
 def _tensor(name: str, value: object) -> Numbers:
-    """A tensor as it is, anything else that reads as an array."""
+    """Return a tensor as it is, anything else that reads as an array as an array."""
     return value if torch.is_tensor(value) else as_array(name, value)
 
 
 def _tensors(named: Mapping[str, object]) -> dict[str, Tensor]:
-    """Numbers of any kind as tensors of one dtype; arrays are copied, as a gradient may need them later."""
+    """Return numbers of any kind as tensors of one dtype; arrays are copied: a gradient may need them."""
     own = {k: value for k, value in named.items() if isinstance(value, Tensor)}
     device = next(iter(own.values())).device if own else torch.device("cpu")
     if own and torch.compiler.is_dynamo_compiling():  # which knows no dtypes of arrays
@@ -278,7 +287,10 @@ def _tensors(named: Mapping[str, object]) -> dict[str, Tensor]:
 
 
 def _stacked(q: Numbers, entries: Entries) -> Numbers:
-    """Entries, numbers or tensors that broadcast to the batch of q (..., n), as one tensor (..., count)."""
+    """Return entries as one tensor (..., count).
+
+    entries: numbers, or tensors that broadcast to the batch of q (..., n)
+    """
     dtype, shape, like = cast(Tensor, q).dtype, q.shape[:-1], cast(Tensor, q)[..., 0]
     columns = [v.to(dtype).expand(shape) if torch.is_tensor(v) else torch.full_like(like, v) for v in entries]
     return torch.stack(columns, -1)

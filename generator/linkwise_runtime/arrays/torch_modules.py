@@ -1,4 +1,4 @@
-"""Torch modules of a robot: what owns its run-time parameters and bodies, and one call to be exported."""
+"""Torch modules of a robot: holders of its run-time parameters and bodies, and one call to be exported."""
 
 import contextlib
 import inspect
@@ -19,13 +19,13 @@ MOTION = {"q", "qd", "qdd", "tau"}
 
 
 class ReloadableRobot(Protocol):
-    """A robot that can be loaded once more."""
+    """A robot that can be loaded again."""
 
     backend: ArrayBackend
 
     @property
     def name(self) -> str:
-        """That of its package."""
+        """Name of its package."""
 
     @property
     def n(self) -> int:
@@ -38,7 +38,7 @@ class ReloadableRobot(Protocol):
 
 
 class RunTimeValues(torch.nn.Module):
-    """Run-time parameters by name, which links that share one ask for its tensor.
+    """Run-time parameters by name: links that share a parameter get the same tensor.
 
     They are buffers, but nn.Parameters where they are given as such or `learned`.
     """
@@ -67,20 +67,20 @@ class RunTimeValues(torch.nn.Module):
         return {name: self[name] for name in self._keys}
 
     def keys(self) -> KeysView[str]:
-        """Names."""
+        """Return the names."""
         return self._keys.keys()
 
     def values(self) -> ValuesView[Tensor]:
-        """Tensors."""
+        """Return the tensors."""
         return self._as_dict().values()
 
     def items(self) -> ItemsView[str, Tensor]:
-        """Names and tensors."""
+        """Return the names and tensors."""
         return self._as_dict().items()
 
 
 class BodyTensors(torch.nn.Module):
-    """The tensors of `Bodies`, in the same order."""
+    """Tensors of `Bodies`, in the same order."""
 
     def __init__(self, bodies: Bodies[Numbers]) -> None:
         super().__init__()
@@ -93,16 +93,20 @@ class BodyTensors(torch.nn.Module):
 
 
 class CallModule(torch.nn.Module):
-    """module(q, ...) answers as the call does; where that has several results, with a dict of them by name.
+    """Module that answers as one call of a robot does, with a dict by name where that has several results.
 
-    forward takes what the call takes, under the same names, but for what is `fixed`, and out. The robot is
-    one of its own: its run-time parameters are `values`, and bodies that were given to `load` are `bodies`,
-    nn.Parameters where they were given as such, buffers otherwise. A robot that is itself a module is shared,
-    as `robot`.
+    forward accepts the arguments of the call, under the same names, but for those that are `fixed`, and out.
+    The module has a robot of its own: its run-time parameters are `values`, and bodies that were given to
+    `load` are `bodies`, nn.Parameters where they were given as such, buffers otherwise. A robot that is
+    itself a module is shared, as `robot`.
     """
 
     def __init__(self, robot: ReloadableRobot, call: str, fixed: Mapping[str, object]) -> None:
-        """Raises ValueError for a call that the robot does not have, and for what the call does not take."""
+        """Set up the module.
+
+        Raises ValueError for a call that the robot does not have, and for an argument that the call does not
+        have.
+        """
         super().__init__()
         self.call, self.fixed = call, dict(fixed)
         self._left = _left_open(robot, call, fixed)
@@ -115,7 +119,7 @@ class CallModule(torch.nn.Module):
 
     @property
     def forward(self) -> Callable[..., object]:  # type: ignore[override]
-        """The call, with the signature in which exporters look for the names of what it takes."""
+        """The call, with the signature from which exporters read the names of its arguments."""
 
         def forward(*given: object, **named: object) -> object:
             bound = self._left.bind(*given, **named).arguments
@@ -126,24 +130,27 @@ class CallModule(torch.nn.Module):
         return forward
 
     def extra_repr(self) -> str:
-        """The call and what is left to give."""
+        """Return the call and the arguments that are left to give."""
         return f"{self.call}({', '.join(self._left.parameters)})"
 
     def __setstate__(self, state: dict[str, object]) -> None:
-        """Take over what the module held of which this is a copy."""
+        """Restore what was held by the module of which this is a copy."""
         super().__setstate__(state)  # type: ignore[no-untyped-call]
         self._lend()
 
     def _lend(self) -> None:
-        """Have the robot compute with the tensors held here."""
+        """Make the robot compute with the tensors held here."""
         if not isinstance(self.robot, torch.nn.Module):
-            # They are asked as mappings and tuples are, which modules cannot be.
+            # They are used as a mapping and a tuple, but modules cannot be subclasses of these.
             self.robot.backend.parameters = cast("Mapping[str, Tensor]", self.values)
             self.robot.backend.bodies = cast("Bodies[Tensor] | None", self.bodies)
         self._make_tables()
 
     def _make_tables(self) -> None:
-        """Call with no samples: torch.compile cannot trace what a first call makes, and finds it made."""
+        """Call with no samples, so that tables are made.
+
+        torch.compile cannot trace how a first call makes them, and then finds them made.
+        """
         needed = [name for name, p in self._left.parameters.items() if p.default is p.empty or name == "tau"]
         if MOTION.issuperset(needed):
             for dtype in (torch.float32, torch.float64):
@@ -152,7 +159,7 @@ class CallModule(torch.nn.Module):
 
 
 def hold(module: torch.nn.Module, key: str, value: object, learned: bool) -> None:
-    """Register a number of the robot: as it is if it is a tensor, of float64 otherwise."""
+    """Register a number of the robot in a module: a tensor as it is, anything else as a tensor of float64."""
     tensor = value if torch.is_tensor(value) else torch.as_tensor(value, dtype=torch.float64)
     if learned and not isinstance(tensor, torch.nn.Parameter):
         real = tensor if tensor.is_floating_point() else tensor.double()
@@ -164,7 +171,7 @@ def hold(module: torch.nn.Module, key: str, value: object, learned: bool) -> Non
 
 
 def attribute_names(names: Iterable[str], module: torch.nn.Module) -> list[str]:
-    """Names as keys of a state_dict: without dots, and none that the module has for something else."""
+    """Return names as keys of a state_dict: without dots, and none that the module has already."""
     found: list[str] = []
     for name in names:
         key = name.replace(".", "_") or "_"
@@ -175,7 +182,11 @@ def attribute_names(names: Iterable[str], module: torch.nn.Module) -> list[str]:
 
 
 def _left_open(robot: ReloadableRobot, call: str, fixed: Mapping[str, object]) -> inspect.Signature:
-    """Signature of a call without what is fixed, and without out."""
+    """Return the signature of a call without what is fixed, and without out.
+
+    Raises ValueError for a call that the robot does not have, and for an argument that the call does not
+    have.
+    """
     taken: Mapping[str, inspect.Parameter] = {}
     with contextlib.suppress(AttributeError, TypeError):
         taken = inspect.signature(attrgetter(call)(robot)).parameters

@@ -1,1 +1,1 @@
-"""What ties, couplings and contacts leave of a robot's motion, on the arrays of the rule."""
+"""Ties, couplings and contacts of a robot and its motion under them, on the arrays of the rule."""

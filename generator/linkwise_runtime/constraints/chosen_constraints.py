@@ -1,4 +1,4 @@
-"""Which constraints a robot has, and which of its joints are independent: chosen once, where loops close."""
+"""Choice of a robot's constraints and independent joints, made once at a position where the loops close."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -16,12 +16,12 @@ from .independent_joints import chosen_independent, loose_base, rank_of, redunda
 
 
 class ChosenConstraints:
-    """Ties, couplings and contacts, and the independent joints."""
+    """Ties, couplings and contacts of a robot, and its independent joints."""
 
     def __init__(
         self, structure: Structure, tree: JointTree, independent: object, contacts: object, at: object
     ) -> None:
-        """Raises as `Dynamics.constrained` does."""
+        """Choose constraints and independent joints; raises as `Dynamics.constrained` does."""
         self._structure, self._tree = structure, tree
         self.held: Sequence[Held] = held_by(tree, contacts)
         if not self.held and not tree.couplings:
@@ -32,14 +32,14 @@ class ChosenConstraints:
         self.tables = tie_tables(tree, structure.n, self.held)
         self.names = all_names(self.held, tree)
         self.couplings = len(tree.couplings)
-        """Whose rows are the last ones."""
+        """Number of couplings, whose rows are the last ones."""
         self.rows = (
             *(row for one in self.held for row in one.row_names),
             *(coupling.name for coupling in tree.couplings),
         )
         self.row_units = (
             *(unit for one in self.held for unit in one.row_units),
-            *("" for _ in tree.couplings),  # whose numbers make the unit of their sum
+            *("" for _ in tree.couplings),  # whose coefficients set the unit of their sum
         )
         self.row_names = tuple(
             [one.name for one in self.held for _ in one.row_names] + [c.name for c in tree.couplings]
@@ -50,12 +50,12 @@ class ChosenConstraints:
 
     @cached_property
     def redundant(self) -> tuple[str, ...]:
-        """Names of those among whose rows some follow from others."""
+        """Names of the constraints some of whose rows follow from other rows."""
         return redundant_names(self._matrix, self.row_names)
 
     @cached_property
     def closed_position(self) -> NDArray[np.float64]:
-        """Where ties close, (n,): the tree's own position, or that where other joints were chosen."""
+        """Position (n,) where ties close: the tree's own, or the one at which other joints were chosen."""
         if self._is_own and self._at is None:
             return np.array(self._tree.closed_position)
         return self._closing.q
@@ -66,7 +66,7 @@ class ChosenConstraints:
 
     @cached_property
     def _closing(self) -> Closing:
-        """Where loops close beside `at`, or anywhere, and A there, of the tree's own numbers."""
+        """Position near `at`, or any without it, where loops close, with A, at the tree's own numbers."""
         tree, n = self._tree, self._structure.n
         starts = random_starts(n) if self._at is None else [self._at]
         q = starts[0]
@@ -86,7 +86,7 @@ class ChosenConstraints:
         free = n - rank_of(self._matrix)
         if not free:
             raise ValueError(f"{listed(self.names)} leave nothing to move: the robot is over-constrained")
-        # What follows by the ties goes on to do so where contacts hold besides.
+        # Joints that follow by the ties alone stay dependent when contacts are added.
         following = [k for k in range(n) if self._tree.independent and k not in self._tree.independent]
         first = (*loose_base(self._tree), *following) if has_contacts else following
         proposed = chosen_independent(self._matrix, tuple(dict.fromkeys(first)))

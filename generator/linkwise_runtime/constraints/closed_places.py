@@ -1,12 +1,11 @@
-"""Positions in which ties close, and how all joints move there when the independent ones do.
+"""Positions in which ties close, and the motion there of all joints with the independent ones.
 
 Dependent joints d follow the independent ones y where A qd = 0, for matrices (..., C, n):
 
     A_d = Q R    A_d^+ = R^-1 Q^T    G_d = -A_d^+ A_y    lambda = A_d^+T tau_d
 
-A_d is tall and of full column rank, so that rows that say the same twice need no case of their own:
-A_d^+ is its pseudoinverse, and lambda the least that does tau_d = A_d^T lambda. Rows are measured as
-`row_sizes` has them.
+A_d is tall and of full column rank, so that redundant rows need no case of their own: A_d^+ is its
+pseudoinverse, and lambda the smallest solution of tau_d = A_d^T lambda. Rows are scaled as `row_sizes` says.
 """
 
 from collections.abc import Sequence
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Followers(NamedTuple):
-    """The answers at one position, or at many."""
+    """Map from the independent joints to all joints, at one position or at many."""
 
     columns: JointColumns
     inverse: Numbers
@@ -37,76 +36,76 @@ class Followers(NamedTuple):
 
 
 class RowNames(NamedTuple):
-    """What errors name."""
+    """Names that error messages use."""
 
     rows: Sequence[str]
-    """Of each row, what it holds."""
+    """Name of each row, which says what it holds."""
     owners: Sequence[str]
-    """Of each row, the tie, coupling or contact; rows of one stand beside each other."""
+    """Name of the tie, coupling or contact that each row belongs to; rows of one are adjacent."""
     joints: Sequence[str]
 
 
 class TiesAt(NamedTuple):
-    """Ties at positions, one or many, whether they close there or not; rows are measured by their sizes."""
+    """Ties at one position or many, whether they close there or not; rows are divided by their sizes."""
 
     q: Numbers
-    """(..., n)"""
+    """Positions of all joints, (..., n)."""
     made: RowsAt
     sizes: Numbers | None
-    """What rows are measured by, (..., C); None without couplings."""
+    """Sizes that rows are divided by, (..., C); None without couplings."""
     violation: Numbers
-    """phi, (..., C)."""
+    """Violation phi of the rows, (..., C)."""
     rows: Numbers
     """A, (..., C, n)."""
     factors: tuple[Numbers, Numbers]
-    """Q and R of A_d."""
+    """Factors Q and R of A_d."""
     inverse: Numbers | None = None
-    """A_d^+, None before it is known to be one."""
+    """A_d^+; None before A_d is known to have full rank."""
 
     @property
     def closable(self) -> Numbers:
-        """What of phi dependent joints could close."""
+        """Part of phi that dependent joints could close, (..., C)."""
         return closable(self.factors, self.violation)
 
 
 class ClosedPlace(NamedTuple):
-    """How joints follow at positions, one or many."""
+    """Closed positions, one or many, and how joints follow there."""
 
     q: Numbers
-    """(..., n)"""
+    """Positions of all joints, (..., n)."""
     found: Followers
     made: RowsAt
     rows: Numbers
-    """A, measured, (..., C, n)."""
+    """A, with its rows divided by their sizes, (..., C, n)."""
     triangle: Numbers
-    """R of its A_d."""
+    """Factor R of A_d, from these rows."""
 
     def velocity(self, yd: Numbers) -> Numbers:
-        """G yd."""
+        """Return the velocities G yd of all joints, (..., n)."""
         return times(self.found.map, yd)
 
     def bias(self, qd: Numbers) -> Numbers:
-        """What all joints accelerate by through their velocities alone, -A_d^+ dA/dt qd."""
+        """Return the accelerations of all joints by velocities alone, -A_d^+ dA/dt qd, (..., n)."""
         return self._shares(self.made.rates(qd) @ qd[..., None])[..., 0]
 
     def bias_by_cause(self, qd: Numbers) -> Numbers:
-        """The same, joint s by joint s in the last axis."""
+        """Return `bias` by cause, (..., n, n): the last axis is the joint s whose velocity causes it."""
         return self._shares(self.made.rates(qd) * qd[..., None, :])
 
     def map_rate(self, qd: Numbers) -> Numbers:
-        """dG/dt = -A_d^+ dA/dt G on the dependent joints."""
+        """Return dG/dt (..., n, m), -A_d^+ dA/dt G on the dependent joints."""
         return self._shares(self.made.rates(qd) @ self.found.map)
 
     def _shares(self, changes: Numbers) -> Numbers:
         return dependent_shares(self.found.columns, self.found.inverse, changes)
 
     def own(self, motion: Numbers) -> Numbers:
-        """The independent joints' of (..., n)."""
+        """Return the independent joints' entries (..., m) of motion (..., n)."""
         return taken(motion, self.found.columns.independent, -1)
 
 
 def ties_at(ties: TieRows, columns: JointColumns, q: Numbers, held_at: Numbers | None = None) -> TiesAt:
-    """Ties at q (..., n); contacts as they are, or from where they took hold."""
+    """Return the ties at q (..., n), with contacts as they are there, or from where they took hold."""
     made = ties.at(q, held_at)
     positions = made.positions()
     sizes = None
@@ -118,11 +117,11 @@ def ties_at(ties: TieRows, columns: JointColumns, q: Numbers, held_at: Numbers |
 
 
 def followed(at: TiesAt, columns: JointColumns, names: RowNames) -> ClosedPlace:
-    """How joints follow where ties close; raises ValueError where they do not stay closed."""
+    """Return how joints follow where ties close; raises ValueError where they do not stay closed."""
     inverse = inverted(at.factors) if at.inverse is None else at.inverse
     mapped = velocity_map(at.rows, columns, inverse)
     check_following(at.rows, columns, mapped, names.owners, names.joints)
-    if at.sizes is not None:  # of rows as they are, whose rates and forces it answers to
+    if at.sizes is not None:  # rates and forces are those of rows that are not scaled
         inverse = inverse / at.sizes[..., None, :]
     return ClosedPlace(at.q, Followers(columns, inverse, mapped), at.made, at.rows, at.factors[1])
 
@@ -130,27 +129,27 @@ def followed(at: TiesAt, columns: JointColumns, names: RowNames) -> ClosedPlace:
 def closed_place(
     ties: TieRows, columns: JointColumns, q: Numbers, tolerance: float | None, names: RowNames
 ) -> ClosedPlace:
-    """How joints follow at q (..., n); raises ValueError where ties are open, or joints do not follow."""
+    """Return how joints follow at q (..., n); raises ValueError where ties are open or joints do not."""
     at = ties_at(ties, columns, q)
     check_closed(at.violation, tolerance, names.rows, names.owners)
     check_factors(at.rows, at.factors[1], columns, names.joints)
-    if tolerance is None:  # what joints could close is held more strictly than what nothing closes
+    if tolerance is None:  # stricter for what joints could close than for what nothing can
         check_closed(at.closable, closable_tolerance(q), names.rows, names.owners)
     return followed(at, columns, names)
 
 
 def factored(rows: Numbers, columns: JointColumns) -> tuple[Numbers, Numbers]:
-    """Q and R of A_d."""
+    """Return the factors Q and R of A_d, from rows A (..., C, n)."""
     q, r = namespace(rows).linalg.qr(taken(rows, columns.dependent, -1))
     return q, r
 
 
 def inverted(factors: tuple[Numbers, Numbers]) -> Numbers:
-    """A_d^+ of a regular R."""
+    """Return A_d^+ (..., d, C) from the factors of A_d, of which R is regular."""
     orthogonal, triangle = factors
     linalg, right = namespace(triangle).linalg, orthogonal.mT
     found: Numbers
-    if isinstance(triangle, np.ndarray):  # NumPy has no solver of triangles; pivoting leaves R as it is
+    if isinstance(triangle, np.ndarray):  # NumPy has no triangular solver; pivoting leaves R as it is
         found = linalg.solve(triangle, right)
     else:
         found = linalg.solve_triangular(triangle, right, upper=True)
@@ -158,17 +157,17 @@ def inverted(factors: tuple[Numbers, Numbers]) -> Numbers:
 
 
 def velocity_map(rows: Numbers, columns: JointColumns, inverse: Numbers) -> Numbers:
-    """G, (..., n, m)."""
+    """Return the velocity map G (..., n, m)."""
     xp = namespace(rows)
     moved = -inverse @ taken(rows, columns.independent, -1)
     m = len(columns.independent)
-    # Zeros of the motion's own make a unit matrix of its kind, in which a gradient may run.
+    # Zeros made from the motion give a unit matrix of its kind, through which gradients can flow.
     unit = xp.zeros_like(moved[..., :1, :]) + xp.eye(m, **_kind(rows))
     return taken(xp.concat([unit, moved], -2), columns.order, -2)
 
 
 def dependent_shares(columns: JointColumns, inverse: Numbers, changes: Numbers) -> Numbers:
-    """-A_d^+ of columns (..., C, X) on the dependent joints, zero on the independent ones, (..., n, X)."""
+    """Return -A_d^+ times columns (..., C, X) on dependent joints, zero on independent ones, (..., n, X)."""
     xp, m = namespace(changes), len(columns.independent)
     moved = -inverse @ changes
     still = xp.zeros_like(moved[..., :1, :]) + xp.zeros((m, 1), **_kind(moved))
@@ -176,27 +175,27 @@ def dependent_shares(columns: JointColumns, inverse: Numbers, changes: Numbers) 
 
 
 def closable(factors: tuple[Numbers, Numbers], violation: Numbers) -> Numbers:
-    """The part of phi (..., C) that dependent joints could close, Q Q^T phi."""
+    """Return the part of phi (..., C) that dependent joints could close, Q Q^T phi."""
     return times(factors[0], times(factors[0].mT, violation))
 
 
 def borne(found: Followers, torque: Numbers) -> Numbers:
-    """lambda (..., C, X) of torques (..., n, X) that dependent joints need."""
+    """Return lambda (..., C, X) for torques (..., n, X), of which those of dependent joints count."""
     return found.inverse.mT @ taken(torque, found.columns.dependent, -2)
 
 
 def projected(found: Followers, torque: Numbers) -> Numbers:
-    """G^T of (..., n, X)."""
+    """Return G^T times torques (..., n, X), (..., m, X)."""
     return found.map.mT @ torque
 
 
 def times(matrix: Numbers, vector: Numbers) -> Numbers:
-    """Matrices (..., a, b) times vectors (..., b)."""
+    """Return matrices (..., a, b) times vectors (..., b)."""
     return (matrix @ vector[..., None])[..., 0]
 
 
 def _kind(like: Numbers) -> dict[str, object]:
-    """Where and of which kind numbers are made to go with others."""
+    """Return the dtype, and the device of a tensor, that new numbers need to go with others."""
     if isinstance(like, np.ndarray):
         return {"dtype": like.dtype}
     tensor = cast("Tensor", like)
@@ -217,12 +216,12 @@ def check_closed(
 
 
 def closable_tolerance(like: Numbers) -> float:
-    """How far joints may be from where they would close ties, in m and rad."""
+    """Return how far joints may be from where they would close ties, in m and rad."""
     return 1e-6 if like.dtype.itemsize == 8 else 1e-4
 
 
 def worst_open(violation: Numbers, tolerance: float | None) -> tuple[list[int], int, float] | None:
-    """The first sample where a row of phi (..., C) is open, which one most, by how much; None for none."""
+    """Return the first sample where phi (..., C) is open, its most open row, and by how much; or None."""
     if hidden(violation):
         return None
     size = np.abs(array_of(violation))
@@ -235,7 +234,7 @@ def worst_open(violation: Numbers, tolerance: float | None) -> tuple[list[int], 
 
 
 def open_by(size: float, row: str) -> str:
-    """How much a row is open, in its unit."""
+    """Return how far a row is open, in words with its unit."""
     if " force" in row:
         return f"{1e3 * size:.3g} mm"
     return f"{size:.3g} rad" if " moment" in row else f"{size:.3g} of its sum, in rad and m"

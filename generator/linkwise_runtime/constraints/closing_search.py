@@ -1,7 +1,7 @@
-"""Where loops of a robot close, at its own numbers, when no such position is known: on NumPy arrays.
+"""Search for positions where a robot's loops close, at its own numbers, when none is known: on NumPy arrays.
 
-Newton's method with least steps of all joints, q <- q - A^+ phi, from a few starts about q = 0, where itself
-loops are often stretched and A loses rank.
+Newton's method with least-norm steps of all joints, q <- q - A^+ phi, from a few starts around zero, but not
+from zero itself, where loops are often stretched and A loses rank.
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,48 +18,48 @@ from .independent_joints import RANK, rank_of
 from .tie_arrays import pairs, tie_jacobian, violation
 
 WIDTHS = (0.1, 0.3, 1.0, 2.0)
-"""How far around zero starts are, in rad and m."""
+"""Largest distance of starts from zero for each group of starts, in rad and m."""
 TRIES = 6
-"""Starts of each width."""
+"""Number of starts for each width."""
 ENOUGH = 4
-"""Closed positions to choose among: one of them may be singular."""
+"""Number of closed positions to choose among: one of them may be singular."""
 STEPS = 60
 LONGEST = 0.5
-"""Of a step, in rad and m."""
+"""Largest step of a joint, in rad and m."""
 SHORTEST = 1e-10
 OPEN = 1e-4
-"""In m and rad of the joints, what may be left open that nothing closes: files round their numbers."""
+"""Largest violation, in m and rad, that may stay where nothing closes it: files round their numbers."""
 Floats = NDArray[np.float64]
 
 
 class Closing(NamedTuple):
-    """Where the steps from a start ended."""
+    """End of the steps from one start."""
 
     q: Floats
     """(n,)"""
     left: Floats
-    """phi, (C,), measured as `row_sizes` has it."""
+    """phi, (C,), scaled as `row_sizes` says."""
     rows: Floats
-    """A, (C, n), measured likewise."""
+    """A, (C, n), scaled likewise."""
     slopes: Floats
-    """The largest of each coupling, as its file counts."""
+    """Largest slope of each coupling, in the units of its file."""
     comparable: Floats
-    """A without units, so that rows and columns may stand beside each other: metres, of ties and of slides,
-    in the robot's size, and couplings by their largest."""
+    """A without units, so that rows and columns can be compared: lengths, of ties and of sliding joints, are
+    in units of the robot's size, and couplings are divided by their largest entry."""
 
     @property
     def is_closed(self) -> bool:
-        """Whether nothing is left open."""
+        """True if no row is left open."""
         return self.open_by <= OPEN
 
     @property
     def open_by(self) -> float:
-        """What is left of the row that is open most."""
+        """Violation of the row that is open most."""
         return float(np.abs(self.left).max(initial=0.0))
 
 
 class TieEquations:
-    """phi(q) = 0 of what is held in a tree, its couplings too."""
+    """Equations phi(q) = 0 of what is held in a tree, its couplings included."""
 
     def __init__(self, tree: JointTree, n: int, held: Sequence[Held]) -> None:
         self._tables, self._numbers = tie_tables(tree, n, held), own_numbers(tree)
@@ -71,7 +71,7 @@ class TieEquations:
         self._slides = np.where(np.isin(np.arange(n), slides), size, 1.0)
 
     def at(self, q: Floats) -> Closing:
-        """phi, without what contacts have, and A at q (n,)."""
+        """Return phi, in which contacts have no violation, and A at q (n,)."""
         column = q[:, None]
         placed = pairs(NUMPY, self._tables, self._numbers, column)
         phi, rows = (
@@ -85,7 +85,7 @@ class TieEquations:
         return Closing(q, phi / sizes, rows / sizes[:, None], slopes, comparable)
 
     def closed_from(self, start: Floats) -> Closing:
-        """Where the steps from q (n,) end."""
+        """Return the end of the steps from q (n,)."""
         at = self.at(start)
         for _ in range(STEPS):
             step = np.linalg.lstsq(at.rows, -at.left, rcond=RANK)[0]
@@ -97,13 +97,16 @@ class TieEquations:
 
 
 def random_starts(n: int) -> list[Floats]:
-    """Positions (n,), the same at every call."""
+    """Return starting positions (n,), the same ones at every call."""
     random = np.random.default_rng(0)
     return [width * random.uniform(-1.0, 1.0, n) for width in WIDTHS for _ in range(TRIES)]
 
 
 def best_closing(equations: TieEquations, starts: Iterable[Floats]) -> tuple[Closing, tuple[Closing, ...]]:
-    """A closed position where A has its largest rank, and all that were found; else what is open least."""
+    """Return the closed position with the largest rank of A, and all that were found.
+
+    Where none closes, return the position that is open least.
+    """
     ended = []
     for start in starts:
         ended.append(equations.closed_from(start))

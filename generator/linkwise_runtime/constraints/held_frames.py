@@ -1,4 +1,4 @@
-"""What ties and contacts hold, row by row, as it was given and as constants for `tie_arrays`."""
+"""Frames that ties and contacts hold, row by row: as given, and as constants for `tie_arrays`."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -27,7 +27,7 @@ ROWS = {
 }
 """Names of the rows of each kind."""
 CONTACTS = {"held": "frame", "hinged": "hinge", "point": "point", "rolling": "rolling"}
-"""Kinds of contacts, and that of the same rows."""
+"""Kinds of contacts, and the kind of tie that has the same rows."""
 
 
 class Held(NamedTuple):
@@ -35,32 +35,32 @@ class Held(NamedTuple):
 
     name: str
     kind: str
-    """One of `ROWS`."""
+    """Key of `ROWS`."""
     first: int
-    """Index of the tree's frame."""
+    """Index of the first frame in the tree."""
     second: int | None
-    """The same; None for the ground."""
+    """Index of the second frame in the tree; None for the ground."""
     axes: NDArray[np.float64]
-    """In the first frame those of what is held, whose z is a hinge's, (3, 3)."""
+    """Axes of what is held, in the first frame, (3, 3); z is that of a hinge."""
     point: Triple = (0.0, 0.0, 0.0)
-    """In the first frame."""
+    """Point that is held, in the first frame."""
     length: float = 0.0
     arm: Triple = (0.0, 0.0, 0.0)
-    """Of what rolls, from where it touches to the point, in the world."""
+    """Vector from where a rolling body touches the ground to the point, in the world's axes."""
 
     @property
     def row_names(self) -> list[str]:
-        """What each row holds."""
+        """Names of the rows, which say what each holds."""
         return [f"{self.name} {row}" for row in ROWS[self.kind]]
 
     @property
     def row_units(self) -> list[str]:
-        """In which each row is open where the frames are not together: rad or m."""
+        """Unit in which each row is open where the frames are apart: rad or m."""
         return ["rad" if row in TURNS else "m" for row in ROWS[self.kind]]
 
 
 def held_by(tree: JointTree, contacts: object) -> list[Held]:
-    """Ties of the tree, then contacts; raises as `Dynamics.constrained` does."""
+    """Return the ties of the tree, then the contacts; raises as `Dynamics.constrained` does."""
     if isinstance(contacts, Contact) or not isinstance(contacts, list | tuple):
         raise TypeError(f"contacts is {known_kind(contacts, Contact)}; give a list of Contact")
     ties = [
@@ -114,7 +114,7 @@ def _vector(given: object, where: str, is_direction: bool = False) -> Triple:
 
 
 def ground_normal(contact: Contact, where: str, gravity: Triple) -> Triple:
-    """The normal of the ground on which it rolls: its own, or against gravity."""
+    """Return the normal of the ground on which a contact rolls: its own, or against gravity."""
     if contact.normal is not None:
         return _vector(contact.normal, f"{where}.normal", True)
     if not any(gravity):
@@ -123,7 +123,7 @@ def ground_normal(contact: Contact, where: str, gravity: Triple) -> Triple:
 
 
 def axes_around(direction: Triple) -> NDArray[np.float64]:
-    """Axes whose z points in a direction."""
+    """Return axes (3, 3) whose z points in a direction."""
     z = np.array(direction) / math.hypot(*direction)
     x = np.cross(np.eye(3)[np.abs(z).argmin()], z)
     x /= np.linalg.norm(x)
@@ -131,55 +131,55 @@ def axes_around(direction: Triple) -> NDArray[np.float64]:
 
 
 def all_names(held: Sequence[Held], tree: JointTree) -> tuple[str, ...]:
-    """Names of what has rows, in their order."""
+    """Return the names of the ties, contacts and couplings, in the order of their rows."""
     return (*(one.name for one in held), *(coupling.name for coupling in tree.couplings))
 
 
 class TieTables(NamedTuple):
     """Constants of P pairs of frames, of which T are ties and the others contacts, and of their C rows.
 
-    Frames stand in the order first ones of ties, those of contacts, second ones of ties.
+    Frames are in this order: first frames of ties, frames of contacts, second frames of ties.
     """
 
     frames: FrameTables | None
-    """None without ties and contacts."""
+    """Tables of the frames; None without ties and contacts."""
     ties: int
     pairs: int
     points: Numbers
-    """In the axes of each frame, (3, frames, 1)."""
+    """Point of each frame, in its axes, (3, frames, 1)."""
     first: Numbers
     """Ones where a joint moves the first frame of a pair, (P, joints, 1)."""
     second: Numbers
-    """The same of the second; none of a contact."""
+    """Ones where a joint moves the second frame of a pair, (P, joints, 1); zeros for a contact."""
     moved_apart: Numbers
-    """Their difference."""
+    """Difference of `first` and `second`."""
     all_axes: Numbers | None
-    """Of a pair 1 where all axes are held, 0 where z alone may be, (P, 1); None where none are."""
+    """1 for a pair whose axes are all held, 0 where at most z is, (P, 1); None where no pair holds any."""
     apart: Numbers
-    """Of a row the length that it holds, 0 elsewhere, (C, 1)."""
+    """Length that each row holds, 0 for rows that hold none, (C, 1)."""
     is_apart: Numbers
-    """Of a pair 1 where a length is held, (P, 1)."""
+    """1 for a pair that holds a length, 0 for others, (P, 1)."""
     row_pairs: Numbers
-    """Pair of each row."""
+    """Index of each row's pair."""
     fixed: Numbers
-    """(6, C, 1): what a row has of the turn and the shift of its pair, along the world's axes."""
+    """(6, C, 1): factors of each row on the turn and the shift of its pair, along the world's axes."""
     turning: Numbers | None
-    """(3, C, 1): the same of the turn, along the axes of the first frame; None for none."""
+    """(3, C, 1): factors of each row on the turn, along the axes of the first frame; None if all are zero."""
     along: Numbers | None
-    """(C, 1): the same of the shift, along the line between the frames; None for none."""
+    """(C, 1): factors of each row on the shift, along the line between the frames; None if all are zero."""
     placed: Numbers
-    """(C, 1): ones for rows that a position can violate; rolling has none."""
+    """(C, 1): ones for rows that a position can violate; zeros for rolling."""
     polynomials: tuple[tuple[Numbers, ...], ...]
-    """c_0, c_1, ... of the couplings' sums, of their derivatives and second derivatives, (K, n, 1) each."""
+    """Coefficients c_0, c_1, ... of couplings' sums, their first and second derivatives, (K, n, 1) each."""
 
     @property
     def moved(self) -> int:
-        """Number of pairs of a joint and a tie, by which the memory of a call grows."""
+        """Number of joints, times one more than the number of pairs: the memory of a call grows with it."""
         return 1 if self.frames is None else len(self.frames.joints.parents) * (1 + self.pairs)
 
 
 def tie_tables(tree: JointTree, n: int, held: Sequence[Held]) -> TieTables:
-    """Tables in float64."""
+    """Return the tables in float64."""
     ties = sum(one.second is not None for one in held)
     seconds = [one.second for one in held[:ties] if one.second is not None]
     frames, points = None, np.zeros((3, 0, 1))
@@ -190,7 +190,7 @@ def tie_tables(tree: JointTree, n: int, held: Sequence[Held]) -> TieTables:
         axes = np.stack([*(one.axes for one in held), *[np.eye(3)] * ties], -1)[..., None]
         rotations = (frames.rotations[:, :, None] * axes[None]).sum(1)
         frames = frames._replace(rotations=rotations)
-        # Points are turned as the axes are, in which they are wanted.
+        # Points are wanted in these axes, and so are turned like them.
         own = np.array([*(one.axes.T @ one.point for one in held), *[np.zeros(3)] * ties])
         points = own.T[..., None]
         moved = np.asarray(frames.carried).T[..., None]
@@ -216,7 +216,7 @@ def tie_tables(tree: JointTree, n: int, held: Sequence[Held]) -> TieTables:
 
 
 def _rows(held: Sequence[Held]) -> tuple[Floats, Floats | None, Floats | None]:
-    """`fixed`, `turning` and `along`."""
+    """Return the tables `fixed`, `turning` and `along`."""
     count = sum(len(ROWS[one.kind]) for one in held)
     fixed, turning, along = (np.zeros((size, count, 1)) for size in (6, 3, 1))
     along = along[0]

@@ -1,8 +1,8 @@
-"""Which joints may be independent, and where the others do not follow: rank and pivoting of A.
+"""Choice of independent joints, and positions where the others do not follow: rank and pivoting of A.
 
-Rows are comparable, as `closing_search` has them: not each by its own largest entry, for a row that a planar
-loop leaves at zero holds nothing but rounding. Columns are compared by what is left of them across those
-taken before.
+Rows are comparable, as `closing_search` makes them. They are not divided by their own largest entry each, for
+a row that a planar loop leaves at zero holds nothing but rounding. Columns are compared by what is left of
+them normal to those taken before.
 """
 
 from collections.abc import Sequence
@@ -21,41 +21,42 @@ if TYPE_CHECKING:
     from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
 
 RANK = 1e-5
-"""Singular values below this part of the largest, or of 1, are zero; what is left of columns likewise.
+"""Singular values below this part of the largest, or of 1, count as zero; so does what is left of columns.
 
-A file's right angle of 1.5708 tilts by 4e-6 what is meant to be parallel.
+A right angle of 1.5708 in a file tilts by 4e-6 what is meant to be parallel.
 """
 LEAST = 3
-"""Coordinates of a body that floats, in a plane or in space: a slide that turns, too, has bearings."""
+"""Least number of coordinates of a floating body, in a plane or in space: a slide that turns has bearings."""
 ABLE = 0.05
-"""Columns smaller than this part of the largest are not preferred to it, whatever joints they are of."""
+"""Columns smaller than this part of the largest are not preferred to it, whichever joints they belong to."""
 TIED = 1e-3
-"""Rows that have less than this part in a sum of rows that is zero are not among those that it ties."""
+"""Least share of a row in a sum of rows that is zero, to count as one of the rows that the sum relates."""
 AGREE = 1e-4
-"""Rows that follow from others may differ from these by this part of their size: files round numbers."""
+"""Largest relative difference of redundant rows from the rows that they follow from: files round numbers."""
 
 
 class JointColumns(NamedTuple):
-    """Joints as tables of positions."""
+    """Joints as tables of indices."""
 
     independent: Numbers
     dependent: Numbers
     order: Numbers
-    """Where each joint stands in the independent ones followed by the dependent ones."""
+    """Position of each joint in the list of the independent joints followed by the dependent ones."""
 
 
 def joint_columns(independent: tuple[int, ...], n: int) -> JointColumns:
-    """Positions in the order of all joints."""
+    """Return the indices of the independent and dependent joints, each in the order of all joints."""
     dependent = [k for k in range(n) if k not in independent]
     order = np.argsort([*independent, *dependent])
     return JointColumns(np.array(independent, dtype=np.intp), np.array(dependent, dtype=np.intp), order)
 
 
 def row_sizes(rows: Numbers, couplings: int) -> Numbers:
-    """What rows of A (..., C, n), the last ones of couplings, are measured by, (..., C).
+    """Return the sizes (..., C) that rows of A (..., C, n) are divided by; couplings have the last rows.
 
-    A coupling's is its largest slope where that is above 1: what it is counted in is a file's choice, and
-    divided so, what is left of it counts in rad and m of its joints. No gradient runs through it.
+    The size of a coupling is its largest slope where that is above 1: its unit is the file's choice, and
+    divided by this size, its violation counts in rad and m of its joints. Other rows have size 1. No gradient
+    flows through the sizes.
     """
     own: Numbers = rows if isinstance(rows, np.ndarray) else cast("Tensor", rows).detach()
     xp, first = namespace(rows), rows.shape[-2] - couplings
@@ -66,7 +67,7 @@ def row_sizes(rows: Numbers, couplings: int) -> Numbers:
 
 
 def rank_of(rows: NDArray[np.float64], tolerance: float = RANK) -> int:
-    """Rank of A (C, n)."""
+    """Return the rank of A (C, n)."""
     values = np.linalg.svd(rows, compute_uv=False)
     return int((values > tolerance * max(1.0, values.max(initial=0.0))).sum())
 
@@ -77,11 +78,12 @@ def chosen_independent(
     preference: Sequence[tuple[float, ...]] | None = None,
     tolerance: float = RANK,
 ) -> tuple[int, ...]:
-    """Coordinates that are left when columns of A (C, n) are taken by pivoting, as of dependent ones.
+    """Return the coordinates left when pivoting takes columns of A (C, n) as those of dependent joints.
 
-    rather_dependent: those that are taken before any other, as far as they can be, since nothing drives them
-    preference: of each coordinate, what compares; of columns that are not small beside the largest that of
-    the greatest is taken, unless given the largest
+    rather_dependent: coordinates that are taken before any other, as far as possible, since nothing drives
+    them
+    preference: key of each coordinate; of the columns that are not small beside the largest, the one with the
+    greatest key is taken; unless given, the largest column is
     """
     left, rank = rows.copy(), rank_of(rows, tolerance)
     least = tolerance * np.linalg.norm(left, axis=0).max(initial=1.0)
@@ -106,14 +108,15 @@ def chosen_independent(
 
 
 def redundant_names(rows: NDArray[np.float64], owners: Sequence[str]) -> tuple[str, ...]:
-    """Whose rows of A (C, n) follow from others, so that forces on them are not unique; each once, in order.
+    """Return the owners of rows of A (C, n) that follow from other rows, each once, in order.
 
-    Rows of nothing but rounding count where their owner has no others: it holds nothing that could move. A
-    planar loop's pin has such across its plane, where no force is asked for.
+    The forces on such rows are not unique. Rows of nothing but rounding count where their owner has no other
+    rows: it holds nothing that could move. The pin of a planar loop has such rows across its plane, where no
+    force is asked for.
     """
     least = RANK * max(1.0, np.linalg.svd(rows, compute_uv=False).max(initial=0.0))
     rows = rows.copy()
-    for owner in set(owners):  # along and across what moves, however the robot stands in the world
+    for owner in set(owners):  # along and across the motion, however the robot stands in the world
         own = [at for at, name in enumerate(owners) if name == owner]
         rows[own] = np.linalg.svd(rows[own])[0].T @ rows[own]
     there = np.abs(rows).max(-1, initial=0.0) > least
@@ -125,9 +128,10 @@ def redundant_names(rows: NDArray[np.float64], owners: Sequence[str]) -> tuple[s
 
 
 def loose_base(tree: JointTree) -> tuple[int, ...]:
-    """Coordinates of bodies that float: that slide and turn in one place, and hang on nothing else.
+    """Return the coordinates of floating bodies: those that slide and turn in one place, on nothing else.
 
-    Nobody drives these. Where a slide is says nothing, so that only what turns must be in one place.
+    Nothing drives these coordinates. The place of a slide does not matter, so only the turns must be in one
+    place.
     """
     carried = {link.joint for link in tree.links}
     roots = [f for f, joint in enumerate(tree.joints) if joint.parent is None]
@@ -135,7 +139,7 @@ def loose_base(tree: JointTree) -> tuple[int, ...]:
 
 
 def _floating(tree: JointTree, root: int, carried: set[int]) -> tuple[int, ...]:
-    """Coordinates on the way from a root to the first link, if they slide and turn; else none."""
+    """Return the coordinates from a root to the first link, if they slide and turn; else none."""
     run = [root]
     while run[-1] not in carried:
         children = [f for f, joint in enumerate(tree.joints) if joint.parent == run[-1]]
@@ -151,7 +155,7 @@ def _floating(tree: JointTree, root: int, carried: set[int]) -> tuple[int, ...]:
 def check_factors(
     rows: Numbers, triangle: Numbers, columns: JointColumns, joint_names: Sequence[str]
 ) -> None:
-    """Raise ValueError for the first sample where A_d, of which R is given, loses its rank."""
+    """Raise ValueError for the first sample where A_d, whose factor R is given, loses its rank."""
     place = lost_at(triangle)
     if place is not None:
         own = array_of(rows)[tuple(place)].astype(float)
@@ -159,7 +163,7 @@ def check_factors(
 
 
 def least_left(triangle: Numbers) -> NDArray[np.floating]:
-    """Of R the least part of a column that is left across those before it, (...,): |R_ff| by its length."""
+    """Return the least part of a column of R left normal to those before it, (...,): |R_ff| by its length."""
     r = array_of(triangle)
     sizes = np.sqrt((r * r).sum(-2))
     least: NDArray[np.floating] = (np.abs(r.diagonal(0, -2, -1)) / np.where(sizes > 0.0, sizes, 1.0)).min(-1)
@@ -167,7 +171,7 @@ def least_left(triangle: Numbers) -> NDArray[np.floating]:
 
 
 def lost_at(triangle: Numbers) -> list[int] | None:
-    """The first sample where R has lost its rank."""
+    """Return the first sample where R has lost its rank, or None."""
     if hidden(triangle):
         return None
     lost = least_left(triangle) <= _epsilon(triangle)
@@ -180,14 +184,14 @@ def lost_at(triangle: Numbers) -> list[int] | None:
 def why_not_following(
     rows: NDArray[np.float64], columns: JointColumns, epsilon: float, joint_names: Sequence[str], where: str
 ) -> str:
-    """Why A_d of one sample leaves joints free, of whose columns less than the part `epsilon` is left."""
+    """Return why A_d of one sample leaves joints free: less than the part `epsilon` of a column is left."""
     dependent = columns.dependent.tolist()
     told = left_free(rows, columns, joint_names, where)
     if rank_of(rows, epsilon) < len(dependent):
         return (
             f"the position is singular: {told}, for the constraints take fewer freedoms there than elsewhere"
         )
-    # Those that follow now go on to do so, as far as they can.
+    # Joints that follow now stay dependent, as far as they can.
     others = [joint_names[k] for k in chosen_independent(rows, dependent, tolerance=epsilon)]
     return (
         f"the independent joints do not tell the others: {told}; there, choose "
@@ -196,7 +200,7 @@ def why_not_following(
 
 
 def left_free(rows: Numbers, columns: JointColumns, joint_names: Sequence[str], where: str) -> str:
-    """Which dependent joints A_d of one sample leaves free, in words."""
+    """Return in words which dependent joints A_d of one sample leaves free."""
     dependent, independent = columns.dependent.tolist(), columns.independent.tolist()
     still = np.abs(np.linalg.svd(array_of(rows).astype(float)[:, dependent])[2][-1])
     moving = [joint_names[dependent[f]] for f in np.flatnonzero(still > SHARE * still.max())]
@@ -208,10 +212,10 @@ def left_free(rows: Numbers, columns: JointColumns, joint_names: Sequence[str], 
 def check_following(
     rows: Numbers, columns: JointColumns, mapped: Numbers, names: Sequence[str], joint_names: Sequence[str]
 ) -> None:
-    """Raise ValueError for the first sample where rows that follow from others do not agree: A G != 0.
+    """Raise ValueError for the first sample where redundant rows contradict those they follow from: A G != 0.
 
-    Rows are measured by the largest of their tie's: of a loop that a joint carries as a whole, or that is
-    open within the tolerance, some are nothing but what is left of differences.
+    Rows are compared with the largest of their tie: in a loop that a joint carries as a whole, or that is
+    open within the tolerance, some rows are nothing but what is left of differences.
     """
     if rows.shape[-2] == len(columns.dependent) or hidden(rows):
         return
@@ -232,5 +236,5 @@ def check_following(
 
 
 def _epsilon(like: Numbers) -> float:
-    """What is left of a column, as part of it, where nothing is left but rounding."""
+    """Return the part of a column at or below which only rounding is left of it."""
     return float(epsilon_of(like) ** (2.0 / 3.0))

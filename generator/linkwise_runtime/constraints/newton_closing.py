@@ -1,13 +1,13 @@
-"""Positions in which ties close: Newton's method on the dependent joints.
+"""Search for closed positions by Newton's method on the dependent joints.
 
     q_d <- q_d - A_d^+ phi
 
-The last step is one from the closed position, so that a gradient through it is that of what is implied:
+The last step starts at the closed position, so that a gradient through it is that of the implicit function:
 dq_d = -A_d^+ A_y dq_y.
 
-For the independent joints alone, the others are led from where ties are closed: steps along G go straight to
-where the independent joints are wanted, all samples at once, and are halved where others would leap: so ties
-that can close in several ways stay in the one of the start.
+With the independent joints alone, the others are led from a position where ties are closed: steps along G go
+straight to the wanted independent joints, all samples at once, and are halved where others would leap. So
+ties that can close in several ways keep the way of the start.
 """
 
 import sys
@@ -39,22 +39,22 @@ if TYPE_CHECKING:
 
 STEPS = 50
 LONGEST = 0.5
-"""Of a step, in m and rad; loops that are far from closing are not thrown further."""
+"""Longest step, in m and rad: loops that are far from closing are not thrown further."""
 NEAR = 0.1
-"""In rad and m: farther from its guess, a joint may have come to another way to close."""
+"""Largest distance from a joint's guess, in rad and m: farther away, ties may close in another way."""
 SHORTEST = 1e-6
-"""Part of a way that is not halved any more."""
+"""Smallest part of the way; no step is halved below it."""
 
 
 class DoesNotClose(ValueError):
-    """Ties stay open: why, and what mends it."""
+    """Error for ties that stay open: why, and what to do about it."""
 
     def __init__(self, reason: str, mend: str) -> None:
         super().__init__(f"{reason}; {mend}")
         self.reason, self._mend = reason, mend
 
     def __reduce__(self) -> tuple[type["DoesNotClose"], tuple[str, str]]:
-        """As processes hand it to each other."""
+        """Return the parts that pickle needs to pass the error between processes."""
         return DoesNotClose, (self.reason, self._mend)
 
 
@@ -66,9 +66,9 @@ def closed(
     tolerance: float | None,
     names: RowNames,
 ) -> TiesAt:
-    """Ties at q (..., n) with its dependent joints moved until they close.
+    """Return the ties at q (..., n) with its dependent joints moved until they close.
 
-    held_at: where contacts took hold, (..., n); names: what errors name
+    held_at: positions in which contacts took hold, (..., n); names: names for error messages
     Raises ValueError for the first sample that is singular, or stays open beyond the tolerance.
     """
     if isinstance(q, np.ndarray):
@@ -119,7 +119,7 @@ def _found(
 def _check_step(
     at: TiesAt, columns: JointColumns, tolerance: float | None, names: RowNames, is_start: bool
 ) -> None:
-    """Raise ValueError where A_d has lost its rank: what is open has a place that was not asked for."""
+    """Raise ValueError where A_d has lost its rank; open ties are named, for q is not where they close."""
     place = lost_at(at.factors[1])
     if place is None:
         return
@@ -142,13 +142,13 @@ def _check_step(
 
 
 def _led(columns: JointColumns) -> str:
-    """The mend that asks for no guess."""
+    """Return the advice that needs no guess: to give the independent joints alone."""
     own = columns.independent.tolist()
     return f"give closed(q[..., {own}]) the independent joints alone"
 
 
 def with_independent(q: Numbers, own: Numbers, columns: JointColumns) -> Numbers:
-    """Positions q (..., n) with the independent joints at others (..., m); gradients run through both."""
+    """Return q (..., n) with its independent joints at `own` (..., m); gradients flow through both."""
     others = taken(q, columns.dependent, -1)
     return taken(namespace(q).concat([own, others], -1), columns.order, -1)
 
@@ -171,9 +171,9 @@ def led(
     columns: JointColumns,
     names: Sequence[str],
 ) -> Numbers:
-    """Closed positions (..., n), from the start (..., n) to independent joints at `wanted` (..., m).
+    """Return closed positions (..., n), led from `start` (..., n) to independent joints at `wanted` (..., m).
 
-    place_of: the closed place beside a position; names: of all joints
+    place_of: function that returns the closed place near a position; names: names of all joints
     Raises ValueError where the others cannot be led there.
     """
     at = place_of(start)
@@ -186,7 +186,7 @@ def led(
             found, told = place_of(guess), "they would have to leap"
         except ValueError as error:
             found, told = None, error.reason if isinstance(error, DoesNotClose) else str(error)
-        # Written so, positions that are not numbers, of gaps in a batch, lead no other sample astray.
+        # Written so, positions that are NaN, as in gaps of a batch, do not stop the other samples.
         if found is not None and not bool((abs(found.q - guess) > NEAR).any()):
             at, done, step = found, done + step, 2.0 * step
             continue

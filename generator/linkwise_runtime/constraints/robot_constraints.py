@@ -1,4 +1,4 @@
-"""The dynamics of a robot whose joints are tied: closed loops, coupled joints, contacts."""
+"""Dynamics of a robot with tied joints: closed loops, coupled joints, contacts."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -29,7 +29,7 @@ from .tied_joints import TiedJoints, without_gradient
 
 
 class TiedRobot(Protocol):
-    """What constraints ask of a robot."""
+    """Attributes of a robot that constraints need."""
 
     @property
     def n(self) -> int:
@@ -45,54 +45,56 @@ class TiedRobot(Protocol):
 
     @property
     def backend(self) -> ArrayBackend:
-        """What computes."""
+        """Back end that computes."""
 
     @property
     def door(self) -> Door[ArrayBackend]:
-        """Where motion comes in."""
+        """Reader of the motion that calls are given."""
 
 
 class Constraints(Generic[Array]):
-    """What ties, couplings and contacts leave of a robot's motion; `Dynamics.constraints`, `.constrained`.
+    """Dynamics of a robot under ties, couplings and contacts; see `Dynamics.constraints` and `.constrained`.
 
     A qd = 0 has C rows, by which all other joints d follow the m independent ones y:
 
         qd = G yd    qdd = G ydd + bias    G_d = -A_d^-1 A_y    bias_d = -A_d^-1 dA/dt qd
         tau^_aj = sum_i G_ia tau_ij = sum_b c2^_ajb ydd_b + sum_b c1^_ajb yd_b + g^_aj
 
-    is what actuators of the independent joints a give through link j while all other joints move freely. The
-    shares sum up as those of the open tree do, in the closing convention.
+    Here tau^_aj is the torque of the actuator of independent joint a through link j, while all other joints
+    move freely. These shares sum up as those of the open tree do, in the closing convention.
 
-    Forces lambda are those on the first frame of a tie, minus those on the second, or on a contact's frame:
-    moments in N m, then forces in N, along the axes that the rows have; a distance's pushes apart; a
-    coupling's is on the unit of its sum. They load the joints with A^T lambda. Where rows say the same
-    twice, as those of a planar loop in space do, A_d^-1 is the pseudoinverse, and of all forces that do it
-    these are the least, by the sum of their squares, a coupling's times its largest slope where that is above
-    1: `redundant` names where that choice was made. Others are unique.
+    The constraint forces lambda act on the first frame of a tie and with the opposite sign on the second, or
+    on the frame of a contact: moments in N m, then forces in N, along the axes of the rows. The force of a
+    distance pushes its ends apart; the force of a coupling is per unit of its sum. They load the joints with
+    A^T lambda. Where rows are redundant, as those of a planar loop in space are, A_d^-1 is the pseudoinverse,
+    and lambda is the solution with the least sum of squares, a coupling's force being multiplied by its
+    largest slope where that is above 1; `redundant` names where that choice was made. Other forces are
+    unique.
 
-    q, batches and errors are as for `Dynamics`, and q (..., n) is that of all joints, in which the ties must
-    close within the tolerance of `Dynamics.constrained`: else ValueError, and `closed` is the mend. Of qd and
-    qdd (..., n) the independent joints count, and the others follow; ydd and yd are (..., m). Answers are of
-    the motion's kind and dtype; gradients flow through motion and parameters.
+    q, batches and errors are as for `Dynamics`. Positions q (..., n) are those of all joints, in which the
+    ties must close within the tolerance of `Dynamics.constrained`: else ValueError is raised; `closed`
+    returns positions in which they do. Of qd and qdd (..., n) only the independent joints count, and the
+    others follow; ydd and yd are (..., m). Answers are of the motion's kind and dtype; gradients flow through
+    motion and parameters.
 
-    Raises ValueError at a singular position, and for a choice of independent joints that does not go, with
+    Raises ValueError at a singular position, and for independent joints that the others do not follow, with
     sample and joints.
     """
 
     def __init__(
         self, robot: "TiedRobot", chosen: ChosenConstraints, tolerance: float | None, made: tuple[object, ...]
     ) -> None:
-        """Made again, as for a copy, by calling a method of the robot, with arguments: `made`."""
+        """Keep `made`, the arguments with which the robot's `constrained` makes them again, as for a copy."""
         self._robot, self._made = robot, made
         self.ties = TiedJoints(robot.structure, chosen, tolerance)
-        """How joints follow, for motion that has been read."""
+        """Motion of the tied joints, for arguments that have been read."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled or copied, they are made again by the robot, which is copied with them."""
+        """Return what pickle and copy need: the robot, copied with them, makes them again."""
         return made_again, (self._robot, "constrained", self._made)
 
     def are_of(self, robot: object) -> bool:
-        """Whether they were made by this robot, on this back end."""
+        """Return whether they were made by this robot, on this back end."""
         return self._robot is robot
 
     def __repr__(self) -> str:
@@ -100,74 +102,79 @@ class Constraints(Generic[Array]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of ties, couplings and contacts, in the order of their rows."""
+        """Names of the ties, contacts and couplings, in the order of their rows."""
         return self.ties.chosen.names
 
     @property
     def rows(self) -> tuple[str, ...]:
-        """What each of the C rows holds: "loop force_x", say."""
+        """Names of the C rows, which say what each holds: "loop force_x", say."""
         return self.ties.chosen.rows
 
     @property
     def row_units(self) -> tuple[str, ...]:
-        """In which each row is open: rad or m; none for a coupling, whose sum may have any."""
+        """Unit in which each row is open: rad or m; empty for a coupling, whose sum may have any."""
         return self.ties.chosen.row_units
 
     def labelled(self, call: str, *given: Any, along: Any = None, **named: Any) -> Any:
-        """`Dynamics.labelled` of these calls: made.labelled("forces", q, qd, qdd)."""
+        """Return `Dynamics.labelled` of one of these calls: made.labelled("forces", q, qd, qdd)."""
         return labelled(self._robot, self, call, given, named, along)
 
     @property
     def independent(self) -> tuple[str, ...]:
-        """Joints y, whose motion tells that of all others; in the order of all joints."""
+        """Names of the independent joints y, which move all others; in the order of all joints."""
         return self.ties.independent
 
     @property
     def dependent(self) -> tuple[str, ...]:
-        """The other joints."""
+        """Names of the dependent joints, in the order of all joints."""
         return self.ties.dependent
 
     @property
     def redundant(self) -> tuple[str, ...]:
-        """Names of those among whose rows some follow from others: how they share forces is a choice."""
+        """Names of constraints some of whose rows follow from others: how these share forces is a choice."""
         return self.ties.chosen.redundant
 
     def violation(self, q: Array, held_at: Array | None = None) -> Array:
-        """How far each row is from closing, (..., C), in m, rad or a coupling's unit.
+        """Return how far each row is from closing, (..., C), in m, rad or a coupling's unit.
 
-        Of a turn it is twice the sine of half the angle. held_at: positions (..., n) in which contacts took
-        hold of their frames; without them, and of rolling, contacts have none.
+        For a rotation this is twice the sine of half the angle.
+
+        held_at: positions (..., n) in which contacts took hold of their frames; without them contacts have no
+        violation. Rolling contacts never have one.
         """
         engine, (at, held) = self._read(q=q, held_at=q if held_at is None else held_at)
         return cast("Array", self.ties.rows(engine).violation(at, held))
 
     def jacobian(self, q: Array) -> Array:
-        """A, (..., C, n), at any q."""
+        """Return the constraint Jacobian A (..., C, n), at any q."""
         engine, (at,) = self._read(q=q)
         return cast("Array", side_by_side(self.ties.rows(engine).at(at).positions()[..., 1:]))
 
     def jacobian_rate(self, q: Array, qd: Array) -> Array:
-        """dA/dt, (..., C, n), at any q and qd, none of which is replaced here."""
+        """Return dA/dt (..., C, n), at any q and qd, which are used as they are given."""
         engine, (at, moved) = self._read(q=q, qd=qd)
         return cast("Array", self.ties.rows(engine).rates(at, moved))
 
     @property
     def closed_position(self) -> NDArray[np.float64]:
-        """A position of all joints in which the ties close, (n,), or (..., n) where parameters have samples.
+        """Position of all joints in which the ties close, (n,), or (..., n) where parameters have samples.
 
-        It is the one that generating found, near zero if ties close there; of `Dynamics.constrained` with
-        other joints or contacts the one at which these were chosen.
+        It is the one found when the package was generated, near zero if ties close there. For constraints
+        made by `Dynamics.constrained` with other joints or contacts, it is the one at which these were
+        chosen.
         """
         return self._closed_position.copy()
 
     def closed(self, q: Array, held_at: Array | None = None, start: Array | None = None) -> Array:
-        """The same q with its dependent joints moved until all ties close, (..., n), by Newton's method.
+        """Return q with its dependent joints moved by Newton's method until all ties close, (..., n).
 
-        q: of all joints, (..., n), the dependent ones where they are looked for; or of the independent ones
-        alone, (..., m): the others are then led there from `start`, step by step without leaps, so that ties
-        that can close in several ways stay in the one of the start
-        held_at: positions in which contacts took hold; q itself unless given, or the start
-        start: a closed position (..., n); `closed_position` unless given
+        q: positions of all joints, (..., n), where the search for the dependent ones starts; or of the
+        independent joints alone, (..., m): the others are then led there from `start`, step by step without
+        leaps, so that ties that can close in several ways keep the way of the start
+        held_at: positions (..., n) in which contacts took hold; unless given, q itself, or `start` where
+        joints are led
+        start: a closed position (..., n), accepted with independent joints alone; `closed_position` unless
+        given
 
         Raises ValueError, with the sample, the tie and what remains, if they do not close.
         """
@@ -183,70 +190,76 @@ class Constraints(Generic[Array]):
         return cast("Array", self.ties.closed(engine, at, held).q)
 
     def velocity_map(self, q: Array) -> Array:
-        """G, (..., n, m): qd = G yd."""
+        """Return the velocity map G (..., n, m) of qd = G yd."""
         engine, (at,) = self._read(q=q)
         return cast("Array", side_by_side(self.ties.place(engine, at).found.map))
 
     def velocity(self, q: Array, yd: Array) -> Array:
-        """qd of all joints, (..., n), for that of the independent ones, (..., m)."""
+        """Return qd of all joints, (..., n), for yd of the independent ones, (..., m)."""
         engine, (at, own) = self._read(self._own("yd", yd), q=q)
         return cast("Array", self.ties.place(engine, at).velocity(own))
 
     def acceleration(self, q: Array, qd: Array, ydd: Array) -> Array:
-        """qdd of all joints, (..., n), for that of the independent ones, (..., m)."""
+        """Return qdd of all joints, (..., n), for ydd of the independent ones, (..., m)."""
         engine, (at, moved, own) = self._read(self._own("ydd", ydd), q=q, qd=qd)
         place = self.ties.place(engine, at)
         return cast("Array", place.velocity(own) + place.bias(place.velocity(place.own(moved))))
 
     def velocity_accelerations(self, q: Array, qd: Array) -> Array:
-        """The bias of qdd = G ydd + bias by its causes, (..., n, n): what joint k gets through qd_s.
+        """Return the bias of qdd = G ydd + bias by cause, (..., n, n): the acceleration of joint k by qd_s.
 
-        Over s they sum to it; independent joints have none.
+        The sum over s is the bias; independent joints have none.
         """
         place, _, (_, moved) = self._moving(q, qd)
         return cast("Array", place.bias_by_cause(moved))
 
     def projected(self, q: Array, torque: Array, by_link: bool = False) -> Array:
-        """G^T torque: what torques (..., n) on all joints come to on the independent ones, (..., m).
+        """Return G^T torque (..., m), what torques (..., n) on all joints come to on the independent ones.
 
-        by_link: torque is (..., n, X), for X links, loads or others, and the answer (..., m, X)
+        by_link: whether torque is (..., n, X), for X links, loads or others, and the answer (..., m, X)
         """
         found = projected(*self._loaded(q, torque, by_link))
         return cast("Array", found if by_link else found[..., 0])
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Torques of the independent joints, sum_j tau^_aj, (..., m): of the links, as in `Dynamics`."""
+        """Return the torques of the independent joints, sum_j tau^_aj, (..., m).
+
+        They are those of the links, as in `Dynamics`.
+        """
         found, answers, motion = self._accelerated(q, qd, qdd)
         return cast("Array", projected(found, answers.inverse_dynamics(*motion)[0][..., None])[..., 0])
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """tau^_aj, (..., m, N)."""
+        """Return the partial torques tau^_aj, (..., m, N)."""
         found, answers, motion = self._accelerated(q, qd, qdd)
         return cast("Array", projected(found, answers.partial_torque(*motion)[0]))
 
     def coefficients(self, q: Array, qd: Array) -> Coefficients[Array]:
-        """c2^, c1^ (..., m, N, m) and g^ (..., m, N) of the closing convention."""
+        """Return c2^ and c1^ (..., m, N, m) and g^ (..., m, N) of the closing convention."""
         place, engine, (_, moved) = self._moving(q, qd)
         return cast("Coefficients[Array]", Coefficients(*self.ties.coefficients(engine, place, moved)))
 
     def propagation(self, q: Array, qd: Array, qdd: Array) -> Propagation[Array]:
-        """c2^_ajb ydd_b and c1^_ajb yd_b, (..., m, N, m), and g^_aj, (..., m, N): they sum to tau^_aj."""
+        """Return c2^_ajb ydd_b, c1^_ajb yd_b (..., m, N, m) and g^_aj (..., m, N): they sum to tau^_aj."""
         place, engine, (_, moved, asked) = self._moving(q, qd, qdd=qdd)
         c2, c1, g = self.ties.coefficients(engine, place, moved)
         yd, ydd = (place.own(a)[..., None, None, :] for a in (moved, asked))
         return cast("Propagation[Array]", Propagation(c2 * ydd, c1 * yd, g))
 
     def forces(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """lambda^(j), (..., C, N): what the constraints bear of link j, where dependent joints have no
-        actuators."""
+        """Return lambda^(j) (..., C, N), the forces by which constraints carry link j.
+
+        Dependent joints are taken to have no actuators.
+        """
         found, answers, motion = self._accelerated(q, qd, qdd)
         return cast("Array", borne(found, answers.partial_torque(*motion)[0]))
 
     def forces_of(self, q: Array, torque: Array, by_link: bool = False) -> Array:
-        """lambda, (..., C), for torques (..., n) that joints need and the dependent ones do not give.
+        """Return lambda (..., C) for torques (..., n) that joints need and the dependent ones do not give.
 
-        by_link: torque is (..., n, X), and the answer (..., C, X). Actuators, springs or loads of dependent
-        joints are taken from the torque first.
+        by_link: whether torque is (..., n, X), and the answer (..., C, X)
+
+        Subtract what actuators, springs or loads of dependent joints give from the torque first.
         """
         found = borne(*self._loaded(q, torque, by_link))
         return cast("Array", found if by_link else found[..., 0])
@@ -254,10 +267,10 @@ class Constraints(Generic[Array]):
     def forward_dynamics(
         self, q: Array, qd: Array, tau: Array, passive: bool = True
     ) -> ConstrainedMotion[Array]:
-        """qdd (..., n) and lambda (..., C) of M qdd + h + g + p = tau + A^T lambda, tau on all joints.
+        """Return qdd (..., n) and lambda (..., C) of M qdd + h + g + p = tau + A^T lambda.
 
-        tau: (..., n)
-        passive: as `Dynamics.forward_dynamics` has it, with p
+        tau: torques on all joints, (..., n)
+        passive: whether joints have p, as in `Dynamics.forward_dynamics`
         """
         place, engine, (_, moved, asked) = self._moving(q, qd, tau=tau)
         qdd, forces = self.ties.motion(engine, place, moved, asked, passive)
@@ -272,7 +285,7 @@ class Constraints(Generic[Array]):
         return np.array(array_of(found), dtype=np.float64)
 
     def _led(self, q: object, held_at: object, start: object) -> Numbers:
-        """Closed positions for independent joints (..., m)."""
+        """Return closed positions (..., n) for positions of the independent joints (..., m)."""
         joints = self._robot.joint_names
         # As a list it has no precision of its own.
         begin = self._closed_position.tolist() if start is None else start
@@ -305,12 +318,12 @@ class Constraints(Generic[Array]):
         return self._robot.door.read(named, beside=beside)
 
     def _own(self, name: str, given: object) -> dict[str, Beside]:
-        """What is given of the independent joints, (..., m)."""
+        """Return an argument for the independent joints, (..., m), by its name."""
         joints = self.independent
         return {name: Beside(given, (len(joints),), f"one for each of {', '.join(joints)}", joints)}
 
     def _loaded(self, q: object, torque: object, by_link: bool) -> tuple[Followers, Numbers]:
-        """How joints follow, and torques (..., n, X)."""
+        """Return how joints follow, and torques (..., n, X)."""
         joints = self._robot.joint_names
         about = Beside(torque, (len(joints),), "one for each joint; with by_link=True (..., n, X)", joints)
         if by_link:
@@ -321,7 +334,7 @@ class Constraints(Generic[Array]):
     def _moving(
         self, q: object, qd: object, **more: object
     ) -> tuple[ClosedPlace, ArrayBackend, Sequence[Numbers]]:
-        """How joints follow, what computes, and q, qd in which all follow, with what else was given."""
+        """Return how joints follow, the back end, and q and qd in which all follow, then other arguments."""
         engine, (at, moved, *others) = self._read(NOTHING, q=q, qd=qd, **more)
         place = self.ties.place(engine, at)
         return place, engine, (at, place.velocity(place.own(moved)), *others)
@@ -329,7 +342,7 @@ class Constraints(Generic[Array]):
     def _accelerated(
         self, q: object, qd: object, qdd: object
     ) -> tuple[Followers, Answers, tuple[Numbers, Numbers, Numbers]]:
-        """How joints follow, what answers for the open tree, and a motion in which they follow."""
+        """Return how joints follow, the answers for the open tree, and a motion in which they follow."""
         place, engine, (at, moved, asked) = self._moving(q, qd, qdd=qdd)
         qdd_there = place.velocity(place.own(asked)) + place.bias(moved)
         return place.found, engine.answers, (at, moved, qdd_there)
@@ -343,7 +356,7 @@ def made_again(robot: object, call: str, arguments: tuple[object, ...]) -> objec
 def constraints_of(
     robot: "TiedRobot", independent: object, contacts: object, at: object, tolerance: object
 ) -> Constraints[Any]:
-    """Constraints as `Dynamics.constrained` makes them; raises as it says."""
+    """Return constraints as `Dynamics.constrained` makes them; raises as it says."""
     if robot.backend.tree is None:
         raise ValueError(
             f"the links of {robot.structure.name} are energies, which do not say where anything is; "

@@ -1,11 +1,11 @@
-"""How far ties, couplings and contacts are from closing, their Jacobian A and its rate, samples innermost.
+"""Violation of ties, couplings and contacts, their Jacobian A and its rate, on arrays with samples innermost.
 
-Of a pair of frames, with S_f = (z, s) the screws of the joints and m = 1 where a joint moves a frame,
+For a pair of frames, with S_f = (z, s) the screws of the joints and m = 1 where a joint moves a frame,
 
     J = ((m1 - m2) z, (m1 - m2) s + z x X)    X = m1 x1 - m2 x2
 
-is how it turns and shifts, J_first - J_second at once. A row is w . J of its pair: w is an axis of the
-world, one of the first frame, whose rate is omega x w, or u = d / |d|, from the second frame to the first.
+is how the pair turns and shifts, J_first - J_second in one. A row is w . J of its pair: w is an axis of the
+world, or one of the first frame, whose rate is omega x w, or u = d / |d|, from the second frame to the first.
 """
 
 from typing import NamedTuple
@@ -26,23 +26,23 @@ from ..rule.tree_arrays import TreeArrays
 from .held_frames import TieTables
 
 TINY = 1e-12
-"""Below it cos(t/2)^2 is that of a frame upside down, whose axis of turning is not known."""
+"""Least cos(t/2)^2: below it a frame is upside down, and its axis of rotation is not known."""
 
 
 class Ends(NamedTuple):
-    """The frames of all pairs where they are."""
+    """Frames of all pairs at a position."""
 
     carried: Carried
     places: Numbers
-    """Of their points, (3, frames, samples)."""
+    """Places of the frames' points, (3, frames, samples)."""
 
 
 class Pairs(NamedTuple):
-    """The same pair by pair, and what their rows take from it."""
+    """Pairs of frames at a position, and what their rows need of them."""
 
     ends: Ends
     shift: Numbers
-    """d, (3, P, samples)."""
+    """Vector d from the second frame to the first, (3, P, samples)."""
     moves: Numbers
     """J, (6, P, n, samples)."""
     weights: Numbers
@@ -50,18 +50,18 @@ class Pairs(NamedTuple):
 
 
 class Changes(NamedTuple):
-    """How pairs change."""
+    """Rates of the pairs."""
 
     moves: Numbers
     """dJ/dt, (6, P, n, samples)."""
     spin: Numbers
-    """omega of the first frames, (3, P, samples)."""
+    """Angular velocity omega of the first frames, (3, P, samples)."""
     speeds: Numbers
-    """Of the points of all frames, (3, frames, samples)."""
+    """Velocities of the points of all frames, (3, frames, samples)."""
 
 
 def ends(xp: Namespace, tables: TieTables, numbers: TreeArrays, q: Numbers) -> Ends | None:
-    """Where frames are at q (n, samples); None without ties and contacts."""
+    """Return the frames at q (n, samples); None without ties and contacts."""
     if tables.frames is None:
         return None
     found = carried(xp, tables.frames, numbers, numbers.offsets, q, from_world=True)
@@ -69,7 +69,7 @@ def ends(xp: Namespace, tables: TieTables, numbers: TreeArrays, q: Numbers) -> E
 
 
 def pairs(xp: Namespace, tables: TieTables, numbers: TreeArrays, q: Numbers) -> Pairs | None:
-    """Where pairs are at q (n, samples); None without ties and contacts."""
+    """Return the pairs at q (n, samples); None without ties and contacts."""
     at = ends(xp, tables, numbers, q)
     if at is None or tables.frames is None:
         return None
@@ -80,7 +80,7 @@ def pairs(xp: Namespace, tables: TieTables, numbers: TreeArrays, q: Numbers) -> 
 
 
 def paired(xp: Namespace, tables: TieTables, at: Ends, moves: Numbers) -> Pairs:
-    """The pairs of frames that move so, (6, P, n, samples)."""
+    """Return the pairs of frames whose J is `moves`, (6, P, n, samples)."""
     shift = at.places[:, : tables.pairs] - _seconds(xp, tables, at.places)
     return Pairs(at, shift, moves, _weights(xp, tables, at, shift))
 
@@ -88,7 +88,7 @@ def paired(xp: Namespace, tables: TieTables, at: Ends, moves: Numbers) -> Pairs:
 def pair_changes(
     xp: Namespace, tables: TieTables, numbers: TreeArrays, qd: Numbers, at: Pairs | None
 ) -> Changes | None:
-    """How that changes at qd (n, samples): z x X becomes zd x X + z x dX/dt."""
+    """Return the rates of the pairs at qd (n, samples): z x X becomes zd x X + z x dX/dt."""
     if at is None or tables.frames is None:
         return None
     places = at.ends.places
@@ -105,7 +105,7 @@ def pair_changes(
 def violation(
     xp: Namespace, tables: TieTables, q: Numbers, at: Pairs | None, held: Ends | None = None
 ) -> Numbers:
-    """phi, (C, samples); held: where contacts took hold, where they are unless given."""
+    """Return phi (C, samples); held: where contacts took hold, where they are unless given."""
     parts: list[Numbers] = []
     if at is not None:
         axes, places = at.ends.carried.axes, at.ends.places
@@ -124,7 +124,7 @@ def violation(
 
 
 def tie_jacobian(xp: Namespace, tables: TieTables, q: Numbers, at: Pairs | None) -> Numbers:
-    """A, (C, n, samples)."""
+    """Return A (C, n, samples)."""
     parts: list[Numbers] = []
     if at is not None:
         parts.append((at.weights[:, :, None] * taken(at.moves, tables.row_pairs, -3)).sum(0))
@@ -136,7 +136,7 @@ def tie_jacobian(xp: Namespace, tables: TieTables, q: Numbers, at: Pairs | None)
 def tie_jacobian_rate(
     xp: Namespace, tables: TieTables, q: Numbers, qd: Numbers, at: Pairs | None, changes: Changes | None
 ) -> Numbers:
-    """dA/dt, (C, n, samples)."""
+    """Return dA/dt (C, n, samples)."""
     parts: list[Numbers] = []
     if at is not None and changes is not None:
         total = at.weights[:, :, None] * taken(changes.moves, tables.row_pairs, -3)
@@ -150,7 +150,10 @@ def tie_jacobian_rate(
 
 
 def _seconds(xp: Namespace, tables: TieTables, a: Numbers, held: Numbers | None = None) -> Numbers:
-    """What the second frames of the pairs have, (..., P, samples): that of a contact is its own, held."""
+    """Return the part of `a` for the second frames of pairs, (..., P, samples).
+
+    For a contact it is that of its own frame, as it was held.
+    """
     own = a[..., tables.pairs :, :]
     if tables.ties == tables.pairs:
         return own
@@ -159,9 +162,9 @@ def _seconds(xp: Namespace, tables: TieTables, a: Numbers, held: Numbers | None 
 
 
 def _turn(xp: Namespace, every: Numbers, first: Numbers, second: Numbers) -> Numbers:
-    """2 sin(t/2) times the axis about which, by t, the first frames are turned from the second ones.
+    """Return 2 sin(t/2) times the axis about which, by t, the first frames are turned from the second ones.
 
-    Of all axes a, or of z alone: sin t times it is half the sum of a2 x a1, or z2 x z1.
+    With all axes a, sin t times that axis is half the sum of a2 x a1; with z alone it is z2 x z1.
     """
     sines = cross(around(xp, second), around(xp, first))
     cosines = (second * first).sum(0)
@@ -172,7 +175,7 @@ def _turn(xp: Namespace, every: Numbers, first: Numbers, second: Numbers) -> Num
 
 
 def _weights(xp: Namespace, tables: TieTables, at: Ends, shift: Numbers) -> Numbers:
-    """w, (6, C, samples); one for all samples where they stay as they are."""
+    """Return w (6, C, samples), with one for all samples where w is constant."""
     weights = tables.fixed
     if tables.turning is not None:
         turning = turned(taken(at.carried.axes, tables.row_pairs), tables.turning)
@@ -184,7 +187,7 @@ def _weights(xp: Namespace, tables: TieTables, at: Ends, shift: Numbers) -> Numb
 
 
 def _weight_rates(xp: Namespace, tables: TieTables, at: Pairs, changes: Changes) -> Numbers | None:
-    """dw/dt; None where they stay as they are."""
+    """Return dw/dt (6, C, samples); None where w is constant."""
     if tables.turning is None and tables.along is None:
         return None
     turning, along = 0.0 * at.weights[:3], 0.0 * at.weights[3:]
@@ -193,7 +196,7 @@ def _weight_rates(xp: Namespace, tables: TieTables, at: Pairs, changes: Changes)
         spin = around(xp, changes.spin)
         turning = cross(taken(spin, tables.row_pairs), around(xp, own))
     if tables.along is not None:
-        # the rate of d, as far as it stands across d, by |d|
+        # the part of d's rate that is normal to d, divided by |d|
         size = _size(xp, tables, at.shift)
         speeds = changes.speeds
         u, slip = at.shift / size, speeds[:, : tables.pairs] - _seconds(xp, tables, speeds)
@@ -202,22 +205,23 @@ def _weight_rates(xp: Namespace, tables: TieTables, at: Pairs, changes: Changes)
 
 
 def _size(xp: Namespace, tables: TieTables, shift: Numbers) -> Numbers:
-    """|d| of pairs whose length is held, (P, samples); 1 of others, and where the ends coincide.
+    """Return |d| of pairs whose length is held, (P, samples); 1 for others, and where the ends coincide.
 
-    There d has no direction, and u = 0: phi is the whole length, and A, whose row is zero, has lost its rank.
+    Where they coincide, d has no direction, and u = 0: phi is the whole length, and A, whose row is zero, has
+    lost its rank.
     """
     squares = (shift * shift).sum(0) * tables.is_apart + (1.0 - tables.is_apart)
     return xp.where(squares > 0.0, squares, 0.0 * squares + 1.0) ** 0.5
 
 
 def _arms(xp: Namespace, tables: TieTables, places: Numbers) -> Numbers:
-    """X, (5, P, joints, samples)."""
+    """Return X (5, P, joints, samples), with its x and y once more, as `around` has it."""
     first, second = places[:, : tables.pairs], _seconds(xp, tables, places)
     return around(xp, tables.first * first[:, :, None] - tables.second * second[:, :, None])
 
 
 def _polynomial(factors: tuple[Numbers, ...], q: Numbers) -> Numbers:
-    """c_0 + c_1 q + ..., (K, n, samples), by Horner's rule."""
+    """Return c_0 + c_1 q + ..., (K, n, samples), by Horner's rule."""
     value = factors[-1] + 0.0 * q
     for factor in factors[-2::-1]:
         value = value * q + factor

@@ -31,7 +31,7 @@ OnTies = Asked[TieTables]
 
 
 class TieEnd(NamedTuple):
-    """A frame of the tree, a point of it, and axes in it."""
+    """Frame of the tree, a point of it, and axes in it."""
 
     frame: int
     point: NDArray[np.float64]
@@ -41,7 +41,7 @@ class TieEnd(NamedTuple):
 
 
 class TieRows:
-    """phi, A and dA/dt on one back end; arguments as `Constraints` says."""
+    """Rows of constraints on one back end: phi, A and dA/dt; arguments are as `Constraints` says."""
 
     def __init__(self, frames: FrameAnswers, chosen: ChosenConstraints) -> None:
         self._frames, self._constants, self.count = frames, chosen.tables, len(chosen.rows)
@@ -53,7 +53,7 @@ class TieRows:
         self._ends = [*first, *(TieEnd(frame, np.zeros(3), np.eye(3)) for frame in seconds)]
 
     def at(self, q: Numbers, held_at: Numbers | None = None) -> "RowsAt":
-        """Rows at positions (..., n); contacts are held as they are, or at others."""
+        """Return the rows at positions (..., n); contacts are held as they are there, or as at `held_at`."""
         is_held = self._has_contacts and held_at is not None
         asked = self._asked([q, held_at] if is_held and held_at is not None else [q])
         one = self._frames.engine.one_sample
@@ -62,7 +62,7 @@ class TieRows:
         return RowsAt(self._frames, asked, q, self.count)
 
     def violation(self, q: Numbers, held_at: Numbers) -> Numbers:
-        """phi, (..., C), from where contacts took hold."""
+        """Return phi (..., C), from where contacts took hold."""
 
         def answer(at: OnTies) -> Numbers:
             held = ends(at.xp, at.tables, at.numbers, at.motion[1]) if self._has_contacts else None
@@ -73,7 +73,7 @@ class TieRows:
         return side_by_side(values.reshape(*q.shape[:-1], self.count))
 
     def rates(self, q: Numbers, qd: Numbers) -> Numbers:
-        """dA/dt, (..., C, n)."""
+        """Return dA/dt (..., C, n)."""
         return self.at(q).rates(qd)
 
     def _asked(self, motion: Sequence[Numbers]) -> OnTies:
@@ -84,7 +84,7 @@ class TieRows:
 
 
 class RowsAt:
-    """Rows at some positions; of few samples, what they are made of is kept for their rates."""
+    """Rows at some positions; for few samples, the pairs of frames are kept for the rates."""
 
     def __init__(self, frames: FrameAnswers, asked: OnTies, q: Numbers, count: int) -> None:
         self._frames, self._asked, self._count = frames, asked, count
@@ -92,7 +92,7 @@ class RowsAt:
         self._kept: Pairs | None = None
 
     def positions(self) -> Numbers:
-        """phi and A beside it, (..., C, 1 + n)."""
+        """Return phi and A beside it, (..., C, 1 + n)."""
 
         def answer(at: OnTies) -> Numbers:
             placed = self._pairs(at)
@@ -106,7 +106,7 @@ class RowsAt:
         return self._made(answer, self._asked, 1 + self._shape[-1])
 
     def rates(self, qd: Numbers) -> Numbers:
-        """dA/dt, (..., C, n), for velocities (..., n) of the same samples."""
+        """Return dA/dt (..., C, n), for velocities (..., n) of the same samples."""
         first = self._asked
         flat = first.xp.swapaxes(qd.reshape(-1, qd.shape[-1]), 0, 1)
         asked = first._replace(motion=[first.motion[0], flat])
@@ -119,11 +119,11 @@ class RowsAt:
         return self._made(answer, asked, self._shape[-1])
 
     def _pairs(self, at: OnTies) -> Pairs | None:
-        """Where pairs are."""
+        """Return the pairs at these positions; None without ties and contacts."""
         return _pairs(at)
 
     def _changes(self, at: OnTies, placed: Pairs | None) -> Changes | None:
-        """How pairs change."""
+        """Return the rates of the pairs; None without ties and contacts."""
         return pair_changes(at.xp, at.tables, at.numbers, at.motion[1], placed)
 
     def _made(self, answer: Callable[[OnTies], Numbers], asked: OnTies, width: int) -> Numbers:
@@ -132,7 +132,7 @@ class RowsAt:
 
 
 class RowsAtOne(RowsAt):
-    """Rows at one sample, for whose frames a back end has functions."""
+    """Rows at one sample, on a back end that has functions for its frames."""
 
     def __init__(
         self,
@@ -156,7 +156,7 @@ class RowsAtOne(RowsAt):
         points = np.array([end.point for end in self._ends], kind)[..., None]
         places = poses[:, :3, 3] + (turns @ points)[..., 0]
         axes = (turns @ np.array([end.axes for end in self._ends], kind)).transpose(1, 2, 0)[..., None]
-        # Nothing more is asked of joints whose frames are known.
+        # Where the frames are known, their joints are not needed.
         found = Ends(Carried(cast(Poses, None), axes, cast(Numbers, None)), places.T[..., None])
         return paired(at.xp, at.tables, found, self._apart(at, jacobians))
 
@@ -169,7 +169,7 @@ class RowsAtOne(RowsAt):
         return Changes(self._apart(at, rates), speeds[:3, : at.tables.pairs], speeds[3:])
 
     def _of_ends(self, call: str, motion: Sequence[NDArray[np.floating]]) -> NDArray[np.floating] | None:
-        """Answers for all frames; None where there are none."""
+        """Return the answers for all frames; None where the back end has none."""
         kind, found = self._q.dtype, []
         for end in self._ends:
             point = end.point.astype(kind) if call != "pose" and end.point.any() else None
@@ -180,7 +180,7 @@ class RowsAtOne(RowsAt):
         return np.array(found)
 
     def _apart(self, at: OnTies, jacobians: NDArray[np.floating]) -> NDArray[np.floating]:
-        """What the first frames of the pairs have less than the second ones, (6, P, n, 1)."""
+        """Return the part of the pairs' first frames minus that of the second ones, (6, P, n, 1)."""
         moves = jacobians[: at.tables.pairs].copy()
         moves[: at.tables.ties] -= jacobians[at.tables.pairs :]
         return moves.transpose(1, 0, 2)[..., None]

@@ -1,4 +1,4 @@
-"""How a robot's joints follow its ties, and what moves them: for motion that has been read."""
+"""Motion of a robot's tied joints and the forces that cause it, for arguments that have been read."""
 
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, cast
@@ -28,7 +28,7 @@ from .tie_rows import TieRows
 
 
 class TiedJoints:
-    """What constraints were chosen, on whatever back end computes; tables are made when first asked for."""
+    """Chosen constraints, for any back end; tables are made when first asked for."""
 
     def __init__(self, structure: Structure, chosen: ChosenConstraints, tolerance: float | None) -> None:
         self.chosen, self._tolerance = chosen, tolerance
@@ -36,42 +36,42 @@ class TiedJoints:
         self.independent, self.dependent = (
             tuple(structure.joint_names[k] for k in columns.tolist()) for columns in self._listed[:2]
         )
-        """Names of the joints."""
+        """Names of the independent and of the dependent joints."""
         self._names = RowNames(chosen.rows, chosen.row_names, structure.joint_names)
         self._columns: dict[object, JointColumns] = {}
         self._rows: dict[ArrayBackend, TieRows] = {}
 
     def rows(self, engine: ArrayBackend) -> TieRows:
-        """Rows of the constraints."""
+        """Return the rows of the constraints on a back end."""
         if engine not in self._rows:
             self._rows[engine] = TieRows(engine.frames, self.chosen)
         return self._rows[engine]
 
     def columns(self, engine: ArrayBackend, q: Numbers) -> JointColumns:
-        """Positions of the joints, to take from `q`."""
+        """Return the indices of the joints, for taking entries of `q`."""
         key = type(q), getattr(q, "device", None)
         if key not in self._columns:
             self._columns[key] = JointColumns(*(engine.index(a, q) for a in self._listed))
         return self._columns[key]
 
     def place(self, engine: ArrayBackend, q: Numbers) -> ClosedPlace:
-        """How joints follow at q (..., n), in which all ties close; raises as `Constraints` says."""
+        """Return how joints follow at q (..., n), in which all ties close; raises as `Constraints` says."""
         return closed_place(self.rows(engine), self.columns(engine, q), q, self._tolerance, self._names)
 
     def closed(self, engine: ArrayBackend, q: Numbers, held_at: Numbers) -> TiesAt:
-        """Ties where dependent joints close them; held_at: positions in which contacts took hold."""
+        """Return the ties once dependent joints close them; held_at: where contacts took hold, (..., n)."""
         columns = self.columns(engine, q)
         return closed(self.rows(engine), columns, q, held_at, self._tolerance, self._names)
 
     def closed_place(self, engine: ArrayBackend, q: Numbers, held_at: Numbers) -> ClosedPlace:
-        """The same place, and how joints follow there."""
+        """Return how joints follow once dependent joints close the ties; held_at: as in `closed`."""
         at = self.closed(engine, q, held_at)
         return followed(at, self.columns(engine, at.q), self._names)
 
     def motion(
         self, engine: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool
     ) -> tuple[Numbers, Numbers]:
-        """qdd (..., n) and lambda (..., C) under torques (..., n), at velocities that follow.
+        """Return qdd (..., n) and lambda (..., C) under torques (..., n), at velocities that follow.
 
         (G^T M G) ydd = G^T (tau - h - g - M bias), then A^T lambda = M qdd + h + g - tau.
         """
@@ -83,14 +83,14 @@ class TiedJoints:
     def acceleration(
         self, engine: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool
     ) -> Numbers:
-        """ydd (..., m) of the same."""
+        """Return ydd (..., m) under torques (..., n), at velocities that follow."""
         mass, bias = engine.answers.equations(place.q, qd, passive)
         return self._solved(place, mass, tau - bias, place.bias(qd))
 
     def coefficients(
         self, engine: ArrayBackend, place: ClosedPlace, qd: Numbers
     ) -> tuple[Numbers, Numbers, Numbers]:
-        """c2^ = G^T c2 G, c1^ = G^T (c2 dG/dt + c1 G), g^ = G^T g, for each link."""
+        """Return c2^ = G^T c2 G, c1^ = G^T (c2 dG/dt + c1 G) and g^ = G^T g, for each link."""
         c2, c1, g = engine.answers.coefficients(place.q, qd)
         found, rate = place.found, place.map_rate(qd)[..., None, :, :]
         mapped = found.map[..., None, :, :]
@@ -104,12 +104,12 @@ class TiedJoints:
 
 
 def without_gradient(like: Numbers) -> AbstractContextManager[object]:
-    """Within it nothing is recorded for gradients."""
+    """Return a context within which nothing is recorded for gradients."""
     return nullcontext() if isinstance(like, np.ndarray) else cast(Any, namespace(like)).no_grad()
 
 
 def _projected_cubes(found: Followers, parts: Numbers) -> Numbers:
-    """G^T over i of (..., n, N, m)."""
+    """Return G^T, over i, times parts (..., n, N, m)."""
     *batch, n, links, m = parts.shape
     flat = projected(found, parts.reshape(*batch, n, links * m))
     cubes: Numbers = flat.reshape(*batch, m, links, m)

@@ -1,4 +1,4 @@
-"""Controllers of a robot's partial impedance: targets are read, motion is checked, torques are computed."""
+"""Controllers of a robot's partial impedance: they read targets, check motion and compute torques."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, Generic, Protocol, cast
@@ -27,40 +27,43 @@ from .joint_impedance import (
 
 Made = tuple[str, tuple[object, ...]]
 Given = Mapping[str, Numbers]
-"""What a call was given, by name, in one shape (..., n)."""
+"""Arguments of a call by name, of one batch shape (...)."""
 
 
 class ControlledRobot(TiedRobot, Protocol):
-    """What controllers ask of a robot."""
+    """Attributes of a robot that controllers need."""
 
     @property
     def name(self) -> str:
-        """That of its package."""
+        """Name of the robot's package."""
 
 
 class Controller:
-    """What controllers have in common: targets of a robot, and how its state is told."""
+    """Base of the controllers: targets of a robot, and how its state is read."""
 
     def __init__(
         self, robot: ControlledRobot, targets: JointTargets, frame: FrameTargets | None, made: Made
     ) -> None:
-        """made: the robot's method that makes it again, as for a copy, and its arguments."""
+        """Keep the robot and its targets.
+
+        made: the robot's method that makes the controller again, as for a copy, and its arguments
+        """
         self._robot, self._frame, self._made = robot, frame, made
         self._joints = JointImpedance(robot.structure, targets)
         self._of_one: dict[ArrayBackend, TorqueOfOne | None] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled or copied, it is made again by the robot, which is copied with it."""
+        """Return what pickle and copy need: the robot, copied with it, makes it again."""
         call, arguments = self._made
         return made_again, (self._robot, call, arguments)
 
     def _about(self) -> str:
-        """The robot, and the frame that is controlled."""
+        """Return the robot's name, its back end, and the frame that is controlled."""
         frame = "" if self._frame is None else f", frame {self._frame.frame!r}"
         return f"{self._robot.name} on {self._robot.backend.name}{frame}"
 
     def _torque_of_one(self, engine: ArrayBackend, given: Given) -> Numbers | None:
-        """The torque, where a back end has it for one sample without these arrays; None where it does not."""
+        """Return the torque if the back end has it for one sample without these arrays, else None."""
         if engine not in self._of_one:
             self._of_one[engine] = engine.controller(self._joints.targets, self._frame)
         of_one = self._of_one[engine]
@@ -69,38 +72,38 @@ class Controller:
     def _arrays(
         self, q: object, qd: object, motion: Mapping[str, object], beside: Mapping[str, Beside] = NOTHING
     ) -> tuple[ArrayBackend, dict[str, Numbers]]:
-        """What computes, and what was given; motion: what else is of shape (..., n)."""
+        """Return the back end and the arguments by name; motion: other arguments of shape (..., n)."""
         named = {"q": q, "qd": qd} | {name: a for name, a in motion.items() if a is not None}
         engine, arrays = self._robot.door.read(named, beside=beside)
         return engine, dict(zip((*named, *beside), arrays, strict=True))
 
 
 class PartialImpedance(Controller, Generic[Array]):
-    """Torques under which the robot obeys its targets; `Dynamics.partial_impedance` makes it.
+    """Controller that makes the robot obey impedance targets; made by `Dynamics.partial_impedance`.
 
-    With e = q - q_d and f, what acts on the joints from outside (the paper's equation, summed over j):
+    With e = q - q_d and f the torques on the joints from outside (the paper's equation, summed over j), it
+    returns the torque u of
 
         M* (qdd - qdd_d) + B* (qd - qd_d) + K* e = f     M* = sum_j M_ijk, B* and K* likewise
         u = M qdd + C qd + g - f, where qdd follows from the line above
 
-    Only the sums over the links move the robot: which link is said to have which share is a choice, made
-    when entries are given or the natural ones are scaled.
+    Only the sums over the links move the robot: how a sum is shared among the links is a choice, made when
+    entries are given or the natural ones are scaled.
 
-    With a frame, that has precedence: of all accelerations with which the frame moves as asked, the joints
-    take the one nearest to what the lines above ask for, by Gauss's principle of least constraint.
+    A frame has precedence over the joints: of all accelerations with which the frame moves as asked, the
+    joints take the one nearest to what the lines above ask for, by Gauss's principle of least constraint.
 
-    M is the inertia of links and armatures. Friction of the joints brakes them beside f, but for what is
-    compensated, which is never more than there is. Arguments, batches and errors are as for `Dynamics`;
-    gradients flow through motion, targets and gains.
+    M is the inertia of links and armatures. Friction of the joints brakes them in addition to f, except for
+    the part that is compensated, which is never more than there is. Arguments, batches and errors are as for
+    `Dynamics`; gradients flow through motion, targets and gains.
 
     target: positions q_d (..., n) to stay at, or a `Target`
-    external: what the surroundings put on the joints, (..., n), in N m or N: J^T (n, f) of a moment and a
-    force, and so the negative of `kinematics.load_torque`; nothing unless given. What is natural in M* needs
-    no measured f.
+    external: torques f of the surroundings on the joints, (..., n), in N m or N: J^T (moment, force), and so
+    the negative of `kinematics.load_torque`; zero unless given. What is natural in M* needs no measured f.
 
-    Raises ValueError for an M* that is not positive at a sample, for a frame that cannot move along a row,
-    and for one that is half a turn from its target. Warns where rounding leaves fewer than half of the
-    digits of the accelerations that are wanted.
+    Raises ValueError for an M* that is not positive definite at a sample, for a frame that cannot move along
+    one of its rows, and for a frame that is half a turn from its target. Warns where rounding leaves fewer
+    than half of the digits of the wanted accelerations.
     """
 
     def __repr__(self) -> str:
@@ -108,21 +111,22 @@ class PartialImpedance(Controller, Generic[Array]):
 
     @property
     def dissipative(self) -> bool:
-        """Whether the stored energy falls along every motion with f = 0, for targets at rest of a frame, and
-        for any of joints.
+        """True if the stored energy falls along every motion with f = 0.
 
-        It does where inertia and damping keep the same share of each link, all that is added and the
-        stiffness being positive: the kept c1 take up what the inertia changes by. Not so for a frame that is
-        stiff about one or two of the three axes, as the angle about one changes by turns about the others.
+        For joints this holds with any target, for a frame with a target at rest. It holds where inertia and
+        damping keep the same share of each link, and all that is added and the stiffness are positive: the
+        kept c1 balance the change of the inertia. It does not hold for a frame that is stiff about one or two
+        of the three axes, as the angle about one changes by turns about the others. It is False for links of
+        energies, of which nothing is known.
         """
-        if self._robot.backend.tree is None:  # nobody knows what energies of a user's do
+        if self._robot.backend.tree is None:  # nothing is known of a user's energies
             return False
         if self._frame is not None:
             return self._frame.dissipative
         return dissipates(self._joints.targets.inertia, self._joints.targets.damping)
 
     def __call__(self, q: Array, qd: Array, target: object = None, external: Array | None = None) -> Array:
-        """Torque u of the actuators, (..., n), in N m or N."""
+        """Return the torque u of the actuators, (..., n), in N m or N."""
         engine, given = self._given(q, qd, target, external)
         torque = self._torque_of_one(engine, given)
         if torque is None and self._frame is None and self._joints.targets.inertia.natural:
@@ -133,11 +137,11 @@ class PartialImpedance(Controller, Generic[Array]):
     def acceleration(
         self, q: Array, qd: Array, target: object = None, external: Array | None = None
     ) -> Array:
-        """qdd that follows, (..., n)."""
+        """Return the acceleration qdd that follows, (..., n), in rad/s^2 or m/s^2."""
         return cast("Array", self._followed(*self._given(q, qd, target, external))[0])
 
     def stored_energy(self, q: Array, qd: Array, target: object = None) -> Array:
-        """(ed' M* ed + e' K* e) / 2 in J, (...); with a frame that of the frame."""
+        """Return the stored energy (ed' M* ed + e' K* e) / 2 in J, (...); with a frame, that of the frame."""
         engine, given = self._given(q, qd, target, None)
         at, moved = given["q"], given["qd"]
         state = self._joints.state(engine, at, moved)
@@ -147,7 +151,7 @@ class PartialImpedance(Controller, Generic[Array]):
         return cast("Array", self._frame.stored(engine, framed))
 
     def _followed(self, engine: ArrayBackend, given: Given) -> tuple[Numbers, Numbers]:
-        """Acceleration that follows, and torque for it."""
+        """Return the acceleration that follows, and the torque for it."""
         q, qd, external = given["q"], given["qd"], given.get("external")
         state = self._joints.state(engine, q, qd)
         qdd = self._joints.acceleration(engine, state, _errors(given), told=self._frame is not None)
@@ -159,7 +163,7 @@ class PartialImpedance(Controller, Generic[Array]):
     def _given(
         self, q: object, qd: object, target: object, external: object
     ) -> tuple[ArrayBackend, dict[str, Numbers]]:
-        """What computes, and what was given; positions alone are a target."""
+        """Return the back end and the arguments by name; positions alone are a target."""
         read = target if isinstance(target, Target) else Target(q=target)
         if hasattr(read.q, "_fields"):
             raise TypeError(
@@ -186,10 +190,10 @@ class PartialImpedance(Controller, Generic[Array]):
 
 
 class Cancellation(Controller, Generic[Array]):
-    """Torques that cancel chosen motion propagation torques and leave the others; see `Dynamics.cancel`.
+    """Controller that cancels chosen motion propagation torques and leaves the others; see `Dynamics.cancel`.
 
-    u = tau + sum over the cancelled c_m,ijk q_k^(m) + g, and what joints have of their own, as
-    `partial_impedance` compensates it, under which the robot obeys
+    It returns u = tau + the sum over the cancelled c_m,ijk q_k^(m) + g, and the joints' own torques as
+    `partial_impedance` compensates them. Under u the robot obeys
 
         (M - M_S) qdd + (C - C_S) qd = tau + f
 
@@ -197,7 +201,7 @@ class Cancellation(Controller, Generic[Array]):
     """
 
     entries: tuple[tuple[str, str, str, int], ...]
-    """What is cancelled, by joint, link, coordinate and order."""
+    """Names of joint, link and coordinate, and the order, of each torque that is cancelled."""
 
     def __init__(
         self,
@@ -220,12 +224,12 @@ class Cancellation(Controller, Generic[Array]):
         external: Array | None = None,
         qdd: Array | None = None,
     ) -> Array:
-        """Torque u of the actuators, (..., n), in N m or N.
+        """Return the torque u of the actuators, (..., n), in N m or N.
 
-        tau: what the task asks for, (..., n); nothing unless given
+        tau: torques that the task asks for, (..., n); zero unless given
         qdd: acceleration at which the cancelled torques are taken, measured or wanted; unless given, the one
-        that follows. With all of them cancelled and a wanted one this is computed torque, but for
-        armature, which is of no link.
+        that follows. With all torques cancelled and a wanted acceleration, this is computed torque control,
+        except for armature, which belongs to no link.
         """
         engine, given = self._arrays(q, qd, {"task": tau, "external": external, "qdd": qdd})
         at, moved, accelerated = given["q"], given["qd"], given.pop("qdd", None)
@@ -242,7 +246,7 @@ class Cancellation(Controller, Generic[Array]):
     def acceleration(
         self, q: Array, qd: Array, tau: Array | None = None, external: Array | None = None
     ) -> Array:
-        """qdd that follows, (..., n)."""
+        """Return the acceleration qdd that follows, (..., n), in rad/s^2 or m/s^2."""
         engine, given = self._arrays(q, qd, {"task": tau, "external": external})
         state = self._joints.state(engine, given["q"], given["qd"])
         return cast("Array", self._joints.acceleration(engine, state, _errors(given)))
@@ -257,7 +261,7 @@ def partial_impedance(
     passive: bool,
     friction_width: float | None,
 ) -> PartialImpedance[Any]:
-    """See `Dynamics.partial_impedance`."""
+    """Return the controller of `Dynamics.partial_impedance`."""
     _check_free(robot)
     structure = robot.structure
     targets = JointTargets(
@@ -276,7 +280,7 @@ def partial_impedance(
 def cancellation(
     robot: ControlledRobot, entries: Iterable[object], passive: bool, friction_width: float | None
 ) -> Cancellation[Any]:
-    """See `Dynamics.cancel`."""
+    """Return the controller of `Dynamics.cancel`."""
     _check_free(robot)
     structure = robot.structure
     chosen = cancelled_motions(entries, structure)
@@ -300,7 +304,7 @@ def _check_free(robot: ControlledRobot) -> None:
 
 
 def _errors(given: Given) -> Errors:
-    """How far motion is from its target, and the forces, from outside and of a task."""
+    """Return how far motion is from its target, and the forces from outside and of a task."""
     place = given["q"] - given["target"] if "target" in given else None
     rate = given["qd"] - given["target.qd"] if "target.qd" in given else given["qd"]
     forces = [given[name] for name in ("external", "task") if name in given]

@@ -1,4 +1,4 @@
-"""The impedance of a frame, which has precedence over that of the joints (the paper's target impedance).
+"""Impedance of a frame, which has precedence over that of the joints (the paper's target impedance).
 
 With r rows of the frame's Jacobian J, its velocity nu = J qd, and H, C, f as for joints:
 
@@ -6,9 +6,9 @@ With r rows of the frame's Jacobian J, its velocity nu = J qd, and H, C, f as fo
     M_e (nud - nud_d) + B_e (nu - nu_d) + E' K_e x = F          x = (rotation vector, place) of the error
     qdd = qdd_0 + Jd (nud - dJ/dt qd - J qdd_0)
 
-L and mu are the frame's natural inertia and velocity forces: dL/dt - 2 mu is skew. E takes angular
-velocities to rates of the rotation vector. qdd_0 is what the joints' targets ask for; O. Khatib, A unified
-approach for motion and force control of robot manipulators, 1987.
+L and mu are the frame's natural inertia and velocity forces: dL/dt - 2 mu is skew-symmetric. E maps angular
+velocities to rates of the rotation vector. qdd_0 is the acceleration that the joints' targets ask for; see O.
+Khatib, A unified approach for motion and force control of robot manipulators, 1987.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,17 +37,17 @@ OF_FRAME = {
     "velocity": ((6,), SIX),
     "acceleration": ((6,), SIX),
 }
-"""What a target has of a frame: own axes, and what stands along them."""
+"""Parts of a target that concern a frame: their own axes, and what lies along these."""
 
 
 class FramePart(NamedTuple):
-    """How much of the natural matrix is kept, and what is added to it."""
+    """Kept part of the natural matrix, and what is added to it."""
 
     kept: float
     added: Gain | None
 
     def of(self, library: Library, natural: Numbers, like: Numbers) -> Numbers:
-        """The wanted matrix (..., r, r)."""
+        """Return the wanted matrix (..., r, r)."""
         kept = natural if self.kept == 1.0 else self.kept * natural
         return kept if self.added is None else kept + self.added.matrix(library, like)
 
@@ -68,18 +68,18 @@ class FrameState(NamedTuple):
     rate: Numbers
     """nu - nu_d (..., r)."""
     place: Numbers | None
-    """x (..., r), None without stiffness."""
+    """x (..., r); None without stiffness."""
     turning: Numbers | None
-    """E (..., r, r), None without stiffness."""
+    """E (..., r, r); None without stiffness."""
     wanted: Numbers | None
-    """nud_d (..., r), None for none."""
+    """nud_d (..., r); None if it is not given."""
 
 
 class FrameTargets:
-    """What is wanted of one frame, for whatever motion."""
+    """Targets of one frame, for any motion."""
 
     def __init__(self, frames: FrameAnswers, asked: FrameImpedance) -> None:
-        """Raises ValueError and TypeError as `Dynamics.partial_impedance` does."""
+        """Read what is wanted of the frame; raises as `Dynamics.partial_impedance` does."""
         if not isinstance(asked, FrameImpedance):
             frame = short(asked) if isinstance(asked, str | int) else "frame"
             raise TypeError(
@@ -96,7 +96,7 @@ class FrameTargets:
 
     @property
     def dissipative(self) -> bool:
-        """Whether natural inertia and velocity forces are kept alike, and turns are held in all ways or none.
+        """True if natural inertia and velocity forces are kept alike, and all turns are stiff or none.
 
         The angle about one axis changes by turns about the others, too.
         """
@@ -104,7 +104,7 @@ class FrameTargets:
         return self.inertia.kept == self.damping.kept and (turns in (0, 3) or self.stiffness is None)
 
     def _check_movable(self, tree: JointTree) -> None:
-        """Raise ValueError for rows that no joints can move, wherever they are."""
+        """Raise ValueError where fewer joints move the frame than it has rows, wherever they are."""
         moving = tree.chain(tree.frames[self.number].joint)
         joints = {tree.joints[f].coordinate for f in moving}
         if len(joints) < len(self.rows):
@@ -114,7 +114,7 @@ class FrameTargets:
             )
 
     def state(self, engine: ArrayBackend, joints: JointState, given: Mapping[str, Numbers]) -> FrameState:
-        """The frame at q and qd, by a target, all of them by name."""
+        """Return the frame's state at q and qd and for a target, which are all in `given` by name."""
         xp, frames, q, qd = engine.xp, engine.frames, given["q"], given["qd"]
         rows = engine.index(np.array(self.rows, np.intp), q)
         point = engine.constant(self.point, q)
@@ -159,7 +159,7 @@ class FrameTargets:
     def acceleration(
         self, engine: ArrayBackend, state: FrameState, qdd: Numbers, external: Numbers | None
     ) -> Numbers:
-        """qdd of the joints, nearest to the one given, with which the frame moves as asked."""
+        """Return qdd (..., n), nearest to the one given, with which the frame moves as asked."""
         xp = engine.xp
         pull = -times(state.wanted_damping, state.rate)
         if state.place is not None and state.turning is not None:
@@ -178,7 +178,7 @@ class FrameTargets:
         return qdd + times(state.dual, moved - state.bias - times(state.jacobian, qdd))
 
     def stored(self, engine: ArrayBackend, state: FrameState) -> Numbers:
-        """(nu~' M_e nu~ + x' K_e x) / 2, (...)."""
+        """Return the stored energy (nu~' M_e nu~ + x' K_e x) / 2, (...), with nu~ = nu - nu_d."""
         energy = (state.rate * times(state.wanted_inertia, state.rate)).sum(-1) / 2.0
         if state.place is None:
             return energy
@@ -188,14 +188,14 @@ class FrameTargets:
         return f"frame {self.frame!r} cannot move along rows each by itself"
 
     def _pull(self, library: Library, place: Numbers) -> Numbers:
-        """K_e x."""
+        """Return K_e x (..., r)."""
         assert self.stiffness is not None  # there is no place without it
         return times(self.stiffness.matrix(library, place), place)
 
     def _place(
         self, engine: ArrayBackend, q: Numbers, wanted: Numbers | None
     ) -> tuple[Numbers | None, Numbers | None]:
-        """x and E of the chosen rows; None where nothing is stiff."""
+        """Return x and E of the chosen rows; None where nothing is stiff."""
         if self.stiffness is None:
             return None, None
         if wanted is None:
@@ -231,7 +231,10 @@ class FrameTargets:
 
 
 def _reach(jacobian: Numbers, inertia: Numbers) -> Numbers:
-    """How far joints of these inertias (..., n), each by itself, turn and move a frame, (..., 6)."""
+    """Return how far joints of these inertias (..., n), each by itself, move a frame, (..., 6).
+
+    The first three numbers are for its turns, the others for its moves.
+    """
     xp: Namespace = namespace(jacobian)
     each = (jacobian**2 / inertia[..., None, :]).sum(-1)
     turns, moves = each[..., :3].sum(-1)[..., None], each[..., 3:].sum(-1)[..., None]
@@ -239,7 +242,10 @@ def _reach(jacobian: Numbers, inertia: Numbers) -> Numbers:
 
 
 def _point(given: object) -> NDArray[np.float64]:
-    """Raises ValueError for what is not three finite numbers, TypeError for a gradient."""
+    """Return the point, (3,), in m.
+
+    Raises ValueError for what is not three finite numbers, TypeError for a gradient.
+    """
     refuse_gradient("frame.point", given)
     point = np.array(cast(ArrayLike, given), float)
     if point.shape != (3,) or not np.isfinite(point).all():
@@ -248,7 +254,7 @@ def _point(given: object) -> NDArray[np.float64]:
 
 
 def _chosen(rows: Sequence[str]) -> tuple[int, ...]:
-    """Numbers of rows; raises ValueError for one that is not there, or there twice."""
+    """Return the indices of rows; raises ValueError for none, and for one that is unknown or given twice."""
     unknown = [row for row in rows if row not in ROWS]
     if unknown or len(set(rows)) < len(rows) or not len(rows):
         raise ValueError(f"frame.rows is {rows!r}; choose some of {', '.join(ROWS)}, each once")

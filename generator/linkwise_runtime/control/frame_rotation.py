@@ -1,4 +1,4 @@
-"""How far a frame is turned from another: the rotation vector, and how it changes with angular velocity."""
+"""Rotation of a frame from another: the rotation vector, and its rate for an angular velocity."""
 
 import math
 
@@ -9,16 +9,16 @@ from ..chosen_names import sample_of
 from ..interface import Library, Numbers
 
 SMALL = 1e-2
-"""Radians below which series serve: their errors are some 1e-17."""
+"""Angle in rad below which series serve: their errors are some 1e-17."""
 HALF_TURN = math.pi - 1e-6
 SKEWED = 1e-4
-"""By so much a pose of float32, or of a file, may not be a rotation."""
+"""Largest error of a rotation matrix: a pose of float32, or of a file, may be so far from a rotation."""
 
 
 def rotation_vector(library: Library, turn: Numbers, wanted: Numbers) -> Numbers:
-    """theta (..., 3), in rad, with turn = exp([theta]) wanted, of matrices (..., 3, 3).
+    """Return theta (..., 3), in rad, with turn = exp([theta]) wanted, for matrices (..., 3, 3).
 
-    Raises ValueError at half a turn, which has no direction, and for what turns nothing.
+    Raises ValueError at half a turn, which has no direction, and for a `wanted` that is no rotation.
     """
     xp = library.xp
     relative = turn @ xp.swapaxes(wanted, -1, -2)
@@ -48,7 +48,7 @@ def rotation_vector(library: Library, turn: Numbers, wanted: Numbers) -> Numbers
 
 
 def rates_of_turning(library: Library, theta: Numbers) -> Numbers:
-    """E (..., 3, 3) of d(theta)/dt = E w, w being the angular velocity in the same axes.
+    """Return E (..., 3, 3) of d(theta)/dt = E w, w being the angular velocity in the same axes.
 
     E = 1 - [theta]/2 + c [theta]^2 with c = (1 - t/2 cot(t/2)) / t^2, t the angle: the inverse of the left
     Jacobian of rotations.

@@ -1,11 +1,11 @@
-"""Gains in the forms that people give them, and what is wanted in place of natural coefficients.
+"""Gains in the forms that users give them, and what is wanted in place of natural coefficients.
 
-How much of the natural ones is kept, and what is added:
+A target says how much of the natural coefficients is kept, and what is added:
 
     M*_ik = sum_j w_ijk c2_ijk + m_ik        B*_ik = sum_j w_ijk c1_ijk + b_ik
 
-Entries that are given in place of the natural ones have w = 0 and their value in m or b, a scale alpha_ij
-has w_ijk = alpha_ij, and a sum that is given whole has w = 0 everywhere.
+Entries that are given in place of the natural ones have w = 0 and their value in m or b, a scale alpha_ij has
+w_ijk = alpha_ij, and a sum that is given whole has w = 0 everywhere.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,9 +28,9 @@ BY_LINK = "a number, ({0},) for a diagonal, ({0}, {0}), or ({0}, {1}, {0}) with 
 
 
 class Gain:
-    """A matrix (size, size) that was given as a number, a diagonal, a matrix, or by link.
+    """Matrix (size, size) that was given as a number, a diagonal, a matrix, or by link.
 
-    Tensors are read anew at each call, as they may be learned, and must stay as positive as they were.
+    Tensors are read again at each call, since they may be learned, and must stay as positive as they were.
     """
 
     def __init__(
@@ -43,18 +43,19 @@ class Gain:
         symmetric: bool = True,
         any_sign: bool = False,
     ) -> None:
-        """names: of the rows; links: how many there are, None where nothing is given by link.
+        """Read and check a gain.
 
-        definite: whether zero is refused; symmetric: whether it must be, else its symmetric part counts;
-        any_sign: whether it may be anything
+        names: names of the rows; links: number of links, None where nothing is given by link
+        definite: whether zero is refused; symmetric: whether the matrix must be symmetric, else its symmetric
+        part counts; any_sign: whether it may be any matrix
 
-        Raises ValueError for a shape that is none of these, for what is not finite and for what is not
-        positive; TypeError for what is not numbers.
+        Raises ValueError for a shape that is none of these, for numbers that are not finite and for a matrix
+        that is not positive; TypeError for what is not numbers.
         """
         size = len(names)
         self.name, self.names = name, tuple(names)
         self.learned = has_tensors([given])
-        """Whether it was given as a tensor."""
+        """True if it was given as a tensor."""
         self._given = read = numbers_of(name, given)
         shapes: tuple[tuple[int, ...], ...] = ((), (size,), (size, size))
         if links is not None:
@@ -64,11 +65,14 @@ class Gain:
             raise ValueError(f"{name} has shape {tuple(read.shape)}; give {forms}")
         self._asked = None if any_sign else (definite, symmetric)
         self.numbers = self._checked(read)
-        """As they were given, (size, size)."""
+        """Numbers of the gain as a matrix, (size, size)."""
         self._converted: dict[object, Numbers] = {}
 
     def matrix(self, library: Library, like: Numbers) -> Numbers:
-        """(size, size), to compute with `like`; raises ValueError for a tensor that is positive no more."""
+        """Return the matrix (size, size), to compute with `like`.
+
+        Raises ValueError for a tensor that is not positive any more.
+        """
         if self.learned:
             if not hidden(self._given):
                 self.numbers = self._checked(self._given, self.numbers)
@@ -80,7 +84,7 @@ class Gain:
         return self._converted[key]
 
     def _checked(self, given: Numbers, known: Real | None = None) -> Real:
-        """The numbers, found to be as they must; those that are known are not looked at again."""
+        """Return the numbers as a matrix, checked; numbers equal to `known` are not checked again."""
         read = np.array(array_of(given), float)
         if not np.isfinite(read).all():
             raise ValueError(f"{self.name} has numbers that are not finite")
@@ -91,7 +95,7 @@ class Gain:
 
 
 def numbers_of(name: str, given: object) -> Numbers:
-    """A tensor, or an array; raises TypeError and ValueError for what is no numbers."""
+    """Return a tensor, or an array; raises TypeError and ValueError for what is not numbers."""
     if isinstance(given, Mapping) or hasattr(given, "_fields") or isinstance(given, type | str | complex):
         raise TypeError(f"{name} is {known_kind(given, Natural)}, which cannot be taken here; give numbers")
     return as_weights(name, given)
@@ -104,7 +108,10 @@ def _square(given: Numbers, ones: Numbers) -> Numbers:
 
 
 def _check_positive(name: str, matrix: Real, names: Sequence[str], definite: bool, symmetric: bool) -> None:
-    """Raise ValueError, with what is wrong and where; signs do not depend on units, which are taken out."""
+    """Raise ValueError, with what is wrong and where.
+
+    Rows and columns are scaled by the diagonal first, as signs do not depend on units.
+    """
     rounding = 1e-9 * np.abs(matrix).max(initial=0.0)
     skew = np.abs(matrix - matrix.T)
     if symmetric and skew.max(initial=0.0) > rounding:
@@ -128,22 +135,22 @@ class WantedShares(NamedTuple):
     """Targets for the coefficients of one order."""
 
     kept: float | Numbers
-    """w: a number for all, or (n, N, 1) or (n, N, n), tensors among them."""
+    """Weights w: one number, or (n, N, 1) or (n, N, n), of which some may be tensors."""
     by_link: Real | None
-    """w of each link, (N,), where it is the same for all joints that it is felt by; else None."""
+    """Weight w of each link, (N,), where all joints that move the link have the same; else None."""
     added: Gain | None
     whole: bool
-    """Whether `added` was given as the sum over the links, armature included."""
+    """True if `added` was given as the sum over the links, armature included."""
     positive: bool
-    """Whether what is added is known to be positive."""
+    """True if what is added is known to be positive."""
 
     @property
     def natural(self) -> bool:
-        """Whether all is as it is."""
+        """True if the natural coefficients stay as they are."""
         return self.added is None and isinstance(self.kept, float) and self.kept == 1.0
 
     def of(self, library: Library, natural: Numbers, by_link: Numbers | None, like: Numbers) -> Numbers:
-        """The wanted sum (..., n, n): `natural` is the sum of the natural ones, `by_link` (..., n, N, n)."""
+        """Return the wanted sum (..., n, n), from the natural sum and its parts by link (..., n, N, n)."""
         if isinstance(self.kept, float):
             kept = natural if self.kept == 1.0 else self.kept * natural
         else:
@@ -152,7 +159,7 @@ class WantedShares(NamedTuple):
 
 
 def wanted(name: str, given: object, structure: Structure, definite: bool) -> WantedShares:
-    """Targets as `Dynamics.partial_impedance` takes them; raises ValueError and TypeError as it says.
+    """Return targets in the forms that `Dynamics.partial_impedance` accepts; raises as it says.
 
     definite: whether a sum that is given must be positive definite and symmetric, as inertia must
     """
@@ -171,7 +178,7 @@ def wanted(name: str, given: object, structure: Structure, definite: bool) -> Wa
 
 
 def stiffness_of(given: object, structure: Structure) -> Gain | None:
-    """K*, None for none; raises ValueError for what is not symmetric or not positive."""
+    """Return K*, or None without stiffness; raises ValueError if it is not symmetric or negative anywhere."""
     if isinstance(given, Mapping):
         given = entries_apart("stiffness", given, structure)[1]
     elif isinstance(given, Natural):
@@ -194,7 +201,7 @@ def check_paths(name: str, given: object, structure: Structure) -> None:
 
 
 def entries_apart(name: str, given: Mapping[object, object], structure: Structure) -> tuple[Real, Real]:
-    """w (n, N, n), zero for the entries, and their values summed over the links."""
+    """Return w (n, N, n), zero for the entries, and their values summed over the links, (n, n)."""
     kept = np.ones((structure.n, structure.N, structure.n))
     values = np.zeros((structure.n, structure.n))
     for key, value in given.items():
@@ -209,7 +216,7 @@ def entries_apart(name: str, given: Mapping[object, object], structure: Structur
 
 
 def entry_of(name: str, key: tuple[int | str, ...], structure: Structure) -> tuple[int, int, int]:
-    """Numbers i, j, k; raises ValueError for a joint that does not move the link, or is not there."""
+    """Return indices i, j, k; raises ValueError for a joint that does not exist or does not move the link."""
     i = structure.joint_index(key[0], f"{name}: joint")
     j = structure.link_index(key[1], f"{name}: link")
     k = structure.joint_index(key[2], f"{name}: coordinate")
@@ -231,7 +238,7 @@ def _number(name: str, key: object, value: object) -> float:
 
 
 def _scaled(name: str, scale: object, structure: Structure) -> tuple[float | Numbers, Real | None]:
-    """w and, where it is one number for each link, these numbers."""
+    """Return w, and w by link (N,) where it is one number for each link."""
     if isinstance(scale, Mapping):
         scale = _by_names(name, scale, structure)
     read = numbers_of(name, scale)

@@ -1,9 +1,9 @@
-"""The impedance of joints: what is wanted of a state, and the acceleration and the torque that follow.
+"""Impedance of joints: targets at a state, and the acceleration and the torque that follow.
 
     M* (qdd - qdd_d) + B* (qd - qd_d) + K* (q - q_d) = f + v        u = H qdd + C qd + g + p - f
 
-H is the inertia of links and armature, p what the joints' own springs and damping take, and of their friction
-what is to be compensated, v what a task asks for where motions are cancelled.
+H is the inertia of links and armature; p is the torque of the joints' own springs and damping, and of the
+part of their friction that is to be compensated; v is what a task asks for where motions are cancelled.
 """
 
 from collections.abc import Iterable
@@ -22,27 +22,27 @@ from .gains import Gain, WantedShares
 from .wanted_solve import WantedInertia, solved_wanted
 
 ORDERS = (1, 2)
-"""Of motion propagation torques that can be cancelled: of velocity and of acceleration."""
+"""Orders of motion propagation torques that can be cancelled: 1, of velocity, and 2, of acceleration."""
 Entry = tuple[int, int, int, int]
-"""i, j, k and the order."""
+"""Indices i, j, k and the order."""
 
 
 class JointTargets(NamedTuple):
-    """What is wanted of the joints."""
+    """Targets of the joints."""
 
     inertia: WantedShares
     damping: WantedShares
     stiffness: Gain | None
     positive: bool
-    """Whether M* must be positive; else it must be regular, as where motions are cancelled."""
+    """True if M* must be positive definite; else it must be regular, as where motions are cancelled."""
     passive: bool
-    """Whether the joints' own springs, damping and armature count."""
+    """True if the joints' own springs, damping and armature count."""
     friction_width: float | None
-    """In rad/s or m/s, the width of their friction; None where it is not compensated."""
+    """Width of the joints' friction, in rad/s or m/s; None where it is not compensated."""
 
 
 class JointState(NamedTuple):
-    """A robot at q and qd: what its joints obey, and the targets for it."""
+    """Robot at q and qd: the terms that its joints obey, and the targets for it."""
 
     inertia: Numbers
     """H (..., n, n)."""
@@ -57,25 +57,25 @@ class JointState(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """How far a state is from its target, and what else there is, (..., n) each; None for nothing."""
+    """Differences of a state from its target, and forces on it, (..., n) each; None if there is none."""
 
     place: Numbers | None
     rate: Numbers
     wanted: Numbers | None
-    """qdd_d."""
+    """Wanted acceleration qdd_d."""
     force: Numbers | None
-    """f, from outside, and v, of a task."""
+    """Sum of f, from outside, and v, of a task."""
 
 
 class JointImpedance:
-    """The targets of one robot, for whatever motion."""
+    """Joint targets of one robot, for any motion."""
 
     def __init__(self, structure: Structure, targets: JointTargets) -> None:
         self.targets, self._structure = targets, structure
         self._shares = any(not isinstance(t.kept, float) for t in (targets.inertia, targets.damping))
 
     def state(self, engine: ArrayBackend, q: Numbers, qd: Numbers) -> JointState:
-        """What its joints obey at q and qd (..., n), and what they shall."""
+        """Return the terms that the joints obey at q and qd (..., n), and their targets there."""
         targets, c2, c1 = self.targets, None, None
         if self._shares:
             c2, c1, by_link = engine.answers.coefficients(q, qd)
@@ -90,12 +90,12 @@ class JointImpedance:
             inertia, rest = mass + armature, rest + spring + damping
             if targets.friction_width is not None:
                 rest = rest + smooth_friction(engine, sums, qd, targets.friction_width)
-            # a share of links leaves the armature beside it, a sum that is given whole has it in it
+            # a share of the links leaves out the armature, a sum that is given whole includes it
             wanted = wanted if targets.inertia.whole else wanted + armature
         return JointState(inertia, coriolis, rest, wanted, targets.damping.of(engine, coriolis, c1, q))
 
     def pull(self, engine: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
-        """-B* ed - K* e, (..., n)."""
+        """Return -B* ed - K* e, (..., n)."""
         pull = -times(state.wanted_damping, errors.rate)
         if self.targets.stiffness is None or errors.place is None:
             return pull
@@ -104,9 +104,9 @@ class JointImpedance:
     def acceleration(
         self, engine: ArrayBackend, state: JointState, errors: Errors, told: bool = False
     ) -> Numbers:
-        """qdd = qdd_d + M*^-1 (f + v - B* ed - K* e), (..., n).
+        """Return qdd = qdd_d + M*^-1 (f + v - B* ed - K* e), (..., n).
 
-        told: whether it is said elsewhere how well a natural M* tells it
+        told: whether the accuracy that a natural M* allows is reported elsewhere
         """
         pull = self.pull(engine, state, errors)
         if errors.force is not None:
@@ -124,17 +124,20 @@ class JointImpedance:
         return moved if errors.wanted is None else errors.wanted + moved
 
     def natural_torque(self, engine: ArrayBackend, state: JointState, qd: Numbers, errors: Errors) -> Numbers:
-        """u = H qdd_d + C qd + g + p - B* ed - K* e: f drops out where all inertia stays."""
+        """Return u = H qdd_d + C qd + g + p - B* ed - K* e, (..., n).
+
+        f drops out where all inertia stays natural.
+        """
         torque = times(state.coriolis, qd) + state.rest + self.pull(engine, state, errors)
         return torque if errors.wanted is None else torque + times(state.inertia, errors.wanted)
 
     def torque(self, state: JointState, qd: Numbers, qdd: Numbers, external: Numbers | None) -> Numbers:
-        """u = H qdd + C qd + g + p - f, (..., n)."""
+        """Return u = H qdd + C qd + g + p - f, (..., n)."""
         torque = times(state.inertia, qdd) + times(state.coriolis, qd) + state.rest
         return torque if external is None else torque - external
 
     def stored(self, engine: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
-        """(ed' M* ed + e' K* e) / 2, (...)."""
+        """Return the stored energy (ed' M* ed + e' K* e) / 2, (...)."""
         energy = (errors.rate * times(state.wanted_inertia, errors.rate)).sum(-1) / 2.0
         if self.targets.stiffness is None or errors.place is None:
             return energy
@@ -143,21 +146,24 @@ class JointImpedance:
 
 
 def times(matrix: Numbers, vector: Numbers) -> Numbers:
-    """(..., r, n) times (..., n)."""
+    """Return matrices (..., r, n) times vectors (..., n)."""
     return (matrix @ vector[..., None])[..., 0]
 
 
 def dissipates(inertia: WantedShares, damping: WantedShares) -> bool:
-    """Whether c2 and c1 of each link are kept alike: then dM*/dt - 2 B* is skew but for what is added."""
+    """Return whether c2 and c1 of each link are kept alike.
+
+    dM*/dt - 2 B* is then skew-symmetric, except for what is added.
+    """
     if not (inertia.positive and damping.positive) or inertia.by_link is None or damping.by_link is None:
         return False
     return bool((inertia.by_link == damping.by_link).all())
 
 
 def cancelled_motions(entries: Iterable[object], structure: Structure) -> tuple[Entry, ...]:
-    """Numbers of what is chosen by name or number, None in a place standing for all that there are.
+    """Return the indices of entries chosen by name or number; None in a place stands for all there are.
 
-    Raises ValueError for what is not there, what is always zero, and what is named twice.
+    Raises ValueError for an entry that does not exist, is always zero, or is named twice.
     """
     found: dict[Entry, None] = {}
     if isinstance(entries, str) or not isinstance(entries, Iterable):
@@ -182,7 +188,7 @@ def cancelled_motions(entries: Iterable[object], structure: Structure) -> tuple[
 
 
 def _meant(entry: tuple[int | str | None, ...], structure: Structure) -> list[Entry]:
-    """All that an entry stands for and that is not always zero."""
+    """Return all entries that one stands for, without those that are always zero."""
     joint, link, coordinate, order = entry
     if order is not None and (isinstance(order, bool) or order not in ORDERS):
         raise ValueError(
@@ -203,7 +209,7 @@ def _meant(entry: tuple[int | str | None, ...], structure: Structure) -> list[En
 
 
 def friction_width_of(given: object, passive: bool) -> float | None:
-    """A width of friction; raises ValueError for one that is no velocity, or without friction."""
+    """Return the width of friction, or None; raises ValueError if it is no velocity, or without friction."""
     if given is None:
         return None
     if isinstance(given, bool) or not isinstance(given, Real) or not 0.0 < float(given) < np.inf:

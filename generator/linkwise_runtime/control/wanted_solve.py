@@ -1,6 +1,6 @@
 """Accelerations from a wanted inertia, M* a = f, and the joints or rows along which it is not positive.
 
-What half of the digits are asks for, and what is refused, C judges by the same numbers (impedance.h).
+C uses the same limits to warn of lost digits and to refuse a matrix (impedance.h).
 """
 
 from typing import NamedTuple
@@ -15,18 +15,18 @@ from ..interface import Namespace, Numbers
 from ..targets import ROWS
 
 SMALL = 1e3
-"""Beside the root of rounding: where no pivot is less, half of the digits and more are known."""
+"""Factor of the square root of rounding: where no pivot is less, at least half of the digits are known."""
 
 
 class WantedInertia(NamedTuple):
-    """A matrix to be solved for, in messages."""
+    """Matrix that is solved for, as messages name it."""
 
     singular: str
     vague: Told
 
     @property
     def roundings(self) -> float:
-        """By which a number of the size of 1 may be wrong, as C has it: six rows stand for any of a frame."""
+        """Roundings by which a number of size 1 may be wrong, as in C: a frame always counts as six rows."""
         return ROUNDINGS * (len(ROWS) if self.vague.of_frame else len(self.vague.names))
 
 
@@ -38,16 +38,16 @@ def solved_wanted(
     positive: bool = True,
     told: bool = False,
 ) -> Numbers:
-    """a (..., r, X) of M* (..., r, r) and forces (..., r, X).
+    """Return a (..., r, X) of M* a = f, for M* (..., r, r) and forces (..., r, X).
 
     natural: numbers (..., r), as large as those that each row of M* is made from, whose rounding is in it
-    positive: whether M* must be positive (its symmetric part, that is), else regular
-    told: whether another matrix says already how well a is known
+    positive: whether M* (its symmetric part, that is) must be positive definite; else it must be regular
+    told: whether the accuracy of a is already reported for another matrix
 
-    Raises ValueError for the first M* that is not, with the sample and the rows: of a singular one those
-    that say nothing, or the same as others. Warns of samples whose answer is known to fewer than half of the
-    digits. A positive matrix is judged by its own diagonal, as M is: links that are made lighter all alike
-    are as well known as before.
+    Raises ValueError for the first M* that is not, with the sample and the rows: for a singular one, the rows
+    that are zero or follow from others. Warns of samples whose answer is known to fewer than half of the
+    digits. A positive matrix is judged by its own diagonal, as M is: if all links are made lighter alike, the
+    answer is known as well as before.
     """
     xp: Namespace = namespace(wanted)
     own, natural = abs(wanted.diagonal(0, -2, -1)), abs(natural)
@@ -70,9 +70,9 @@ def _check(
     positive: bool,
     told: bool,
 ) -> None:
-    """Raise ValueError for the first that is not positive, or not regular, or warn; NaN passes.
+    """Raise ValueError for the first matrix that is not positive, or not regular, or warn; NaN passes.
 
-    diagonals: of it before it was scaled, and of what it is made from, (..., r)
+    diagonals: that of the matrix before it was scaled, and that of what it is made from, (..., r)
     """
     finite = np.isfinite(scaled).all((-2, -1), keepdims=True)
     known = np.where(finite, scaled, np.eye(scaled.shape[-1], dtype=scaled.dtype))
@@ -100,9 +100,11 @@ def _refuse(about: WantedInertia, sample: tuple[int, ...], rows: NDArray[np.bool
 
 
 def _largest_when_free(matrices: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Of positive ones, 1 by the part of a row's inertia that is left when all others move freely (...,).
+    """Return 1 divided by the part of a row's inertia that is left when all others move freely, (...,).
 
-    It is of the row with the least pivot; infinite where one of the matrices is not positive.
+    It is for positive matrices, and of the row with the least pivot; infinite for one that is not positive.
+    Where all pivots are large, 1 divided by the least pivot is used instead; where a matrix of the batch is
+    not positive, 1 divided by the least eigenvalue of each.
     """
     try:
         pivots = np.linalg.cholesky(matrices).diagonal(0, -2, -1) ** 2
@@ -110,15 +112,18 @@ def _largest_when_free(matrices: NDArray[np.floating]) -> NDArray[np.floating]:
             return _inverted(pivots.min(-1))
         unit = np.eye(matrices.shape[-1], dtype=matrices.dtype)[pivots.argmin(-1)]
         moved = np.linalg.solve(matrices, unit[..., None])[..., 0]
-    except np.linalg.LinAlgError:  # of the root or, where rounding has left that a pivot, of the solution
+    except np.linalg.LinAlgError:  # of the factor or, where rounding has left that a pivot, of the solution
         return _inverted(np.linalg.eigvalsh(matrices)[..., 0])
     mobility: NDArray[np.floating] = (moved * unit).sum(-1)
-    # Rounding may leave less than nothing, and less than what moves while those behind are held.
+    # Rounding may leave a negative number, or less than what moves with the rows behind held.
     return np.where(mobility > 0.0, np.maximum(mobility, _inverted(pivots.min(-1))), np.inf)
 
 
 def _largest_of_inverse(matrices: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Of any, the largest number of its inverse (...,); infinite where one is exactly singular."""
+    """Return the largest number of each inverse, (...,), infinite for a matrix that is exactly singular.
+
+    Where one of the batch is, 1 divided by the least singular value of each is used instead.
+    """
     try:
         largest: NDArray[np.floating] = np.abs(np.linalg.inv(matrices)).max((-2, -1))
     except np.linalg.LinAlgError:
@@ -127,13 +132,13 @@ def _largest_of_inverse(matrices: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def _inverted(least: NDArray[np.floating]) -> NDArray[np.floating]:
-    """1 by each, infinite for what is not above 0."""
+    """Return 1 divided by each number, infinite for one that is not above 0."""
     above = least > 0.0
     return np.where(above, 1.0 / np.where(above, least, 1.0), np.inf).astype(least.dtype)
 
 
 def _least_along(matrix: NDArray[np.floating], symmetric: bool) -> NDArray[np.floating]:
-    """The rows (r,) along which a matrix is the least."""
+    """Return the direction over the rows, (r,), along which a matrix is the least."""
     if symmetric:
         return np.asarray(np.linalg.eigh(matrix)[1][:, 0])
     return np.asarray(np.linalg.svd(matrix)[0][:, -1])

@@ -1,1 +1,1 @@
-"""Where the named frames of a robot are and how they move, on the arrays of the rule."""
+"""Poses and motion of a robot's named frames, on the arrays of the rule."""

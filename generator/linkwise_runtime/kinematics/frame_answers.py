@@ -1,4 +1,4 @@
-"""Calls on frames as one back end answers them, for motion that has been read: samples innermost."""
+"""Calls on frames as one back end answers them, for motion that has been read, with samples innermost."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -34,26 +34,26 @@ from .frame_arrays import (
 )
 
 ALL, LINKS = "all frames", "links"
-"""What is asked of, where it is not one frame by its number."""
+"""Parts of a robot that a call may be for, where it is not one frame by its number."""
 CACHE = 1 << 21
-"""Bytes of the arrays of one piece of a batch, which are to stay in the processor's cache."""
+"""Size in bytes of the arrays of one piece of a batch, which are to stay in the processor's cache."""
 NUMBERS = 60
-"""Numbers that a joint or a frame has of one sample."""
+"""Count of numbers that a joint or a frame has for one sample."""
 VECTORS = {
     "point": "x, y, z in the frame, in m",
     "at": "x, y, z in the world, in m",
     "force": "x, y, z in the world, in N",
     "moment": "x, y, z in the world, in N m",
 }
-"""What may be given beside motion."""
+"""Arguments that may be given beside the motion."""
 
 Vectors = Mapping[str, Numbers]
-"""Some of them, by name."""
+"""Vectors given beside the motion, by name."""
 NONE: Vectors = {}
 
 
 class Moved(Protocol):
-    """Tables that tell by how much the memory of a call grows."""
+    """Tables that say by how much the memory of a call grows."""
 
     @property
     def moved(self) -> int:
@@ -64,21 +64,21 @@ Tables = TypeVar("Tables", bound=Moved)
 
 
 OwnNumbers = tuple[TreeArrays, Numbers]
-"""A tree's numbers, and where each stands among these and those of formulas."""
+"""Numbers of a tree, and the place of each among these and those of formulas."""
 
 
 class Asked(NamedTuple, Generic[Tables]):
-    """What a call computes with: constants, the tree's numbers, motion (n, samples) each."""
+    """Data that a call computes with: constants, the tree's numbers, motion (n, samples) each."""
 
     xp: Namespace
     tables: Tables
     numbers: TreeArrays
     motion: Sequence[Numbers]
     vectors: Vectors
-    """(3, 1, samples) each."""
+    """Vectors beside the motion, (3, 1, samples) each."""
 
     def some(self, samples: slice) -> "Asked[Tables]":
-        """The same for some of the samples; of a number that all share there is one."""
+        """Return the data for some of the samples; numbers that all samples share are kept."""
         numbers = (a[..., samples] if a.shape[-1] > 1 else a for a in self.numbers)
         vectors = {name: a[..., samples] for name, a in self.vectors.items()}
         motion = [a[:, samples] for a in self.motion]
@@ -89,22 +89,22 @@ OnFrames = Asked[FrameTables]
 
 
 def _frame(at: OnFrames, from_world: bool = False) -> Carried:
-    """The frame, or all of them."""
+    """Return the place of the frame asked for, or of all frames."""
     return carried(at.xp, at.tables, at.numbers, at.numbers.offsets, at.motion[0], from_world)
 
 
 def _centres(at: OnFrames, from_world: bool = False) -> Carried:
-    """Centres of mass of the links."""
+    """Return the places of the links' centres of mass."""
     return carried(at.xp, at.tables, at.numbers, at.numbers.centres, at.motion[0], from_world)
 
 
 def _place(at: OnFrames, found: Carried) -> Numbers:
-    """Where the point is, the frame's origin unless given."""
+    """Return the place of the point, the frame's origin unless given."""
     return point_at(found, at.vectors.get("point"))
 
 
 def _moving(at: OnFrames, found: Carried) -> Twists:
-    """Motion of the joints."""
+    """Return the motion of the joints."""
     qd, *qdd = at.motion[1:]
     return moving(at.xp, at.tables, at.numbers, found, qd, qdd[0] if qdd else None)
 
@@ -171,16 +171,19 @@ ANSWERS: Mapping[str, Callable[[OnFrames], Numbers]] = {
     "centre_of_mass_jacobian": _centre_jacobian,
     "centre_of_mass_jacobian_rate": _centre_jacobian_rate,
 }
-"""Rows of the table by their names; samples are the last axis."""
+"""Functions for the rows of the table by their names; samples are the last axis."""
 
 
 class FrameAnswers:
-    """The calls of one back end; tables are made when first asked for, for each dtype and device."""
+    """Calls on frames on one back end; tables are made when first needed, for each dtype and device."""
 
     def __init__(
         self, engine: PackedEngine, tree: JointTree, numbers: Callable[[OwnNumbers, Numbers], TreeArrays]
     ) -> None:
-        """numbers: the tree's for the parameters and the bodies, to compute with some positions."""
+        """Set up the calls.
+
+        numbers: returns the tree's numbers for the parameters and the bodies, to compute with some positions
+        """
         self.engine, self.tree, self._numbers = engine, tree, numbers
         self.names = tuple(frame.name for frame in self.tree.frames)
         self._own: dict[object, OwnNumbers] = {}
@@ -188,13 +191,13 @@ class FrameAnswers:
         self._shapes = answer_shapes(engine.structure, len(self.names))
 
     def shape(self, call: str) -> tuple[int, ...]:
-        """Of a call's answer for one sample."""
+        """Return the shape of a call's answer for one sample."""
         return self._shapes[f"kinematics.{call}"][0]
 
     def answer(
         self, call: str, motion: Sequence[Numbers], part: object = ALL, vectors: Vectors = NONE
     ) -> Numbers:
-        """Answer (..., *shape) to motion and vectors in one shape of samples.
+        """Return the answer (..., *shape) to motion and vectors in one shape of samples.
 
         part: a frame by its number, all of them, or the links
         """
@@ -217,7 +220,7 @@ class FrameAnswers:
         motion: Sequence[Numbers],
         vectors: Vectors = NONE,
     ) -> Asked[Tables]:
-        """Constants, numbers and motion with samples innermost.
+        """Return the constants, numbers and motion of a call, with samples innermost.
 
         tables: those of parts, for each dtype and device; listed: makes the one of a part, in float64
         """
@@ -247,7 +250,7 @@ def in_pieces(
     answer: Callable[[Asked[Tables]], Numbers],
     count: int,
 ) -> Numbers:
-    """Answers (samples, count), as many samples at once as the back end wants."""
+    """Return answers (samples, count), computed for as many samples at once as the back end wants."""
     xp, samples = at.xp, at.motion[0].shape[1]
     size = engine.chunk(motion, max(16, CACHE // (motion[0].itemsize * (NUMBERS * at.tables.moved + count))))
     if size is None or samples <= size:
@@ -261,14 +264,17 @@ def in_pieces(
 
 
 def vectors_beside(given: Mapping[str, object], prefix: str = "") -> dict[str, Beside]:
-    """Vectors that are to be read beside motion, those away that are None; prefix: before their names."""
+    """Return the vectors that are to be read beside motion, without those that are None.
+
+    prefix: put before their names
+    """
     return {prefix + name: Beside(a, (3,), VECTORS[name]) for name, a in given.items() if a is not None}
 
 
 def frame_index(given: object, frames: Sequence[str]) -> int:
-    """Index among `frames` of one by its name, or by that index itself: the number that C has for it too.
+    """Return the index among `frames` of a frame given by its name, or by that index, as in C.
 
-    Raises ValueError for one that is not there, TypeError for what is neither a name nor a number.
+    Raises ValueError for one that does not exist, TypeError for what is neither a name nor a number.
     """
     if isinstance(given, str):
         if (name := known_as(given, frames)) is not None:

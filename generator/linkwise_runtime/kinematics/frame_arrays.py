@@ -5,10 +5,10 @@ hinge o of a path. For a point at x, seen from o,
 
     J_f = (z, s + z x x)      dJ_f/dt = (zd, sd + zd x x + z x xd)      xd = v + omega x x
 
-and of the centre of mass, with m_f and h_f the sums of m_j / m and of m_j c_j / m over the links j that joint
-f moves, J_f = m_f s + z x h_f and dJ_f/dt = m_f sd + zd x h_f + z x hd_f.
+and for the centre of mass, with m_f and h_f the sums of m_j / m and of m_j c_j / m over the links j that
+joint f moves, J_f = m_f s + z x h_f and dJ_f/dt = m_f sd + zd x h_f + z x hd_f.
 
-A force F and a moment M on a point ask joint f for -J_f^T (M, F) = -(z . M + (s + z x x) . F).
+A force F and a moment M on a point require of joint f the torque -J_f^T (M, F) = -(z . M + (s + z x x) . F).
 """
 
 from collections.abc import Sequence
@@ -37,23 +37,24 @@ from ..rule.tree_arrays import TreeArrays
 
 
 class FrameTables(NamedTuple):
-    """Constants of some frames and of the joints before them; behind all joints stands the ground."""
+    """Constants of some frames and of the joints that carry them; the ground stands behind all joints."""
 
     joints: KinematicTables
     from_world: KinematicTables
-    """The same, with places counted from the world's origin instead of the first hinge of a path."""
+    """Tables with places counted from the world's origin instead of the first hinge of a path."""
     chosen: Numbers
-    """Which of the tree's joints these are, and its ground."""
+    """Indices of these joints among the tree's, and that of its ground."""
     carriers: Numbers
-    """Of each frame, which of these joints moves it."""
+    """Index of the joint that moves each frame, among these."""
     frames: Numbers
-    """Which of the tree's frames these are."""
+    """Indices of these frames among the tree's."""
     rotations: Numbers
-    """From the axes of each frame to those of its carrier, (3, 3, frames, 1)."""
+    """Rotations from the axes of each frame to those of its carrier, (3, 3, frames, 1)."""
     columns: tuple[Numbers, ...]
-    """Joints of each coordinate, the first of each, then the second of each, ...; the ground for none."""
+    """Joints of each coordinate, the first of each, then the second of each, ...; the ground where there is
+    none."""
     carried: Numbers
-    """(joints, frames): ones where a joint moves a frame."""
+    """Matrix (joints, frames) with ones where a joint moves a frame."""
 
     @property
     def moved(self) -> int:
@@ -62,14 +63,14 @@ class FrameTables(NamedTuple):
 
 
 def frame_tables(tree: JointTree, n: int, frames: Sequence[int]) -> FrameTables:
-    """Tables of some of a tree's frames, in float64."""
+    """Return the tables of some of a tree's frames, in float64."""
     some = [tree.frames[f] for f in frames]
     rotations = np.array([frame.rotation for frame in some])
     return _tables(tree, n, [frame.joint for frame in some], frames, rotations)
 
 
 def link_tables(tree: JointTree, n: int) -> FrameTables:
-    """Tables of all links, whose frames are those of their joints."""
+    """Return the tables of all links, whose frames are those of their joints."""
     links = tree.links
     rotations = np.array([np.eye(3)] * len(links))
     return _tables(tree, n, [link.joint for link in links], range(len(links)), rotations)
@@ -86,7 +87,7 @@ def _tables(
     chosen = sorted({joint for chain in chains for joint in chain})
     at = {joint: position for position, joint in enumerate(chosen)}
     joints = tuple(
-        joint._replace(parent=None if joint.parent is None else at[joint.parent])
+        replace(joint, parent=None if joint.parent is None else at[joint.parent])
         for joint in (tree.joints[f] for f in chosen)
     )
     part, ground = kinematic_tables(replace(tree, joints=joints)), len(chosen)
@@ -114,13 +115,13 @@ def _columns(coordinates: Sequence[int], n: int) -> Sequence[NDArray[np.intp]]:
 
 
 class Carried(NamedTuple):
-    """Joints where they are, and frames on them."""
+    """Poses of the joints, and of frames on them."""
 
     joints: Poses
     axes: Numbers
-    """Of the frames, (3, 3, frames, samples): [component, axis]."""
+    """Axes of the frames, (3, 3, frames, samples): [component, axis]."""
     places: Numbers
-    """Of their origins, (3, frames, samples)."""
+    """Origins of the frames, (3, frames, samples)."""
 
 
 def carried(
@@ -131,10 +132,10 @@ def carried(
     q: Numbers,
     from_world: bool = False,
 ) -> Carried:
-    """Forward kinematics of frames.
+    """Return the poses of frames, by forward kinematics.
 
-    offsets: of all the tree's frames, or links, in the axes of their carriers, (3, count, samples); q: (n,
-    samples); from_world: whether places are counted from the world's origin
+    offsets: those of all the tree's frames, or links, in the axes of their carriers, (3, count, samples); q:
+    (n, samples); from_world: whether places are counted from the world's origin
     """
     joints = tables.from_world if from_world else tables.joints
     placed = poses(xp, joints, taken(numbers.translations, tables.chosen), taken(q, joints.coordinates))
@@ -144,19 +145,19 @@ def carried(
 
 
 def point_at(found: Carried, point: Numbers | None) -> Numbers:
-    """Where points (3, frames, samples) are, which are given in the axes of the frames."""
+    """Return the places of points (3, frames, samples), which are given in the axes of the frames."""
     return found.places if point is None else found.places + turned(found.axes, point)
 
 
 def homogeneous(xp: Namespace, found: Carried) -> Numbers:
-    """Matrices (4, 4, frames, samples) from the frames' coordinates to the world's."""
+    """Return matrices (4, 4, frames, samples) from the frames' coordinates to the world's."""
     upper = xp.concat([found.axes, found.places[:, None]], 1)
     zero = xp.zeros_like(upper[:1, :1])
     return xp.concat([upper, xp.concat([zero, zero, zero, zero + 1.0], 1)], 0)
 
 
 def jacobian(xp: Namespace, tables: FrameTables, found: Carried, x: Numbers) -> Numbers:
-    """Of a point at x (3, 1, samples) of one frame, (6, n, samples)."""
+    """Return the Jacobian (6, n, samples) of a point at x (3, 1, samples) of one frame."""
     screws = joint_screws(xp, tables.joints, found.joints)
     z, s = screws[:, 0], screws[:, 1]
     return by_coordinate(tables, xp.concat([z[:3], s[:3] + cross(z, around(xp, x))], 0))
@@ -165,9 +166,9 @@ def jacobian(xp: Namespace, tables: FrameTables, found: Carried, x: Numbers) -> 
 def load_torque(
     xp: Namespace, tables: FrameTables, found: Carried, x: Numbers, force: Numbers, moment: Numbers | None
 ) -> Numbers:
-    """What a force, and a moment or None, (3, 1, samples) each, on a point at x ask of coordinates.
+    """Return the torques (n, samples) that a load on a point at x of one frame requires of the coordinates.
 
-    Of one frame, (n, samples).
+    force, moment: (3, 1, samples) each, or None for no moment
     """
     screws = joint_screws(xp, tables.joints, found.joints)
     z, s = screws[:, 0], screws[:, 1]
@@ -185,7 +186,7 @@ def moving(
     qd: Numbers,
     qdd: Numbers | None = None,
 ) -> Twists:
-    """Screws and motion of the joints, without gravity; qd, qdd: (n, samples), no qdd for none."""
+    """Return the screws and motion of the joints, without gravity; qd, qdd: (n, samples), no qdd for none."""
     joints = tables.joints
     velocity = taken(qd, joints.coordinates)
     acceleration = 0.0 * velocity if qdd is None else taken(qdd, joints.coordinates)
@@ -193,7 +194,7 @@ def moving(
 
 
 def jacobian_rate(xp: Namespace, tables: FrameTables, moved: Twists, x: Numbers) -> Numbers:
-    """Rate of `jacobian`, (6, n, samples)."""
+    """Return the rate of `jacobian`, (6, n, samples)."""
     zd, sd = moved.rates[:, 0], moved.rates[:, 1]
     xd = point_velocity(xp, of_frames(tables, moved.twists), x)
     linear = sd[:3] + cross(zd, around(xp, x)) + cross(moved.screws[:, 0], around(xp, xd))
@@ -201,13 +202,13 @@ def jacobian_rate(xp: Namespace, tables: FrameTables, moved: Twists, x: Numbers)
 
 
 def velocity_of(xp: Namespace, tables: FrameTables, moved: Twists, x: Numbers) -> Numbers:
-    """(omega, xd) of points, (6, frames, samples)."""
+    """Return (omega, xd) of points, (6, frames, samples)."""
     twist = of_frames(tables, moved.twists)
     return xp.concat([twist[:3, 0], point_velocity(xp, twist, x)], 0)
 
 
 def acceleration_of(xp: Namespace, tables: FrameTables, moved: Twists, x: Numbers) -> Numbers:
-    """(alpha, xdd) of points, (6, frames, samples): xdd = a + alpha x x + omega x xd."""
+    """Return (alpha, xdd) of points, (6, frames, samples): xdd = a + alpha x x + omega x xd."""
     twist, change = (of_frames(tables, a) for a in (moved.twists, moved.accelerations))
     xd = around(xp, point_velocity(xp, twist, x))
     linear = change[:3, 1] + cross(change[:, 0], around(xp, x)) + cross(twist[:, 0], xd)
@@ -215,12 +216,12 @@ def acceleration_of(xp: Namespace, tables: FrameTables, moved: Twists, x: Number
 
 
 def centre_of_mass(masses: Numbers, found: Carried) -> Numbers:
-    """Of all links, (3, samples)."""
+    """Return the centre of mass of all links, (3, samples)."""
     return (_shares(masses) * found.places).sum(1)
 
 
 def centre_jacobian(xp: Namespace, tables: FrameTables, masses: Numbers, found: Carried) -> Numbers:
-    """Jacobian of the centre of mass, (3, n, samples)."""
+    """Return the Jacobian of the centre of mass, (3, n, samples)."""
     screws = joint_screws(xp, tables.joints, found.joints)
     mass, moment = _behind(tables, masses, found.places)
     return by_coordinate(tables, mass * screws[:3, 1] + cross(screws[:, 0], around(xp, moment)))
@@ -229,7 +230,7 @@ def centre_jacobian(xp: Namespace, tables: FrameTables, masses: Numbers, found: 
 def centre_jacobian_rate(
     xp: Namespace, tables: FrameTables, masses: Numbers, found: Carried, moved: Twists
 ) -> Numbers:
-    """Its rate, (3, n, samples)."""
+    """Return the rate of `centre_jacobian`, (3, n, samples)."""
     speeds = point_velocity(xp, of_frames(tables, moved.twists), found.places)
     mass, moment = _behind(tables, masses, found.places)
     change = around(xp, _behind(tables, masses, speeds)[1])
@@ -239,33 +240,33 @@ def centre_jacobian_rate(
 
 
 def _shares(masses: Numbers) -> Numbers:
-    """m_j / m, (N, samples)."""
+    """Return the shares of the mass, m_j / m, (N, samples)."""
     return masses / masses.sum(0)
 
 
 def _behind(tables: FrameTables, masses: Numbers, vectors: Numbers) -> tuple[Numbers, Numbers]:
-    """Sums over the links that each joint moves: of their shares m_j / m, and of these times vectors."""
+    """Return sums over the links that each joint moves: of shares m_j / m, and of these times vectors."""
     shares = _shares(masses)
     return tables.carried @ shares, tables.carried @ (shares * vectors)
 
 
 def of_frames(tables: FrameTables, twists: Numbers) -> Numbers:
-    """Those of the joints that carry the frames."""
+    """Return the twists of the joints that carry the frames."""
     return taken(twists, tables.carriers)
 
 
 def point_velocity(xp: Namespace, twist: Numbers, x: Numbers) -> Numbers:
-    """v + omega x x."""
+    """Return the velocity of a point at x, v + omega x x."""
     return twist[:3, 1] + cross(twist[:, 0], around(xp, x))
 
 
 def turned(axes: Numbers, vector: Numbers) -> Numbers:
-    """Matrices (3, 3, ...) times vectors (3, ...)."""
+    """Return matrices (3, 3, ...) times vectors (3, ...)."""
     return axes[:, 0] * vector[0] + axes[:, 1] * vector[1] + axes[:, 2] * vector[2]
 
 
 def by_coordinate(tables: FrameTables, columns: Numbers) -> Numbers:
-    """Columns (..., joints, samples) summed over the joints of each coordinate, (..., n, samples)."""
+    """Return columns (..., joints, samples) summed over the joints of each coordinate, (..., n, samples)."""
     first, *others = tables.columns
     total = taken(columns, first)
     for joints in others:

@@ -1,4 +1,4 @@
-"""The kinematics of a robot's frames: where they are, how they move, and what moves the centre of mass."""
+"""Kinematics of a robot's frames: poses, velocities and accelerations, and those of the centre of mass."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from operator import attrgetter
@@ -11,39 +11,39 @@ from .frame_answers import ALL, LINKS, FrameAnswers, frame_index, vectors_beside
 
 
 class FramesEngine(Library, Protocol):
-    """A back end that answers for frames."""
+    """A back end that answers calls on frames."""
 
     @property
     def frames(self) -> FrameAnswers:
-        """Its answers; raises ValueError for links of energies."""
+        """Answers of the calls on frames; raises ValueError for links given by energies."""
 
     def read_beside_motion(self) -> Iterable[object]:
-        """Arrays or tensors that results hang on, beside the motion."""
+        """Return the arrays or tensors, beside the motion, that results depend on."""
 
 
 class FramedRobot(Protocol):
-    """What kinematics ask of a robot."""
+    """Part of a robot that `Kinematics` needs."""
 
     @property
     def door(self) -> Door[FramesEngine]:
-        """Where motion comes in."""
+        """Entry at which motion is read."""
 
 
 class Kinematics(Generic[Array]):
     """Poses, Jacobians and their rates of a robot's frames; `Dynamics.kinematics` of any back end.
 
     A frame is a body of the robot's file, also one that was merged into another, stands on the ground or has
-    no mass, or a site of it. It is given by its name, or by its number in `frames`, which is that of `poses`
+    no mass, or a site in it. It is given by its name, or by its number in `frames`, which is that of `poses`
     and of C too, and not a link's j; its axes are the file's.
 
     q, qd, qdd, batches and `out` are as for `Dynamics`. Answers are in the world's axes, which are those of
     the file's root with a fixed base, in m, rad and s, of the motion's kind and dtype. Gradients flow through
     motion, points, parameters and bodies.
 
-    point: of the frame, in its axes and in m, shape (3,) or (..., 3); its origin unless given
+    point: point of the frame, in its axes and in m, shape (3,) or (..., 3); its origin unless given
 
-    Every call raises ValueError for a frame that is not there, or a wrong shape, and TypeError for what
-    cannot be taken without a doubt.
+    Every call raises ValueError for a frame that does not exist, or a wrong shape, and TypeError for an
+    argument that cannot be read without ambiguity.
     """
 
     frames: tuple[str, ...]
@@ -53,26 +53,26 @@ class Kinematics(Generic[Array]):
         self._robot, self.frames = robot, frames
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled or copied, they are those of the robot, which is copied with them."""
+        """Return what gets these kinematics again from the robot, which is copied with them."""
         return attrgetter("kinematics"), (self._robot,)
 
     def __repr__(self) -> str:
         return f"<kinematics of {len(self.frames)} frames>"
 
     def pose(self, q: Array, frame: str | int, out: Array | None = None) -> Array:
-        """Homogeneous matrix from the frame's coordinates to the world's, shape (..., 4, 4)."""
+        """Return the homogeneous matrix from the frame's coordinates to the world's, shape (..., 4, 4)."""
         pose: Array = self._answer("pose", (q,), self._index(frame), {}, out)
         return pose
 
     def poses(self, q: Array, out: Array | None = None) -> Array:
-        """Those of all F frames, in the order of `frames`, shape (..., F, 4, 4)."""
+        """Return the matrices `pose` of all F frames, in the order of `frames`, shape (..., F, 4, 4)."""
         poses: Array = self._answer("poses", (q,), ALL, {}, out)
         return poses
 
     def jacobian(
         self, q: Array, frame: str | int, point: Array | None = None, out: Array | None = None
     ) -> Array:
-        """J of shape (..., 6, n): J qd is the frame's angular velocity, then the point's velocity.
+        """Return J of shape (..., 6, n): J qd is the frame's angular velocity, then the point's velocity.
 
         A moment n and a force f on the point, in the world's axes, load the joints with J^T (n, f).
         """
@@ -89,12 +89,13 @@ class Kinematics(Generic[Array]):
         at: Array | None = None,
         out: Array | None = None,
     ) -> Array:
-        """What a load adds to the torque that joints need, -J^T (moment, force), shape (..., n), N m (N).
+        """Return the torque that a load adds to that of the joints, -J^T (moment, force), (..., n), N m (N).
 
-        A force from below that bears the robot relieves its joints. Add it to `inverse_dynamics`.
+        A force from below that supports the robot relieves its joints. Add the torque to `inverse_dynamics`.
 
         force, moment: on the frame, in the world's axes, N and N m, (3,) or (..., 3); no moment unless given
-        point: where the force acts, in the frame; at: the same in the world, as of a centre of pressure
+        point: where the force acts, in the frame; at: where it acts in the world, such as a centre of
+        pressure
         """
         check_load(force, point, at)
         beside = {"force": force, "moment": moment, "point": point, "at": at}
@@ -104,14 +105,14 @@ class Kinematics(Generic[Array]):
     def jacobian_rate(
         self, q: Array, qd: Array, frame: str | int, point: Array | None = None, out: Array | None = None
     ) -> Array:
-        """Rate dJ/dt, of a point that stays where it is in the frame, shape (..., 6, n)."""
+        """Return the rate dJ/dt, for a point that is fixed in the frame, shape (..., 6, n)."""
         rate: Array = self._answer("jacobian_rate", (q, qd), self._index(frame), {"point": point}, out)
         return rate
 
     def velocity(
         self, q: Array, qd: Array, frame: str | int, point: Array | None = None, out: Array | None = None
     ) -> Array:
-        """Angular velocity of the frame in rad/s, then velocity of the point in m/s: J qd, shape (..., 6)."""
+        """Return J qd (..., 6): the frame's angular velocity in rad/s, then the point's velocity in m/s."""
         velocity: Array = self._answer("velocity", (q, qd), self._index(frame), {"point": point}, out)
         return velocity
 
@@ -124,24 +125,24 @@ class Kinematics(Generic[Array]):
         point: Array | None = None,
         out: Array | None = None,
     ) -> Array:
-        """Their rates, J qdd + dJ/dt qd, without gravity, shape (..., 6)."""
+        """Return J qdd + dJ/dt qd (..., 6), the rate of `velocity` without gravity, in rad/s^2 and m/s^2."""
         acceleration: Array = self._answer(
             "acceleration", (q, qd, qdd), self._index(frame), {"point": point}, out
         )
         return acceleration
 
     def centre_of_mass(self, q: Array, out: Array | None = None) -> Array:
-        """Of all moving links, in the world, shape (..., 3)."""
+        """Return the centre of mass of all moving links, in the world, shape (..., 3), in m."""
         centre: Array = self._answer("centre_of_mass", (q,), LINKS, {}, out)
         return centre
 
     def centre_of_mass_jacobian(self, q: Array, out: Array | None = None) -> Array:
-        """Its Jacobian, shape (..., 3, n)."""
+        """Return the Jacobian of the centre of mass, shape (..., 3, n)."""
         jacobian: Array = self._answer("centre_of_mass_jacobian", (q,), LINKS, {}, out)
         return jacobian
 
     def centre_of_mass_jacobian_rate(self, q: Array, qd: Array, out: Array | None = None) -> Array:
-        """Rate of that, shape (..., 3, n)."""
+        """Return the rate of the centre of mass's Jacobian, shape (..., 3, n)."""
         rate: Array = self._answer("centre_of_mass_jacobian_rate", (q, qd), LINKS, {}, out)
         return rate
 

@@ -1,4 +1,4 @@
-"""Lagrangians differentiated by torch."""
+"""The back end that differentiates Lagrangians by torch."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, cast
@@ -25,9 +25,10 @@ AT_A_TIME = 1 << 16
 
 
 class AutogradBackend(TorchBackend):
-    """Partial torques and coefficients by differentiating each link's Lagrangian.
+    """Back end that gets partial torques and coefficients by differentiating each link's Lagrangian.
 
-    modules: of the links, in the order of j; given: the run-time parameters, which these share
+    modules: modules of the links, in the order of j
+    given: the run-time parameters, which the modules share
     """
 
     name: ClassVar = "autograd"
@@ -45,7 +46,7 @@ class AutogradBackend(TorchBackend):
         self.parameters = cast("Mapping[str, Any]", given)
 
     def read_beside_motion(self) -> Iterable[Tensor]:
-        """All tensors that the energies hang on, beside the motion: constants of links too."""
+        """Return all tensors, besides the motion, that the energies depend on: constants of links too."""
         sources: dict[int, torch.nn.Module] = {id(self.given): self.given}
         for link in self.modules:
             at: Energies | None = link
@@ -55,12 +56,12 @@ class AutogradBackend(TorchBackend):
         return numbers_of(tuple(sources.values()))
 
     def seen_by(self, q: Tensor) -> Parameters:
-        """Parameters and constants as a call computes with them."""
+        """Return the parameters and constants as a call computes with them."""
         wanted = torch.is_grad_enabled() and any(t.requires_grad for t in self.read_beside_motion())
         return Parameters(self._values(q), q[..., 0], wanted)
 
     def tree_numbers(self, own: tuple[TreeArrays, Numbers], q: Numbers) -> TreeArrays:
-        """The tree's numbers, those in place of its own that the modules of the links have."""
+        """Return the tree's numbers, with those that the links' modules hold in place of its own."""
         numbers = super().tree_numbers(own, q)
         translations, masses, centres = (list(cast(Tensor, a).unbind(-2)) for a in numbers[1:4])
         like = cast(Tensor, q)
@@ -76,40 +77,40 @@ class AutogradBackend(TorchBackend):
         return numbers._replace(**dict(zip(("translations", "masses", "centres"), found, strict=True)))
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
+        """Return c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         parts: Sequence[Tensor] = self._of_links((decomposition, decomposition_followed), q, qd, qdd)
         return parts
 
     def torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
-        """tau (..., count) in the order of `Layout.torque`."""
+        """Return tau (..., count) in the order of `Layout.torque`."""
         tau: Tensor = self._of_links((torque, torque_followed), q, qd, qdd)
         return tau
 
     def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
-        """c0 (..., count) in the order of `Layout.velocity`."""
+        """Return c0 (..., count) in the order of `Layout.velocity`."""
         c0: Tensor = self._of_links((position_gradient, position_gradient_followed), q, qd, qdd)
         return c0
 
     def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
-        """Kinetic and potential energies of the links in J, (..., N) each."""
+        """Return the kinetic and potential energies of the links in J, (..., N) each."""
         at = cast(Tensor, q)
         kinetic, potential = energies(tuple(self.modules), at, cast(Tensor, qd), self.seen_by(at))
         return kinetic.movedim(0, -1), potential.movedim(0, -1)
 
     def graph(self, *asked: Any) -> Any:
-        """See `Dynamics.graph`."""
+        """Return the graph of a torque, see `Dynamics.graph`."""
         return graph_of(self, *asked)
 
     def graph_parts(self, *asked: Any) -> Any:
-        """See `Dynamics.graph_parts`."""
+        """Return the graphs of a torque's parts, see `Dynamics.graph_parts`."""
         return graph_parts_of(self, *asked)
 
     def _of_links(self, calls: tuple[Call, Call], *motion: Numbers) -> Any:
-        """What a function of sweeps.py makes of the Lagrangians, or its like where the call is followed."""
+        """Return the result of a function of sweeps.py, or of its counterpart inside a transformation."""
         links, (sweep, followed) = tuple(self.modules), calls
         q, qd, qdd = cast("tuple[Tensor, Tensor, Tensor]", motion)
         if torch.compiler.is_exporting():
-            # It records sweeps as they run, for any number of samples, but no torch.func within another.
+            # Export records sweeps as they run, for any number of samples, but no nested torch.func.
             return sweep(links, self.seen_by(q), q, qd, qdd)
         if transformed():
             return followed(links, self.seen_by(q), q, qd, qdd)
@@ -124,13 +125,13 @@ class AutogradBackend(TorchBackend):
 
 
 def _side_by_side(rows: Sequence[Tensor]) -> Tensor:
-    """Tensors (..., samples) as one of shape (..., rows, samples); of one sample is what all share."""
+    """Stack tensors (..., samples) to (..., rows, samples); a tensor of one sample counts for all samples."""
     samples = max(row.shape[-1] for row in rows)
     return torch.stack([row.expand(*row.shape[:-1], samples) for row in rows], -2)
 
 
 def _in_pieces(call: Callable[..., Any], p: Parameters, motion: Sequence[Tensor], most: int) -> Any:
-    """What `call` makes of all samples, so many at a time."""
+    """Return the results of `call` for all samples, computed for at most `most` samples at a time."""
     batch = motion[0].shape[:-1]
     flat = [a.reshape(-1, a.shape[-1]) for a in motion]
     values = {name: v.expand(batch).reshape(-1) if v.dim() else v for name, v in p.items()}

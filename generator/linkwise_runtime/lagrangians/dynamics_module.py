@@ -1,4 +1,4 @@
-"""A robot whose links are torch modules, itself one."""
+"""A robot whose links are torch modules, and which is a torch module itself."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar
@@ -17,16 +17,16 @@ from .link_modules import LinkModules, links_and_values
 from .partial_lagrangian import PartialLagrangian
 
 MADE_ANEW = ("structure", "backend", "layout", "_load", "_asked", "door", "kinematics", "constraints")
-"""What a copy does not take over: it has its own."""
+"""Attributes that a copy does not take over: it has its own."""
 
 
 class DynamicsModule(Dynamics, torch.nn.Module):
     """`Dynamics` as an nn.Module: robot(q, qd, qdd) is `partial_torque`, links[j] is the module of link j.
 
     A state_dict holds the numbers of each link as links.NAME.mass and so on, and run-time parameters as
-    values.NAME. What is changed there, or by `load_state_dict`, counts from the next call on. Calls compute
-    in the motion's dtype and on its device, wherever the modules are. Hooks see robot(q, qd, qdd) and
-    links[j](q, qd); the calls that have names go past them.
+    values.NAME. Changes to these, also by `load_state_dict`, take effect at the next call. Calls compute in
+    the motion's dtype and on its device, wherever the modules are. Hooks run for robot(q, qd, qdd) and
+    links[j](q, qd), but not for the calls that have names.
     """
 
     links: LinkModules
@@ -48,16 +48,16 @@ class DynamicsModule(Dynamics, torch.nn.Module):
         Dynamics.__init__(self, structure, backend, load, asked, check_finite)
 
     def forward(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
-        """tau_ij, shape (..., n, N)."""
+        """Return tau_ij, shape (..., n, N)."""
         return self.partial_torque(q, qd, qdd)
 
     @property
     def parameters(self) -> Any:
-        """Run-time parameters by name; called, as of every nn.Module, the tensors to be learned."""
+        """Run-time parameters by name; when called, as for every nn.Module, the tensors to be learned."""
         return _Parameters(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled, copied or sent to another process, it is loaded again there, with this one's modules."""
+        """Describe how a pickle or a copy is made: the robot is loaded again, with this one's modules."""
         name, _, *asked = self._asked
         state = {key: value for key, value in vars(self).items() if key not in MADE_ANEW}
         return self._load, (name, None, *asked), (state, self.check_finite)
@@ -73,7 +73,7 @@ class DynamicsModule(Dynamics, torch.nn.Module):
 
 
 class BackendOfLinks(AutogradBackend):
-    """The back end of a robot whose links are these modules."""
+    """The back end of a robot whose links are such modules."""
 
     face: ClassVar[Any] = DynamicsModule
 
@@ -85,16 +85,16 @@ def backend_of_links(
     requires_grad: bool | str | Iterable[str] = False,
     rule: RigidRule | None = None,
 ) -> BackendOfLinks:
-    """The back end of one module a link, and these with it; `requires_grad` as the package's `load` says.
+    """Return the back end of one module for each link; `requires_grad` means what it does in `load`.
 
-    rule: that of the package's tree, whose frames are to be known; None for energies
+    rule: rule of the package's tree, which frames need; None for links that are given by their energies
     """
     modules, given = links_and_values(structure, kinds, values, requires_grad)
     return BackendOfLinks(structure, modules, given, rule.tree if rule else None)
 
 
 class _Parameters(Mapping[str, Tensor]):
-    """`parameters` of Dynamics, a mapping, and of nn.Module, a call."""
+    """The attribute `parameters`: a mapping as in Dynamics, and a call as in nn.Module."""
 
     def __init__(self, robot: DynamicsModule) -> None:
         self._robot = robot

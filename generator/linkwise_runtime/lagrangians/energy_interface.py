@@ -1,4 +1,4 @@
-"""What the energies of a link are asked with: coordinates, and the run-time parameters of the robot."""
+"""Arguments of a link's energies: coordinates, and the run-time parameters of the robot."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Protocol
@@ -10,7 +10,7 @@ from torch.utils._python_dispatch import _get_current_dispatch_mode
 from .recording import transformed
 
 Number = Tensor | float
-"""One number for all samples, or a tensor of one value or of one a sample."""
+"""One number for all samples, or a tensor of one value or of one value for each sample."""
 Nested = Number | Sequence["Nested"]
 """A number, or numbers in lists of lists, as `Tensor.tolist` nests them."""
 
@@ -24,9 +24,9 @@ class Values(Protocol):
 class Parameters(Mapping[str, Tensor]):
     """The robot's run-time parameters by name, and constants of links, as one call computes with them.
 
-    like: one value a sample, shape (...), of the call's dtype and device
+    like: one value for each sample, shape (...), of the call's dtype and device
     wanted: whether the call's results may be differentiated by constants
-    learned: constants of links that are seen as these values, nested in lists, and not as what is held
+    learned: values, nested in lists, that constants of links take instead of those that modules hold
     """
 
     def __init__(
@@ -50,9 +50,9 @@ class Parameters(Mapping[str, Tensor]):
         return len(self._values)
 
     def constants(self, module: torch.nn.Module) -> Mapping[str, Any]:
-        """Constants of a link: Python's numbers, nested as they are; tensors where somebody follows them.
+        """Return the constants of a link: Python numbers, nested; tensors where a transformation needs them.
 
-        With numbers, what a zero stands before is left out, so that a shoulder without offset costs nothing.
+        With numbers, a product with zero is left out, so that a shoulder without offset costs nothing.
         """
         if module not in self._constants:
             held = (*module._parameters.items(), *module._buffers.items())
@@ -78,21 +78,21 @@ class Energies(Protocol):
 
     @property
     def linear(self) -> bool:
-        """Whether the kinetic energy has terms linear in the velocities."""
+        """True if the kinetic energy has terms linear in the velocities."""
 
     @property
     def before(self) -> "Energies | None":
-        """The link that carries this one, None where their energies share no work."""
+        """Link that carries this one; None where their energies share no work."""
 
     def kinetic(self, q: Values, qd: Values, p: Parameters) -> Number:
-        """Kinetic energy: a tensor of the coordinates' shape, or one number for all."""
+        """Return the kinetic energy in J: a tensor of the coordinates' shape, or one number for all."""
 
     def potential(self, q: Values, p: Parameters) -> Number:
-        """Potential energy, likewise."""
+        """Return the potential energy in J: a tensor of the coordinates' shape, or one number for all."""
 
 
 def numbers_of(sources: Iterable[torch.nn.Module]) -> Iterator[Tensor]:
-    """Every tensor that these modules hold, their own modules' too."""
+    """Yield every tensor that these modules and their submodules hold."""
     for source in sources:
         for module in source.modules() if source._modules else (source,):
             for held in (module._parameters, module._buffers):

@@ -1,8 +1,9 @@
-"""How a joint moves the frame behind it: vectors of three components, numbers or tensors of all samples.
+"""Motion of the frame behind a joint: vectors of three components, numbers or tensors of all samples.
 
-What is the number 0.0 is always zero, and products with it are left out: a planar arm costs what a planar arm
-costs, and so does a shoulder without offset. Nothing here looks into a tensor. These functions are called for
-every component of every vector, so they ask little, and ask it in place.
+The number 0.0 stands for a component that is always zero, and products with it are left out: a planar arm
+costs no more than its planar formulas do, and a missing shoulder offset costs nothing. Nothing here looks
+into a tensor. These functions are called for every component of every vector, so their checks are few and
+inline.
 """
 
 from collections.abc import Sequence
@@ -15,14 +16,14 @@ from .energy_interface import Number, Values
 Vector = Sequence[Number] | Tensor
 Triple = tuple[Number, Number, Number]
 Signed = tuple[float, Number]
-"""A sign, 1.0 or -1.0, and what it stands before."""
+"""A sign, 1.0 or -1.0, and the number that it belongs to."""
 
 GROUND = (0.0, 0.0, 0.0)
-"""Velocity and angular velocity of what everything hangs on."""
+"""Velocity or angular velocity of the ground, on which everything stands."""
 
 
 class JointCurve:
-    """Polynomials in q - start, each from its start on; the first one holds before its start too.
+    """Piecewise polynomials in q - start, each valid from its start on; the first one before its start too.
 
     pieces: coefficients of powers 0, 1, 2, ... for rad or m
     """
@@ -37,15 +38,15 @@ class JointCurve:
         self._slopes = torch.cat([self._starts[:, None], (filled * torch.arange(size))[:, 1:]], 1)
 
     def __call__(self, q: Tensor) -> Tensor:
-        """What the joint moves by."""
+        """Return the joint's displacement at q."""
         return self._value(q, self._pieces)
 
     def slope(self, q: Tensor) -> Tensor:
-        """How that changes with q."""
+        """Return the derivative of the displacement by q."""
         return self._value(q, self._slopes)
 
     def _value(self, q: Tensor, pieces: Tensor) -> Tensor:
-        """For rows of a start and the coefficients from there on."""
+        """Return the value at q of polynomials, given as rows: a start and the coefficients from there."""
         piece = (q.detach().unsqueeze(-1) >= self._starts[1:].to(q)).sum(-1)
         start, *coefficients = torch.nn.functional.embedding(piece, pieces.to(q)).unbind(-1)
         value = coefficients[-1]
@@ -64,30 +65,30 @@ class Axes:
         self._picked = along if len(along) == 3 else None
 
     def turn(self, q: Values, k: int, ratio: float = 1.0, curve: JointCurve | None = None) -> "Turn":
-        """Rᵀ of a joint that turns by ratio · q[k], or that of its curve, about its z axis."""
+        """Return Rᵀ of a joint that turns about its z axis by ratio · q[k], or by ratio · curve(q[k])."""
         return Turn(self, q, k, ratio, curve)
 
     def slide(self, a: Vector) -> Triple:
-        """Rᵀ a of a joint that slides: its axes are always those at q = 0."""
+        """Return Rᵀ a of a prismatic joint: its axes are always those at q = 0."""
         x, y, z = (value if sign > 0.0 else _opposite(value) for sign, value in self.along(a))
         return x, y, z
 
     def along(self, a: Vector) -> Sequence[Signed]:
-        """Components of a along these axes."""
+        """Return the components of a along these axes."""
         if self._picked:
             return [(sign, a[at]) for sign, at in self._picked]
         return [(1.0, _dot(column, a)) for column in self._columns]
 
 
 class Turn:
-    """Rᵀ a of vectors a: from the axes before a joint to those behind it, R = axes · Rz(ratio · q[k])."""
+    """The map Rᵀ of vectors, from the axes before a joint to those behind it: R = axes · Rz(ratio · q[k])."""
 
     def __init__(self, axes: Axes, q: Values, k: int, ratio: float, curve: JointCurve | None) -> None:
         self._axes, self._q, self._k, self._ratio, self._curve = axes, q, k, ratio, curve
         self._sine_and_cosine: tuple[Tensor, Tensor] | None = None
 
     def __call__(self, a: Vector) -> Triple:
-        """The vector in the axes behind the joint."""
+        """Return the vector in the axes behind the joint."""
         (i, x), (k, y), (m, z) = self._axes.along(a)
         if m < 0.0:
             z = _opposite(z)
@@ -97,7 +98,7 @@ class Turn:
         return _two(i, c, x, k, s, y), _two(k, c, y, -i, s, x), z
 
     def _trigonometry(self) -> tuple[Tensor, Tensor]:
-        """Sine and cosine of the angle, once, where they are needed."""
+        """Return sine and cosine of the angle, computed once, when first needed."""
         moved = self._curve(self._q[self._k]) if self._curve else self._q[self._k]
         angle = moved if self._ratio == 1.0 else self._ratio * moved
         self._sine_and_cosine = torch.sin(angle), torch.cos(angle)
@@ -105,13 +106,16 @@ class Turn:
 
 
 def along_z(a: Vector, more: Number) -> Triple:
-    """a + z · more, z the axis of the joint."""
+    """Return a + z · more, z the axis of the joint."""
     x, y, z = a
     return x, y, more if z.__class__ is float and z == 0.0 else z + more
 
 
 def velocity_at(place: Vector, w: Vector, v: Vector) -> Triple:
-    """v + w × p in m/s: of the point p of a body that turns by w in rad/s, and whose origin moves by v."""
+    """Return v + w × p in m/s, the velocity of point p of a body.
+
+    The body turns by w in rad/s, and its origin moves by v in m/s.
+    """
     x, y, z = place
     return (
         _less(_more(v[0], w[1], z), w[2], y),
@@ -121,7 +125,7 @@ def velocity_at(place: Vector, w: Vector, v: Vector) -> Triple:
 
 
 def potential_at(place: Vector, a: Vector, u: Number) -> Number:
-    """u - a·p in m^2/s^2: potential per mass at the point p, with a gravity and u that of the origin."""
+    """Return u - a·p in m^2/s^2, the potential per mass at point p, with gravity a and u at the origin."""
     return _less(_less(_less(u, a[0], place[0]), a[1], place[1]), a[2], place[2])
 
 
@@ -133,7 +137,7 @@ def _dot(column: Sequence[float], a: Vector) -> Number:
 
 
 def _two(i: float, f: Tensor, x: Number, k: float, g: Tensor, y: Number) -> Number:
-    """i f x + k g y with signs i and k."""
+    """Return i f x + k g y with signs i and k."""
     if y.__class__ is float and y == 0.0:
         return f * x if i > 0.0 else -(f * x)
     if x.__class__ is float and x == 0.0:
@@ -144,7 +148,7 @@ def _two(i: float, f: Tensor, x: Number, k: float, g: Tensor, y: Number) -> Numb
 
 
 def _more(value: Number, a: Number, b: Number) -> Number:
-    """value + a b."""
+    """Return value + a b."""
     if (b.__class__ is float and b == 0.0) or (a.__class__ is float and a == 0.0):
         return value
     product = a if b.__class__ is float and b == 1.0 else a * b
@@ -152,7 +156,7 @@ def _more(value: Number, a: Number, b: Number) -> Number:
 
 
 def _less(value: Number, a: Number, b: Number) -> Number:
-    """value - a b."""
+    """Return value - a b."""
     if (b.__class__ is float and b == 0.0) or (a.__class__ is float and a == 0.0):
         return value
     if value.__class__ is float and value == 0.0:

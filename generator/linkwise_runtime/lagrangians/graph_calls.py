@@ -1,4 +1,4 @@
-"""What `Dynamics.graph` and `Dynamics.graph_parts` answer: autograd's graphs, to count and to run."""
+"""Answers to `Dynamics.graph` and `Dynamics.graph_parts`: autograd's graphs, to count and to run."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -25,26 +25,26 @@ ORDERS = "2 for acceleration, 1 for velocity, 0 for position and gravity"
 
 
 class GraphSource(Protocol):
-    """What graphs need of a back end: what checks the motion, the energies, and the parameters' values."""
+    """A back end as graphs need it: it checks the motion, and has the energies and the parameters' values."""
 
     structure: Structure
     given: RunTimeValues
 
     @property
     def modules(self) -> Iterable[Energies]:
-        """The links', themselves one module."""
+        """Modules of the links, together one module."""
 
     def arrays(self, named: Mapping[str, object], n: int) -> Sequence[Numbers]:
-        """The motion, checked and broadcast to a common shape (..., n)."""
+        """Return the motion, checked and broadcast to a common shape (..., n)."""
 
     def _values(self, q: Tensor) -> Mapping[str, Tensor]: ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TorqueGraph:
-    """Operations of torch, and the motions and parameters that they start from, up to a torque in N m or N.
+    """Torch operations, and the motions and parameters that they start from, up to a torque in N m or N.
 
-    Keys of leaves and operations are the same in every graph, so that graphs can be laid over each other.
+    Keys of leaves and operations are the same in every graph, so that graphs can be compared node by node.
     """
 
     joint: str
@@ -58,14 +58,14 @@ class TorqueGraph:
     leaves: tuple[Leaf, ...]
     """Motions and parameters that are connected with the torque."""
     operations: tuple[Operation, ...]
-    """Operands first."""
+    """Operations, each after its operands."""
     output: str | float
-    """Key of the torque; a number where it is constant, 0.0 above all."""
+    """Key of the torque; a number where the torque is constant, usually 0.0."""
     backend: GraphSource
-    """What checks the motion and has the parameters' values."""
+    """Back end that checks the motion and has the parameters' values."""
 
     def __repr__(self) -> str:
-        """Which torque or part of it, and how large; the operations themselves are in `operations`."""
+        """Return which torque or part of it this is, and its size; the operations are in `operations`."""
         words = {None: "motion", 0: "position", 1: "velocity", 2: "acceleration"}
         every = {None: "", 0: ", gravity", 1: ", all velocities", 2: ", all accelerations"}
         part = every[self.order] if self.coordinate is None else f", {words[self.order]} of {self.coordinate}"
@@ -74,7 +74,7 @@ class TorqueGraph:
         return f"<TorqueGraph: torque on {self.joint} through {through}{part}: {sizes}>"
 
     def __copy__(self) -> "TorqueGraph":
-        """Itself: nothing of it can be changed."""
+        """Return the graph itself: nothing of it can be changed."""
         return self
 
     def __reduce_ex__(self, protocol: object) -> NoReturn:
@@ -90,15 +90,15 @@ class TorqueGraph:
 
     @property
     def edges(self) -> tuple[tuple[str, str], ...]:
-        """Keys (operand, operation), one for each time that an operation reads a value."""
+        """Keys (operand, operation), one pair for each time that an operation reads a value."""
         return tuple((operand, node.key) for node in self.operations for operand in node.operands)
 
     def counts(self) -> dict[str, int]:
-        """Number of operations by name, the most frequent first."""
+        """Return the number of operations by name, the most frequent first."""
         return dict(Counter(node.name for node in self.operations).most_common())
 
     def shared_with(self, *others: "TorqueGraph") -> tuple[Operation, ...]:
-        """Operations that are in each of the others too."""
+        """Return the operations that are in each of the other graphs too."""
         for other in others:
             if not isinstance(other, TorqueGraph):
                 raise TypeError(
@@ -108,10 +108,11 @@ class TorqueGraph:
         return tuple(node for node in self.operations if all(node.key in known for known in keys))
 
     def evaluate(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
-        """The torque (...) for a motion (..., n), by these operations alone; gradients flow through it.
+        """Return the torque (...) for a motion (..., n), by these operations alone.
 
-        Motion is what the calls of the robot take, and refused likewise. Parameters, which are leaves, have
-        the values that they have now; all other numbers of the links those of when the graph was made.
+        Gradients pass through them. The motion is checked as in the calls of the robot. Parameters, which
+        are leaves, have the values that they have now; all other numbers of the links those of when the
+        graph was made.
         """
         backend, n = self.backend, self.backend.structure.n
         read = cast("Sequence[Tensor]", backend.arrays({"q": q, "qd": qd, "qdd": qdd}, n))
@@ -156,7 +157,7 @@ class TorqueGraph:
 
 
 def graph_of(backend: GraphSource, i: Name, j: Links, k: Name | None, m: int | None) -> TorqueGraph:
-    """See `Dynamics.graph`."""
+    """Return the graph of a torque, see `Dynamics.graph`."""
     joint, through = _place(backend, i, j)
     order = None if m is None else whole_number(m)
     if order not in (0, 1, 2) and m is not None:
@@ -166,7 +167,7 @@ def graph_of(backend: GraphSource, i: Name, j: Links, k: Name | None, m: int | N
 
 
 def graph_parts_of(backend: GraphSource, i: Name, j: Links) -> tuple[TorqueGraph, ...]:
-    """See `Dynamics.graph_parts`."""
+    """Return the graphs of a torque's parts, see `Dynamics.graph_parts`."""
     joint, through = _place(backend, i, j)
     paths = [path for at in through if joint in (path := backend.structure.paths[at])]
     coordinates = sorted({k for path in paths for k in path})
@@ -192,7 +193,7 @@ def _place(backend: GraphSource, i: Name, j: Links) -> tuple[int, tuple[int, ...
 def _torque_graphs(
     backend: GraphSource, joint: int, through: Sequence[int], parts: Sequence[Part]
 ) -> tuple[TorqueGraph, ...]:
-    """Graphs of parts (k, m) of the torque on a joint through the sum of some links, counted from 0."""
+    """Return graphs of parts (k, m) of the torque on a joint through the sum of some links; all from 0."""
     structure, links = backend.structure, list(backend.modules)
 
     def chosen(values: Mapping[str, Tensor]) -> list[LinkEnergies]:
@@ -220,7 +221,7 @@ def _torque_graphs(
 def _needed(
     recorded: RecordedParts, part: Part
 ) -> tuple[tuple[Leaf, ...], tuple[Operation, ...], str | float]:
-    """Leaves and operations that the value of a part hangs on, and its key, or the number that it is."""
+    """Return the leaves and operations that a part's value depends on, and its key, or a constant value."""
     output = recorded.values[part]
     if not isinstance(output, Ref):
         return (), (), output
@@ -233,13 +234,13 @@ def _needed(
 
 
 def _leaves_beside_motion(backend: GraphSource) -> dict[Leaf, Tensor]:
-    """Leaves that a graph may have, and their values as they are now."""
+    """Return the leaves, other than the motion, that a graph may have, with their present values."""
     given = {Leaf(f"p[{name}]", "parameter", name): value for name, value in backend.given.items()}
     return given | {Leaf(name, "parameter", name): entry for name, entry in _learned_entries(backend).items()}
 
 
 def _learned_entries(backend: GraphSource) -> dict[str, Tensor]:
-    """Numbers of links that are nn.Parameters, as they are now, by names such as links.link2.com[0]."""
+    """Return the present numbers of links that are nn.Parameters, by names such as links.link2.com[0]."""
     return {
         name: entry
         for link, module in _modules(backend)
@@ -250,7 +251,7 @@ def _learned_entries(backend: GraphSource) -> dict[str, Tensor]:
 
 
 def _seen_as_leaves(backend: GraphSource, values: Mapping[str, Tensor]) -> Parameters:
-    """What energies are recorded with: leaves by their keys, and numbers for all that nobody learns."""
+    """Return the parameters for recording energies: leaves by key, and numbers where nothing is learned."""
     learned = {
         module: {
             key: _nested(iter([values[name] for name in _names(link, key, tensor)]), tensor.shape)
@@ -268,11 +269,11 @@ def _modules(backend: GraphSource) -> Iterator[tuple[str, torch.nn.Module]]:
 
 
 def _names(link: str, key: str, tensor: Tensor) -> list[str]:
-    """Name of each entry: that of the tensor in the robot's state_dict, and where the entry stands in it."""
+    """Return a name for each entry: the tensor's in the robot's state_dict, and the entry's place in it."""
     places = product(*map(range, tensor.shape))
     return [f"links.{link}.{key}{list(place) if place else ''}" for place in places]
 
 
 def _nested(entries: Iterator[Tensor], shape: tuple[int, ...]) -> Nested:
-    """Entries in lists of lists, as `Tensor.tolist` nests numbers."""
+    """Return entries in lists of lists, as `Tensor.tolist` nests numbers."""
     return [_nested(entries, shape[1:]) for _ in range(shape[0])] if shape else next(entries)

@@ -1,8 +1,8 @@
 """Many points of a motion side by side, so that one sweep differentiates the Lagrangians of all links.
 
-A lane is one velocity at which one link's energies are looked at, for every sample. Each link has lanes of
+A lane is one velocity at which one link's energies are evaluated, for every sample. Each link has lanes of
 its own, which no other link's energy depends on: the gradient of the sum of all energies then holds the
-gradient of each of them. What a link hands on to those it carries is worked out once, for all their lanes.
+gradient of each of them. What a link passes on to the links it carries is computed once, for all their lanes.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -18,7 +18,7 @@ from torch import Tensor
 Indices = NDArray[np.intp]
 
 NOWHERE = -1
-"""A lane that holds zeros."""
+"""Index of a lane that holds zeros."""
 
 Method = TypeVar("Method", bound=Callable[..., object])
 
@@ -30,9 +30,9 @@ Leaf = Callable[[int, slice], Tensor]
 class Lanes:
     """Values of the coordinates of `path` in some lanes, each made when it is first asked for.
 
-    dim: axes of what has lanes; whatever has fewer is the same in all of them
+    dim: number of axes of a tensor that has lanes; a tensor with fewer axes is the same in all lanes
     parts: how many of the lanes belong to the link itself, and to each branch that it carries
-    whole: the lanes that these are part number `part` of
+    whole: the lanes of which these are part number `part`
     """
 
     rows: slice
@@ -53,7 +53,10 @@ class Lanes:
         return self.variables[k]
 
     def divided(self, state: object) -> Sequence[object]:
-        """Values in all these lanes, nested in tuples, for each part; what has no lanes is every part's."""
+        """Split values in all these lanes, nested in tuples, by part.
+
+        A value without lanes goes to every part.
+        """
         if state.__class__ is tuple:
             columns = [self.divided(value) for value in state]
             return list(zip(*columns, strict=True)) if columns else [()] * len(self.parts)
@@ -64,7 +67,7 @@ class Lanes:
 
 @dataclass(frozen=True, eq=False)
 class SharedValues:
-    """One tensor for each coordinate, shared by all links whose energies are looked at."""
+    """One tensor for each coordinate, shared by all links whose energies are evaluated."""
 
     values: Sequence[Tensor]
     states: dict[Callable[..., object], object] = field(default_factory=dict)
@@ -95,7 +98,7 @@ def carried(function: Method) -> Method:
 
 @dataclass(frozen=True)
 class Plan:
-    """Which lanes are whose: each link's own, `counts` of them, then those of the branches it carries."""
+    """Order of the lanes: each link's own, `counts` of them, then those of the branches it carries."""
 
     paths: tuple[tuple[int, ...], ...]
     parents: tuple[int | None, ...]
@@ -103,12 +106,12 @@ class Plan:
 
     @cached_property
     def lanes(self) -> int:
-        """Lanes of all links together."""
+        """Number of lanes of all links together."""
         return sum(self.counts)
 
     @cached_property
     def totals(self) -> tuple[int, ...]:
-        """Lanes of each link and of what it carries."""
+        """Number of lanes of each link and of all links that it carries."""
         totals = list(self.counts)
         for j, parent in reversed(list(enumerate(self.parents))):
             if parent is not None:
@@ -128,7 +131,7 @@ class Plan:
 
     @cached_property
     def branches(self) -> tuple[tuple[int, ...], ...]:
-        """Links that hang on each link directly."""
+        """Links that each link carries directly."""
         found: list[list[int]] = [[] for _ in self.parents]
         for j, parent in enumerate(self.parents):
             if parent is not None:
@@ -136,7 +139,7 @@ class Plan:
         return tuple(map(tuple, found))
 
     def lay(self, leaf: Leaf, dim: int) -> "Motion":
-        """Lanes of one quantity, q or qd, whose variables `leaf` makes, of `dim` axes."""
+        """Return the lanes of one quantity, q or qd, whose variables, of `dim` axes, `leaf` makes."""
         whole: list[Lanes] = []
         own: list[Lanes] = []
         for j, (path, start, parent) in enumerate(zip(self.paths, self.starts, self.parents, strict=True)):
@@ -150,17 +153,17 @@ class Plan:
 
 @dataclass(frozen=True)
 class Motion:
-    """One quantity in the lanes of every link: each one's `own`, and those with all that it carries."""
+    """One quantity in the lanes of every link: its `own`, and the `whole` with all that it carries."""
 
     own: tuple[Lanes, ...]
     whole: tuple[Lanes, ...]
 
     def places(self) -> Iterator[tuple[int, slice]]:
-        """Coordinate and lanes of each variable."""
+        """Yield coordinate and lanes of each variable."""
         return ((k, lanes.rows) for lanes in (*self.own, *self.whole) for k in lanes.variables)
 
     def variables(self) -> list[Tensor]:
-        """All variables that were asked for, in the order of `places`."""
+        """Return all variables that were asked for, in the order of `places`."""
         return [v for lanes in (*self.own, *self.whole) for v in lanes.variables.values()]
 
 
@@ -177,13 +180,13 @@ class LaneEntries:
 
     @cached_property
     def plan(self) -> Plan:
-        """d lanes of link j at e_k; d + 1 more at rest for its linear terms."""
+        """Plan with d lanes of link j at e_k, and d + 1 more at rest if it has linear terms."""
         counts = (len(path) * (1 + more) + more for path, more in zip(self.paths, self.linear, strict=True))
         return Plan(self.paths, self.parents, tuple(counts))
 
     @cached_property
     def single(self) -> Plan:
-        """One lane for each link."""
+        """Plan with one lane for each link."""
         return Plan(self.paths, self.parents, (1,) * len(self.paths))
 
     @cached_property
@@ -230,7 +233,7 @@ class LaneEntries:
 class Rows:
     """Values in the lanes of variables, by coordinate and lane; zeros where no variable was asked for.
 
-    lanes: how many the plan has, whichever of them an energy asks for
+    lanes: number of lanes of the plan, whichever of them an energy asks for
     """
 
     def __init__(
@@ -254,11 +257,11 @@ class Rows:
             at += rows.stop - rows.start
 
     def __call__(self, k: Indices, lanes: Indices) -> Tensor:
-        """Value of coordinate k[e] in lane lanes[e] for each entry e, shape (entries, ...)."""
+        """Return the value of coordinate k[e] in lane lanes[e] for each entry e, shape (entries, ...)."""
         found = [pick(self.values, table[lanes, k]) for table in self.tables]
         return sum(found[1:], found[0]) if found else pick(self.values, 0 * k)
 
 
 def pick(values: Tensor, rows: Indices) -> Tensor:
-    """Rows of values."""
+    """Return these rows of values."""
     return values.index_select(0, torch.from_numpy(rows).to(values.device))

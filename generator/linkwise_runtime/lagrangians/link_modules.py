@@ -16,7 +16,10 @@ KINDS = ("mass", "com", "inertia", "place")
 
 
 class LinkModules(torch.nn.Module):
-    """links[j] with j from 0, or links["name"]; in a state_dict they have their names, without dots."""
+    """The links' modules: links[j] with j from 0, or links["name"].
+
+    In a state_dict they have their names, without dots.
+    """
 
     def __init__(self, names: Iterable[str], modules: Iterable[PartialLagrangian]) -> None:
         super().__init__()
@@ -26,7 +29,7 @@ class LinkModules(torch.nn.Module):
             self.add_module(key, module)
 
     def __getitem__(self, link: int | str) -> PartialLagrangian:
-        """Raises ValueError for a link that is not there; -1 is the last."""
+        """Return a link's module; -1 is the last link. Raises ValueError for a link that is not there."""
         if isinstance(link, int) and -len(self.names) <= link < 0:
             link += len(self.names)
         link = position_of(link, self.names, "link", "the link")
@@ -45,7 +48,10 @@ def links_and_values(
     values: Mapping[str, object],
     requires_grad: bool | str | Iterable[str],
 ) -> tuple[LinkModules, RunTimeValues]:
-    """One module a link, and what they share; `requires_grad` as the package's `load` says."""
+    """Return one module for each link, and the run-time parameters, which the modules share.
+
+    requires_grad: as in the package's `load`
+    """
     rigid = any(issubclass(kind, RigidLagrangian) for kind in kinds)
     learned = learned_names(requires_grad, values, rigid)
     given, made = RunTimeValues(values, learned), dict[type[PartialLagrangian] | None, PartialLagrangian]()
@@ -57,9 +63,9 @@ def links_and_values(
 
 
 def learned_names(asked: bool | str | Iterable[str], parameters: Iterable[str], rigid: bool) -> set[str]:
-    """Names of constants and run-time parameters that become nn.Parameters.
+    """Return the names of constants and run-time parameters that become nn.Parameters.
 
-    Raises ValueError for a name that is none of them.
+    Raises ValueError for a name that is none of them, and TypeError for anything but names or a bool.
     """
     known = [*(KINDS if rigid else ()), *parameters]
     if isinstance(asked, bool):
@@ -76,7 +82,7 @@ def learned_names(asked: bool | str | Iterable[str], parameters: Iterable[str], 
 def _refuse_idle(
     kinds: Iterable[str], modules: Collection[PartialLagrangian], parameters: Mapping[str, object]
 ) -> None:
-    """Raise ValueError for a kind of constants that no link has, as they hang on run-time parameters."""
+    """Raise ValueError for a kind of constants that no link has, as they depend on run-time parameters."""
     for kind in sorted(kinds):
         if not any(kind in module._parameters for module in modules):
             raise ValueError(

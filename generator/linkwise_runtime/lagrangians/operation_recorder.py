@@ -1,7 +1,7 @@
-"""What torch computes while energies are differentiated, written down operation by operation.
+"""Records what torch computes while energies are differentiated, operation by operation.
 
-Equal operations on equal operands are one, known by one key in every recording: that is what graphs share.
-A value that hangs on no motion and no parameter is a constant, and no operation; nor is a product with 1
+Equal operations on equal operands are one, with one key in every recording: these are what graphs share.
+A value that depends on no motion and no parameter is a constant, and no operation; nor is a product with 1
 or a sum with 0, from which every sweep of autograd starts.
 """
 
@@ -21,11 +21,11 @@ from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode
 
 ENERGIES = re.compile(r".*\.energies\.link_\d+")
-"""Modules of a package whose lines energies are."""
+"""Names of a package's modules that hold the energies' source lines."""
 FILLED = {"ones_like", "zeros_like", "full_like", "new_zeros", "new_ones", "new_full", "new_empty_strided"}
 """Operations whose results have a tensor's shape, and nothing of its values."""
 NEUTRAL = {"add": 0.0, "sub": 0.0, "mul": 1.0, "div": 1.0}
-"""Numbers that leave what stands before them as it is."""
+"""Numbers that leave the other operand as it is."""
 CALLS: dict[str, Callable[..., object]] = {
     "add": operator.add,
     "sub": operator.sub,
@@ -34,10 +34,10 @@ CALLS: dict[str, Callable[..., object]] = {
     "neg": operator.neg,
     "pow": operator.pow,
 }
-"""What computes an operation also where an operand is a number."""
+"""Functions that compute an operation also where an operand is a number."""
 
 Place = tuple[int, tuple[int, ...], tuple[int, ...], torch.dtype]
-"""Where a tensor's numbers lie in memory, and how."""
+"""Address of a tensor's numbers in memory, and their layout."""
 
 
 class Ref(NamedTuple):
@@ -51,13 +51,13 @@ class Leaf:
     """A motion, q[k], qd[k] or qdd[k] with k from 0, or one number that is a parameter."""
 
     key: str
-    """The same for the same leaf of every graph."""
+    """Key of the leaf, equal in every graph."""
     kind: str
-    """q, qd, qdd or parameter."""
+    """One of q, qd, qdd and parameter."""
     name: str
-    """Of the joint, the run-time parameter, or the entry of a link's nn.Parameter: links.link2.com[0]."""
+    """Name of the joint, the run-time parameter, or the entry of an nn.Parameter, links.link2.com[0]."""
     shape: tuple[int, ...] = ()
-    """Of one sample."""
+    """Shape of the value for one sample."""
 
 
 @dataclass(frozen=True)
@@ -65,23 +65,23 @@ class Operation:
     """One operation of torch."""
 
     key: str
-    """The same for the same operation on the same operands in every graph."""
+    """Key, equal for the same operation on the same operands in every graph."""
     name: str
-    """As torch calls it: mul, sin."""
+    """Name of the operation in torch, such as mul or sin."""
     arguments: tuple[object, ...]
-    """Operands as `Ref`, numbers and whatever else the operation was called with, nested as it was."""
+    """Operands as `Ref`, numbers and other arguments of the operation, nested as they were."""
     options: Mapping[str, object]
-    """What it was called with by name."""
+    """Keyword arguments of the operation."""
     shape: tuple[int, ...]
-    """Of its value for one sample."""
+    """Shape of the value for one sample."""
     source: str
     """Line of the energy that it computes or differentiates, link_2.py:31; empty where there is none."""
     derivative: int
-    """How often the energy has been differentiated: 0 in the energy itself."""
+    """Number of times that the energy has been differentiated: 0 in the energy itself."""
     pointwise: bool
-    """Whether it computes every sample by itself, whatever the shape of the batch."""
+    """True if it computes every sample by itself, whatever the shape of the batch."""
     call: Callable[..., object] = field(repr=False, compare=False)
-    """What computes it."""
+    """Function that computes it."""
 
     @property
     def operands(self) -> tuple[str, ...]:
@@ -90,7 +90,7 @@ class Operation:
 
 
 class OperationRecorder(TorchDispatchMode):  # type: ignore[no-untyped-call]
-    """Records while it is entered; values belong to one sample."""
+    """Records operations while it is entered; values belong to one sample."""
 
     def __init__(self) -> None:
         super().__init__()  # type: ignore[no-untyped-call]
@@ -101,17 +101,20 @@ class OperationRecorder(TorchDispatchMode):  # type: ignore[no-untyped-call]
 
     @classmethod
     def _should_skip_dynamo(cls) -> bool:
-        """Torch would import its compiler, for seconds, to hide this from it; nothing here is compiled."""
+        """Return False: else torch imports its compiler, for seconds, to hide this mode from it.
+
+        Nothing here is compiled.
+        """
         return False
 
     def leaf(self, leaf: Leaf, value: Tensor) -> Tensor:
-        """Take a tensor for the value of a leaf; others that no operation made are constants."""
+        """Take a tensor for the value of a leaf; other tensors that no operation made are constants."""
         self._know(value, Ref(leaf.key))
         return value
 
     @contextmanager
     def derivative(self, number: int) -> Iterator[None]:
-        """What is recorded inside belongs to the derivative of this order."""
+        """Let all that is recorded inside belong to the derivative of this order."""
         former, self._derivative = self._derivative, number
         try:
             yield
@@ -119,7 +122,10 @@ class OperationRecorder(TorchDispatchMode):  # type: ignore[no-untyped-call]
             self._derivative = former
 
     def operand(self, value: object, number: bool = True) -> object:
-        """A value as an operand: a `Ref`, or a constant, of a single number as such where that will do."""
+        """Return a value as an operand: a `Ref`, or a constant.
+
+        number: whether a constant of a single number is returned as a Python number
+        """
         if not torch.is_tensor(value):
             return value
         known = self._known.get(_place(value))
@@ -134,13 +140,13 @@ class OperationRecorder(TorchDispatchMode):  # type: ignore[no-untyped-call]
         args: tuple[object, ...] = (),
         kwargs: Mapping[str, object] | None = None,
     ) -> Tensor | Sequence[Tensor]:
-        """Compute an operation and write it down."""
+        """Compute an operation and record it."""
         if func._schema.is_mutable:
             raise TypeError(f"{func} writes into a tensor, which a graph cannot show; write x = x + 1, say")
         options = dict(kwargs or {})
         result = func(*args, **options)
         name = func.overloadpacket.__name__
-        # What is not in CALLS, or adds a multiple (alpha), takes tensors where it was given tensors.
+        # An operation that is not in CALLS, or adds a multiple (alpha), needs tensors where it had tensors.
         number = name in CALLS and not options
         arguments = tuple(mapped(lambda value: self.operand(value, number), args))
         if name in FILLED or not any(flat(arguments)):
@@ -152,7 +158,7 @@ class OperationRecorder(TorchDispatchMode):  # type: ignore[no-untyped-call]
                 self._know(part, item)
             return result
         if _place(result) in self._known:
-            return result  # the same value once more, as of detach()
+            return result  # an alias of a known value, as detach() returns
         same = _same(name, arguments, options, result)
         if same is None:
             same = self._record(func, name, arguments, options, tuple(result.shape))
@@ -179,13 +185,13 @@ class OperationRecorder(TorchDispatchMode):  # type: ignore[no-untyped-call]
         return Ref(key)
 
     def _know(self, value: Tensor, ref: Ref) -> None:
-        self._known[_place(value)] = ref, value  # kept, so that its memory is no other's
+        self._known[_place(value)] = ref, value  # kept alive, so that no other tensor gets its memory
 
     def _source(self, arguments: tuple[object, ...]) -> str:
-        """Line of the energy, or of the operation that this one differentiates."""
+        """Return the line of the energy, or of the operation that this one differentiates."""
         node = torch._C._current_autograd_node()
         source = _line_of_energy() if node is None else self._sources.get(node._sequence_nr(), "")
-        if not source and self._derivative:  # a sum of gradients: it belongs to what it sums
+        if not source and self._derivative:  # a sum of gradients: its line is that of what it sums
             found = (self.operations[r.key].source for r in flat(arguments) if r.key in self.operations)
             source = next(filter(None, found), "")
         self._sources.setdefault(torch._C._autograd._get_sequence_nr() - 1, source)
@@ -193,7 +199,7 @@ class OperationRecorder(TorchDispatchMode):  # type: ignore[no-untyped-call]
 
 
 def flat(nested: object) -> Iterator[Ref]:
-    """Operands that are values, in order."""
+    """Yield the operands that are values, in order."""
     if isinstance(nested, Ref):
         yield nested
     elif isinstance(nested, list | tuple):
@@ -202,7 +208,7 @@ def flat(nested: object) -> Iterator[Ref]:
 
 
 def mapped(function: Callable[[object], object], nested: Sequence[object]) -> Iterator[object]:
-    """A function of everything in nested lists and tuples."""
+    """Yield the results of a function of everything in nested lists and tuples, nested likewise."""
     for part in nested:
         if isinstance(part, list | tuple) and not isinstance(part, Ref):
             yield type(part)(mapped(function, part))
@@ -211,16 +217,17 @@ def mapped(function: Callable[[object], object], nested: Sequence[object]) -> It
 
 
 def _place(value: Tensor) -> Place:
-    """What two tensors have in common that are the same numbers in the same memory."""
+    """Return the address and layout of a tensor, equal for tensors of the same numbers in the same memory."""
     return value.data_ptr(), tuple(value.shape), value.stride(), value.dtype
 
 
 def _same(
     name: str, arguments: tuple[object, ...], options: Mapping[str, object], result: Tensor
 ) -> Ref | float | None:
-    """The operand that a product with 1, or a sum with 0, is, or the number 0 for a product with it.
+    """Return the operand that a product with 1, or a sum with 0, equals.
 
-    Of a difference and a quotient only the second may be such a number.
+    Returns 0.0 for a product with 0, and None for any other operation. In a difference or a quotient only
+    the second operand may be such a number.
     """
     if options or len(arguments) != 2 or name not in NEUTRAL or result.dim():
         return None
@@ -235,7 +242,7 @@ def _same(
 
 
 def _key(name: str, arguments: tuple[object, ...], options: Mapping[str, object]) -> str:
-    """Hash of an operation and its operands; which factor or summand comes first does not matter."""
+    """Return a hash of an operation and its operands; the order of factors or summands does not matter."""
     parts = [repr(part.tolist() if torch.is_tensor(part) else part) for part in arguments]
     if name in ("add", "mul") and not options:
         parts.sort()

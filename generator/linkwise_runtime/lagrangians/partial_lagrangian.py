@@ -15,16 +15,16 @@ from .functional_sweeps import lagrangians
 
 
 class PartialLagrangian(torch.nn.Module):
-    """Lagrangian of one link as a module; a subclass writes down `kinetic` and `potential`.
+    """Lagrangian of one link as a module; a subclass implements `kinetic` and `potential`.
 
-    A call link(q, qd) goes through hooks of torch; `torque`, `coefficients` and the calls of the whole robot
-    differentiate kinetic and potential energy apart, and call no module.
+    A call link(q, qd) runs torch's hooks; `torque`, `coefficients` and the calls of the whole robot
+    differentiate kinetic and potential energy separately, and call no module.
     """
 
     path: ClassVar[tuple[int, ...]] = ()
     """Coordinates that the energies depend on, ascending, counted from 0."""
     linear: ClassVar[bool] = False
-    """Whether the kinetic energy has terms linear in the velocities."""
+    """True if the kinetic energy has terms linear in the velocities."""
     parent: ClassVar["type[PartialLagrangian] | None"] = None
     """Lagrangian of the link that carries this one, if their energies share work."""
 
@@ -35,10 +35,11 @@ class PartialLagrangian(torch.nn.Module):
         before: "PartialLagrangian | None" = None,
         learned: Collection[str] = (),
     ) -> None:
-        """`alone` is the robot with this link only, `given` holds its run-time parameters.
+        """Hold the link's back end; `alone` is the robot with this link only.
 
-        `learned` names constants that are nn.Parameters. Modules of others that this one needs are no parts
-        of it, as each tensor has one owner.
+        given: the run-time parameters
+        before: module of the link that carries this one; no submodule, as each tensor has one owner
+        learned: names of constants that are nn.Parameters
         """
         super().__init__()
         self._before = (before,)
@@ -46,34 +47,34 @@ class PartialLagrangian(torch.nn.Module):
 
     @property
     def before(self) -> Any:
-        """Module of the link that carries this one, None where their energies share no work."""
+        """Module of the link that carries this one; None where their energies share no work."""
         return self._before[0]
 
     def kinetic(self, q: Values, qd: Values, p: Parameters) -> Number:
-        """Kinetic energy in J."""
+        """Return the kinetic energy in J."""
         raise NotImplementedError
 
     def potential(self, q: Values, p: Parameters) -> Number:
-        """Potential energy in J."""
+        """Return the potential energy in J."""
         raise NotImplementedError
 
     def forward(self, q: Tensor, qd: Tensor) -> Tensor:
-        """Lagrangian in J, shape (...); q and qd of shape (..., n)."""
+        """Return the Lagrangian in J, shape (...); q and qd of shape (..., n)."""
         at, moved = self._read(q=q, qd=qd)
         return lagrangians((self,), at, moved, self._backend.seen_by(at))[0]
 
     def energies(self, q: Tensor, qd: Tensor) -> tuple[Tensor, Tensor]:
-        """Kinetic and potential energy in J, shape (...) each."""
+        """Return kinetic and potential energy in J, shape (...) each."""
         kinetic, potential = self._backend.answers.energy(*self._read(q=q, qd=qd))
         return cast(Tensor, kinetic[..., 0]), cast(Tensor, potential[..., 0])
 
     def torque(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
-        """tau_ij of this link j, the torque on each joint i through it, shape (..., n)."""
+        """Return tau_ij of this link j, the torque on each joint i through it, shape (..., n)."""
         (tau,) = self._backend.answers.partial_torque(*self._read(q=q, qd=qd, qdd=qdd))
         return cast(Tensor, tau[..., 0])
 
     def coefficients(self, q: Tensor, qd: Tensor) -> Coefficients[Tensor]:
-        """c2_ik and c1_ik (..., n, n) and g_i (..., n) of this link, in the closing convention."""
+        """Return c2_ik and c1_ik (..., n, n) and g_i (..., n) of this link, in the closing convention."""
         c2, c1, g = self._backend.answers.coefficients(*self._read(q=q, qd=qd))
         return Coefficients(*(cast(Tensor, a) for a in (c2[..., 0, :], c1[..., 0, :], g[..., 0])))
 

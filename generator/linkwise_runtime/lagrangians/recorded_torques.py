@@ -1,11 +1,11 @@
-"""Partial torques and their parts as they are recorded, one sample, from the Lagrangians of links.
+"""Partial torques and their parts, recorded for one sample, from the Lagrangians of links.
 
 With L = K - P of a link, p_i = dK/dqd_i, and every derivative by autograd:
 
     tau_ij = sum_k dp_i/dqd_k qdd_k + h_i + g_ij      h_i = sum_s dp_i/dq_s qd_s - dK/dq_i      g_ij = dP/dq_i
-    c2_ijk = dp_i/dqd_k        c1_ijk = 1/2 (dh_i/dqd_k + the same at rest)        c0_ijk = d(tau_ij)/d(q_k)
+    c2_ijk = dp_i/dqd_k     c1_ijk = 1/2 (dh_i/dqd_k + dh_i/dqd_k at rest)     c0_ijk = d(tau_ij)/d(q_k)
 
-At rest dh_i/dqd_k is what terms of K linear in the velocities leave: zero for rigid links.
+At rest dh_i/dqd_k comes from terms of K linear in the velocities alone: zero for rigid links.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -22,14 +22,14 @@ from .operation_recorder import Leaf, Operation, OperationRecorder, Ref
 MOTIONS = ("q", "qd", "qdd")
 Number = Tensor | float
 Slopes = tuple[dict[int, Number], dict[int, Number], Number]
-"""dp_i/dq_s and dp_i/dqd_s of a link by s, and dK/dq_i."""
+"""Derivatives dp_i/dq_s and dp_i/dqd_s of a link by s, and dK/dq_i."""
 Part = tuple[int | None, int | None]
 """Coordinate k and order m of a part; (None, None) is the whole torque, (None, 0) gravity."""
 
 
 @dataclass(frozen=True)
 class LinkEnergies:
-    """Energies of one link in J, of sequences of coordinates and velocities."""
+    """Energies of one link in J, as functions of sequences of coordinates and velocities."""
 
     path: tuple[int, ...]
     linear: bool
@@ -39,7 +39,7 @@ class LinkEnergies:
 
 @dataclass(frozen=True)
 class RecordedParts:
-    """What was recorded: all operations in order, the leaves, and the value of each part."""
+    """A recording: all operations in order, the leaves, and the value of each part."""
 
     operations: Mapping[str, Operation]
     leaves: Mapping[str, Leaf]
@@ -55,7 +55,8 @@ def record(
 ) -> RecordedParts:
     """Record parts of the torque on a joint, through the sum of some links.
 
-    links: energies, for the values of leaves by their keys; beside: those leaves that are no motion
+    links: energies, for the values of leaves by their keys
+    beside: the leaves that are no motion, with their values
     """
     recorder, leaves = OperationRecorder(), dict[str, Leaf]()
 
@@ -84,7 +85,7 @@ def record(
 
 
 class _Torque:
-    """Sums over links; a coefficient is multiplied by its motion once."""
+    """Parts of a torque, summed over links; each coefficient is multiplied by its motion once."""
 
     def __init__(
         self,
@@ -99,7 +100,7 @@ class _Torque:
         self._path = sorted({k for link in self._links for k in link.path})
 
     def part(self, k: int | None, m: int | None) -> Number:
-        """Value of a part: a tensor, or 0.0."""
+        """Return the value of a part: a tensor, or 0.0."""
         if m == 0:
             return self.gravity if k is None else _times(self._at(self.stiffness, k), self._q[k])
         if k is None:
@@ -112,17 +113,17 @@ class _Torque:
 
     @cached_property
     def inertia(self) -> list[Number]:
-        """c2_ik, by k on the path."""
+        """Coefficients c2_ik, by k on the path."""
         return [_sum([rates[k] for _, rates, _ in self._moving if k in rates]) for k in self._path]
 
     @cached_property
     def velocity_force(self) -> Number:
-        """h_i."""
+        """Force h_i, summed over the links."""
         return _sum([self._force(slopes, self._qd) for slopes in self._moving])
 
     @cached_property
     def damping(self) -> list[Number]:
-        """c1_ik in the closing convention, by k on the path."""
+        """Coefficients c1_ik in the closing convention, by k on the path."""
         slopes = [self._slopes(self.velocity_force, [self._qd[k] for k in self._path], 3)]
         for link in self._links:
             if link.linear:
@@ -133,13 +134,13 @@ class _Torque:
 
     @cached_property
     def gravity(self) -> Number:
-        """g_i."""
+        """Gravity torque g_i, summed over the links."""
         at = [self._q[self._joint]]
         return _sum([slope for link in self._links for slope in self._slopes(link.potential(self._q), at, 1)])
 
     @cached_property
     def stiffness(self) -> list[Number]:
-        """c0_ik, by k on the path."""
+        """Coefficients c0_ik, by k on the path."""
         return self._slopes(self.part(None, None), [self._q[k] for k in self._path], 3)
 
     def _at(self, coefficients: Sequence[Number], k: int) -> Number:
@@ -150,7 +151,7 @@ class _Torque:
         return [self._momentum(link, self._qd) for link in self._links]
 
     def _momentum(self, link: LinkEnergies, qd: Sequence[Tensor]) -> Slopes:
-        """dp_i/dq_s and dp_i/dqd_s by s, and dK/dq_i of a link."""
+        """Return dp_i/dq_s and dp_i/dqd_s by s, and dK/dq_i of a link."""
         kinetic, path = link.kinetic(self._q, qd), link.path
         momentum, force = self._slopes(kinetic, [qd[self._joint], self._q[self._joint]], 1)
         slopes = self._slopes(momentum, [*(self._q[s] for s in path), *(qd[s] for s in path)], 2)
@@ -165,7 +166,7 @@ class _Torque:
         return -force if _none(turned) else turned - force
 
     def _slopes(self, value: Number, by: Sequence[Tensor], order: int) -> list[Number]:
-        """Derivatives of a value, which may be differentiated again; 0.0 where it does not depend on one."""
+        """Return derivatives of a value, which can be differentiated again; 0.0 where it has none."""
         if not torch.is_tensor(value) or not value.requires_grad:
             return [0.0] * len(by)
         with self._recorder.derivative(order):

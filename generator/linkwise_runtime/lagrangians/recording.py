@@ -1,4 +1,4 @@
-"""Differentiating by torch inside a call, whatever grad mode the caller is in."""
+"""Differentiation by torch inside a call, whatever grad mode the caller is in."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ from torch.autograd import forward_ad
 
 @dataclass(frozen=True)
 class Recording:
-    """What a call has to know while it differentiates under torch.enable_grad()."""
+    """State of a call while it differentiates under torch.enable_grad()."""
 
     like: Tensor
-    """One value a sample, shape (...)."""
+    """One value for each sample, shape (...)."""
     wanted: bool
-    """Whether the caller may differentiate the results."""
+    """True if the caller may differentiate the results."""
 
     @classmethod
     def of(cls, motion: Sequence[Tensor], wanted: bool) -> "Recording":
@@ -24,17 +24,17 @@ class Recording:
         return cls(motion[0][..., 0], recorded or wanted)
 
     def lanes(self, values: Tensor) -> Tensor:
-        """One value a lane, (lanes,), for every sample: shape (lanes, ...)."""
+        """Return values (lanes,) repeated for every sample: shape (lanes, ...)."""
         return values.reshape(-1, *[1] * self.like.dim()).expand(-1, *self.like.shape)
 
     def finish(self, values: Tensor) -> Tensor:
-        """Values (count, ...) as (..., count), as the caller's grad mode wants them."""
+        """Return values (count, ...) as (..., count), detached unless the caller may differentiate them."""
         packed = values.movedim(0, -1).contiguous()
         return packed if self.wanted else packed.detach()
 
 
 def transformed() -> bool:
-    """Whether torch.func, torch.compile or forward mode follows this call: sweeps would hide it from them."""
+    """Return whether torch.func, torch.compile or forward mode is active, from which sweeps hide the call."""
     return (
         torch.compiler.is_compiling()
         or torch._C._are_functorch_transforms_active()
@@ -43,7 +43,10 @@ def transformed() -> bool:
 
 
 def variable(a: Tensor) -> Tensor:
-    """A tensor of its own to differentiate by: its values may also be a direction, which must stay fixed."""
+    """Return a separate tensor to differentiate by.
+
+    Its values may also serve as a direction, which must stay fixed.
+    """
     return a.view_as(a) if a.requires_grad else a.detach().requires_grad_()
 
 
@@ -54,10 +57,10 @@ def gradient(
     keep: bool,
     last: bool,
 ) -> Sequence[Tensor]:
-    """Gradients of the weighted sum of `values`, of their sum if no weights are given.
+    """Return gradients of the weighted sum of `values`, or of their sum if no weights are given.
 
-    Zeros where it doesn't depend on an input. With `keep` gradients can be differentiated in turn; after the
-    `last` sweep without it the graph is gone, and its memory with it.
+    They are zeros where the sum does not depend on an input. With `keep`, gradients can be differentiated in
+    turn; without it, the `last` sweep frees the graph and its memory.
     """
     chosen = [
         (value, torch.ones_like(value) if weights is None else weights[i])

@@ -21,7 +21,7 @@ CROSS = (
     (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0),
     (0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
 )
-"""c·CROSS are the entries of the matrix [c]× with [c]× a = c × a, row by row."""
+"""Tensor with c·CROSS the entries of the matrix [c]×, row by row, where [c]× a = c × a."""
 
 
 class RigidLagrangian(PartialLagrangian):
@@ -31,16 +31,16 @@ class RigidLagrangian(PartialLagrangian):
 
     mass     in kg, shape ()
     com      centre of mass in m, (3,)
-    inertia  about the centre of mass in kg m^2, (3, 3); of it the symmetric part counts
+    inertia  about the centre of mass in kg m^2, (3, 3); only its symmetric part counts
     place    of its joint in the frame of the link before it, in m, (3,); place_a, place_b, ... where joints
              without a body lie between them
 
-    What hangs on run-time parameters is not listed: the subclass works it out of these.
+    Numbers that depend on run-time parameters are not listed: the subclass computes them from these.
     """
 
     constants: ClassVar[Mapping[str, Nested]] = {}
     places: ClassVar[Mapping[int, str]] = {}
-    """Joints, as tree.py counts them, whose place is one of these constants, and its name."""
+    """Joints, counted as in tree.py, whose place is one of these constants, and the constant's name."""
 
     def __init__(
         self,
@@ -54,16 +54,18 @@ class RigidLagrangian(PartialLagrangian):
             hold(self, name, value, name.partition("_")[0] in learned)
 
     def body(self, p: Parameters) -> Body:
-        """Mass, centre of mass and inertia: numbers, or tensors where somebody differentiates by them."""
+        """Return mass, centre of mass and inertia: numbers, or tensors to differentiate by."""
         own = p.constants(self)
         return own["mass"], own["com"], own["inertia"]
 
 
 def kinetic_energy(body: Body, w: Sequence[Number], v: Sequence[Number]) -> Number:
-    """m v·v/2 + m v·(w × c) + w·I w/2 in J, with I = inertia + m (c·c 1 - c cᵀ) about the frame's origin.
+    """Return m v·v/2 + m v·(w × c) + w·I w/2 in J.
 
-    body: mass m in kg, centre of mass c in m, inertia about it in kg m^2: tensors, or numbers where nobody
-    differentiates by them
+    I = inertia + m (c·c 1 - c cᵀ) is the inertia about the frame's origin.
+
+    body: mass m in kg, centre of mass c in m, inertia about it in kg m^2: tensors, or numbers where
+    nothing is differentiated by them
     w, v: angular velocity in rad/s and velocity of the frame's origin in m/s, in the body's axes; tensors of
     one shape, and the number 0.0 for components that are always zero
     """
@@ -90,10 +92,9 @@ def kinetic_energy(body: Body, w: Sequence[Number], v: Sequence[Number]) -> Numb
 def _written_out(
     w: Sequence[Number], v: Sequence[Number], m: Number, c: Vector, inertia: Sequence[Vector] | Tensor
 ) -> Number:
-    """m u·u/2 + w·inertia w/2 with u = v + w × c, of single numbers.
+    """Return m u·u/2 + w·inertia w/2 with u = v + w × c, for single numbers.
 
-    Whoever looks at what is recorded of one sample sees products and sums of numbers, and those with zeros
-    left out.
+    A recording of one sample then shows products and sums of numbers, without those with zeros.
     """
     u = [
         _dot((1.0, c[2], -c[1]), (v[0], w[1], w[2])),
@@ -104,7 +105,7 @@ def _written_out(
 
 
 def _dot(a: Vector, b: Vector) -> Number:
-    """a·b without the products with the number 0."""
+    """Return a·b without the products with the number 0."""
     pairs = ((x, y) for x, y in zip(a, b, strict=True) if not (_is(x, 0.0) or _is(y, 0.0)))
     products = [y if _is(x, 1.0) else x * y for x, y in pairs]
     return sum(products[1:], products[0]) if products else 0.0
@@ -127,7 +128,7 @@ def _spatial_inertia(m: Tensor, c: Tensor, inertia: Tensor) -> Tensor:
 
 
 def _spatial_numbers(m: float, c: Sequence[float], inertia: Sequence[Sequence[float]]) -> list[list[float]]:
-    """Return the same of numbers."""
+    """Return the matrix H (6, 6) of `_spatial_inertia` as lists of numbers."""
     x, y, z = c
     cross = ((0.0, -m * z, m * y), (m * z, 0.0, -m * x), (-m * y, m * x, 0.0))
     squares = (y * y + z * z, x * x + z * z, x * x + y * y)
@@ -141,7 +142,7 @@ def _spatial_numbers(m: float, c: Sequence[float], inertia: Sequence[Sequence[fl
 
 
 def _product(matrix: Tensor, vector: Tensor) -> Tensor:
-    """Matrix (m, m), behind axes of samples if each has its own, times vector (m, ...)."""
+    """Return a matrix (m, m), behind axes of samples if each has its own, times a vector (m, ...)."""
     if matrix.dim() == vector.dim() == 2:
         return matrix @ vector
     if matrix.dim() == 2:
@@ -152,14 +153,17 @@ def _product(matrix: Tensor, vector: Tensor) -> Tensor:
 
 
 def _holds_tensors(value: Nested | Body) -> bool:
-    """Whether a number, or what is nested in a list of numbers, is a tensor."""
+    """Return whether a number, or anything nested in a list of numbers, is a tensor."""
     if isinstance(value, list | tuple):
         return any(map(_holds_tensors, value))
     return value.__class__ is not float
 
 
 def _tensor(value: Nested | Body, axes: int, like: Tensor) -> Tensor:
-    """A number, a vector or a matrix, `axes` axes of 3, behind axes of samples if entries have these."""
+    """Return a number, a vector or a matrix as a tensor.
+
+    It has `axes` axes of 3, behind axes of samples if entries have these.
+    """
     if torch.is_tensor(value) or not _holds_tensors(value):
         return torch.as_tensor(value, dtype=like.dtype, device=like.device)
     rows = cast(Sequence[Sequence[Number]], value if axes == 2 else [value])

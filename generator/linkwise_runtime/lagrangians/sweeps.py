@@ -2,18 +2,20 @@
 
 With L = K - P of one link, K of degree two in the velocities, and D_i = d/dt d/dqd_i - d/dq_i,
 
-    tau_i = D_i L           M = d2K/dqd2            p = dK/dqd = M qd + b
-    c1_ik = 1/2 (dM_ik/dt + dp_i/dq_k - dp_k/dq_i) = 1/2 d(tau_i)/d(qd_k), if K has no linear terms (b = 0)
+    tau_i = D_i L           M = d2K/dqd2            dK/dqd = p + b            p = M qd
+    c1_ik = 1/2 (dM_ik/dt + dp_i/dq_k - dp_k/dq_i) + h1_ik       h1_ik = db_i/dq_k - db_k/dq_i
 
-Nothing here is worked out beforehand. A first reverse sweep gives the gradient of K. The Hessian of K times a
+where b comes from the terms of K linear in qd; without these, c1_ik = 1/2 d(tau_i)/d(qd_k).
+
+Nothing here is derived in advance. A first reverse sweep gives the gradient of K. The Hessian of K times a
 direction is the gradient of (gradient . direction), as the Hessian is symmetric: a second reverse sweep over
-the graph of the first. What is wanted in several directions, or of several links, goes side by side in lanes.
+the graph of the first. Several directions, and several links, go side by side in lanes.
 
 Link j has these lanes; e_k is a velocity of 1 of coordinate k alone:
 
     at e_k       dK/dqd is column k of M, its change along qd column k of dM/dt; dp_k/dq = d(e_k . M qd)/dq
-    at rest      one lane, if K has terms linear in qd: what of the above is due to b
-    at rest      one lane for each coordinate then: dK/dqd_k = b_k, whose derivatives are needed by themselves
+    at rest      one lane, if K has terms linear in qd: the share of the above that is due to b
+    at rest      then one lane for each coordinate too: dK/dqd_k = b_k, whose derivatives are needed alone
 """
 
 from collections.abc import Callable, Sequence
@@ -30,7 +32,7 @@ Links = Sequence[Energies]
 
 
 class Sweep:
-    """The motion of one call in the lanes of a plan: what can be asked of the Lagrangians there."""
+    """The motion of one call in the lanes of a plan, and derivatives of the Lagrangians there."""
 
     def __init__(
         self, links: Links, p: Parameters, plan: Plan, motion: Sequence[Tensor], record: Recording
@@ -40,15 +42,15 @@ class Sweep:
         self.n, self.dim = len(self.x), record.like.dim() + 1
 
     def same(self, values: Sequence[Tensor]) -> Leaf:
-        """The same value of a coordinate in all lanes."""
+        """Return a leaf that gives all lanes the same value of a coordinate."""
         return lambda k, rows: values[k].expand(rows.stop - rows.start, *self.record.like.shape)
 
     def lay(self, leaf: Leaf) -> Motion:
-        """Variables with the values of `leaf`."""
+        """Return variables with the values of `leaf`."""
         return self.plan.lay(lambda k, rows: variable(leaf(k, rows)), self.dim)
 
     def kinetic(self, velocity: Leaf) -> tuple[Motion, Motion, Sequence[Tensor], Sequence[Tensor]]:
-        """q and qd in lanes, and the gradient of the kinetic energy with respect to their variables."""
+        """Return q and qd in lanes, and the gradients of the kinetic energy by the variables of each."""
         q, qd = self.lay(self.same(self.x)), self.lay(velocity)
         moved = zip(self.links, q.own, qd.own, strict=True)
         energies = [link.kinetic(position, speed, self.p) for link, position, speed in moved]
@@ -57,28 +59,28 @@ class Sweep:
         return q, qd, slopes[: len(x)], slopes[len(x) :]
 
     def potential(self, keep: bool) -> tuple[Motion, Sequence[Tensor]]:
-        """q in lanes, and the gradient of the potential energy with respect to its variables."""
+        """Return q in lanes, and the gradient of the potential energy by its variables."""
         q = self.lay(self.same(self.x))
         energies = [link.potential(at, self.p) for link, at in zip(self.links, q.own, strict=True)]
         return q, gradient(energies, None, q.variables(), keep, last=True)
 
     def rows(self, values: Sequence[Tensor], *motions: Motion) -> Rows:
-        """Values that belong to the variables of one or more motions, in their order."""
+        """Return values that belong to the variables of one or more motions, in their order, as `Rows`."""
         places = (place for motion in motions for place in motion.places())
         return Rows(places, values, self.plan.lanes, self.n, self.record.like)
 
     def along(self, motion: Motion, direction: Leaf) -> list[Tensor]:
-        """A direction for each variable of a motion."""
+        """Return a direction for each variable of a motion."""
         return [direction(k, rows) for k, rows in motion.places()]
 
     def marks(self, chosen: Callable[[int], Indices]) -> Leaf:
-        """One in the lanes that are chosen for a coordinate, zero in the others."""
+        """Return a leaf that is one in the lanes that are chosen for a coordinate, and zero in the others."""
         like = self.record.like
         columns = [torch.from_numpy(chosen(k)).to(like.device, like.dtype) for k in range(self.n)]
         return lambda k, rows: self.record.lanes(columns[k][rows])
 
     def torque(self, keep: bool) -> tuple[tuple[Motion, ...], tuple[Sequence[Tensor], ...]]:
-        """Variables qd, q and q again, and for each of them its part of tau: d/dt dK/dqd, dK/dq and dP/dq."""
+        """Return variables qd, q and q again, and for each its part of tau: d/dt dK/dqd, dK/dq and dP/dq."""
         q, qd, force, momentum = self.kinetic(self.same(self.v))
         way = [*self.along(q, self.same(self.v)), *self.along(qd, self.same(self.a))]
         rate = gradient([*force, *momentum], way, qd.variables(), keep, last=True)
@@ -87,7 +89,7 @@ class Sweep:
 
 
 def entries_of(links: Links) -> LaneEntries:
-    """Where the entries of these links are."""
+    """Return the entries and lanes of these links."""
     numbers = {id(link): j for j, link in enumerate(links)}
     parents = tuple(numbers.get(id(link.before)) for link in links)
     return _entries(tuple(link.path for link in links), parents, tuple(link.linear for link in links))
@@ -97,7 +99,10 @@ _entries = lru_cache(maxsize=64)(LaneEntries)
 
 
 def decomposition(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> list[Tensor]:
-    """c2 (i <= k), c1, g, tau and h1, the part of c1 linear in qd, packed link by link: (..., count) each."""
+    """Return c2 (i <= k), c1, g, tau and h1, packed link by link: (..., count) each.
+
+    h1 is the part of c1 that comes from terms of K linear in qd.
+    """
     entries, record = _begin(links, p, q, qd, qdd)
     with torch.enable_grad():
         sweep = Sweep(links, p, entries.plan, (q, qd, qdd), record)
@@ -110,7 +115,7 @@ def decomposition(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tenso
 
 
 def torque(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
-    """tau of every link over its path, shape (..., count)."""
+    """Return tau of every link over its path, shape (..., count)."""
     entries, record = _begin(links, p, q, qd, qdd)
     with torch.enable_grad():
         sweep = Sweep(links, p, entries.single, (q, qd, qdd), record)
@@ -122,11 +127,11 @@ def torque(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> T
 
 
 def position_gradient(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
-    """d(tau_i)/d(q_k) of every link over its path, row by row, shape (..., count)."""
+    """Return d(tau_i)/d(q_k) of every link over its path, row by row, shape (..., count)."""
     entries, record = _begin(links, p, q, qd, qdd)
     resting = LaneEntries(entries.paths, entries.parents, (False,) * len(links))
     with torch.enable_grad():
-        # Lane e_i of a link is there for its tau_i.
+        # Lane e_i of a link serves its tau_i.
         sweep = Sweep(links, p, resting.plan, (q, qd, qdd), record)
         (qd_, q_, place), (rate, force, gravity) = sweep.torque(keep=True)
         mine = sweep.marks(lambda k: resting.lanes[:, 1] == k)
@@ -142,7 +147,10 @@ def _begin(links: Links, p: Parameters, *motion: Tensor) -> tuple[LaneEntries, R
 
 
 def _second_derivatives(sweep: Sweep, entries: LaneEntries) -> tuple[Tensor, Tensor, Tensor]:
-    """M_ik and c1_ik of all pairs (i, k), and twice the part of c1 that is due to terms linear in qd."""
+    """Return M_ik and c1_ik of all pairs (i, k), and h1, the part of c1 from terms of K linear in qd.
+
+    h1 has the pairs of links with such terms.
+    """
     coordinate, kind = entries.lanes[:, 1], entries.lanes[:, 2]
     keep, along_qd = sweep.record.wanted, sweep.same(sweep.v)
     q, qd, force, momentum = sweep.kinetic(sweep.marks(lambda k: (coordinate == k) & (kind == 0)))
@@ -171,14 +179,14 @@ def _second_derivatives(sweep: Sweep, entries: LaneEntries) -> tuple[Tensor, Ten
 
 
 def _gravity(sweep: Sweep, entries: LaneEntries) -> Tensor:
-    """dP/dq_i of every link over its path, in one lane for each link."""
+    """Return dP/dq_i of every link over its path, in one lane for each link."""
     sweep = Sweep(sweep.links, sweep.p, entries.single, sweep.motion, sweep.record)
     place, slopes = sweep.potential(sweep.record.wanted)
     return sweep.rows(slopes, place)(*entries.paths_in_lanes)
 
 
 def _sums(terms: Tensor, entries: LaneEntries) -> Tensor:
-    """Sums over k of terms (i, k), link by link."""
+    """Return the sums over k of terms (i, k), link by link."""
     sizes = [len(path) for path in entries.paths]
     blocks = terms.split_with_sizes([d * d for d in sizes])
     return torch.cat([b.reshape(d, d, *b.shape[1:]).sum(1) for d, b in zip(sizes, blocks, strict=True)])

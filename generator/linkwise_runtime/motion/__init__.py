@@ -1,1 +1,1 @@
-"""What moves a robot, source by source, and how it then moves over time."""
+"""Causes of a robot's motion, source by source, and the motion over time."""

@@ -1,11 +1,11 @@
-"""The equations of motion as rates of a state, of an open tree or with constraints, and their energy.
+"""Equations of motion as rates of a state, for an open tree or with constraints, and their energy.
 
-State (q, v, W): v = qd, or with constraints those of the independent joints, and the work W that was done:
+State (q, v, W): v = qd, or with constraints that of the independent joints, and W the work that was done:
 
     dq/dt = qd    dv/dt = qdd (ydd)    dW/dt = qd . (tau - sum_e load torque_e - damping - friction)
 
 With constraints the dependent joints of every q are closed first, by Newton's method from where they are, and
-qd = G v: they do not drift.
+qd = G v, so that they do not drift.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,26 +25,26 @@ from ..interface import Numbers
 from .source_forces import AppliedLoads, loads_of
 
 HALVES = 30
-"""Of the way to a position that does not close, to find how far it goes."""
+"""Limit of the halvings of the way to a position that does not close, to find how far it goes."""
 DEAD = 1e-3
-"""Joints are at a dead point where no more is left of columns of A_d than this part of that at the start."""
+"""Part of what is left of columns of A_d at the start; where less is left, joints are at a dead point."""
 LEAP = 0.5
-"""rad and m: joints that go farther from one place to the next have left the motion."""
+"""Longest way from one place to the next, in rad and m: joints that go farther have left the motion."""
 NEAR = 10.0
-"""So many times as much is left where the last position beside a dead point closes."""
+"""Factor of the limit of a dead point, for the last position beside it that closes."""
 
 
 class TiedMotion:
-    """Places along a motion; the last one is kept, for a step begins where the one before ended."""
+    """Closed places along a motion; the last one is kept, since a step begins where the one before ended."""
 
     def __init__(self, ties: TiedJoints, engine: ArrayBackend, start: ClosedPlace) -> None:
-        """`start` is also where contacts took hold."""
+        """Begin at `start`, where contacts also took hold."""
         self._ties, self._engine, self._held_at = ties, engine, start.q
         self._last: tuple[Numbers, ClosedPlace] = start.q, start
         self._dead = 0.0 if hidden(start.q) else DEAD * float(least_left(start.triangle).min(initial=1.0))
 
     def place(self, t: float, q: Numbers) -> ClosedPlace:
-        """The place beside q (..., n), whose dependent joints are closed first.
+        """Return the closed place beside q (..., n), whose dependent joints are closed first.
 
         Raises ValueError, with the time, where they cannot be closed, or independent joints go no further.
         """
@@ -64,18 +64,18 @@ class TiedMotion:
         return found
 
     def settled(self, t: float, q: Numbers) -> Numbers:
-        """q with its dependent joints where the constraints want them."""
+        """Return q (..., n) with its dependent joints where the constraints want them."""
         place = self.place(t, q)
         self._last = place.q, place
         return place.q
 
     def accelerated(self, t: float, q: Numbers, qd: Numbers, tau: Numbers, passive: bool) -> Numbers:
-        """Accelerations of the independent joints."""
+        """Return the accelerations of the independent joints, (..., m)."""
         place = self.place(t, q)
         return self._ties.acceleration(self._engine, place, qd, tau, passive)
 
     def _leap(self, q: Numbers) -> str | None:
-        """That independent joints leap away from where they were; None where they do not."""
+        """Return a message if independent joints leap away from where they were, else None."""
         place = self._last[1]
         if hidden(q):
             return None
@@ -89,11 +89,11 @@ class TiedMotion:
         )
 
     def _furthest(self, place: ClosedPlace, q: Numbers) -> ClosedPlace:
-        """The last place that closes on the straight way of the independent joints."""
+        """Return the last place that closes on the straight way of the independent joints to q."""
         way, reached = q - place.q, 0.0
         for k in range(1, HALVES):
             tried = reached + 0.5**k
-            # Others start from the last place that closed, not from far along the way.
+            # Dependent joints start from the last place that closed, not from far along the way.
             mover = place.velocity(place.own(way)) * (tried - reached)
             try:
                 place = self._ties.closed_place(self._engine, place.q + mover, self._held_at)
@@ -103,7 +103,7 @@ class TiedMotion:
         return place
 
     def _dead_point(self, place: ClosedPlace, near: float = 1.0) -> str | None:
-        """Why independent joints go no further than a place; None where they do."""
+        """Return why independent joints go no further than a place; None where they do."""
         if hidden(place.q):
             return None
         left = least_left(place.triangle)
@@ -118,18 +118,18 @@ class TiedMotion:
 
 
 Given = Callable[[float, Numbers, Numbers], object]
-"""What somebody gives by time, position and velocity."""
+"""Function of the user's, of time, position and velocity."""
 
 
 class State(NamedTuple):
-    """Of one instant, or rates of it."""
+    """State at one instant, or the rates of one."""
 
     q: Numbers
-    """(..., n)."""
+    """Positions of all joints, (..., n)."""
     v: Numbers
-    """(..., n), or (..., m) of the independent joints."""
+    """Velocities of all joints, (..., n), or of the independent ones, (..., m)."""
     work: Numbers
-    """(...)."""
+    """Work W, (...)."""
 
 
 class ReadLoads(NamedTuple):
@@ -141,26 +141,26 @@ class ReadLoads(NamedTuple):
 
 @dataclass(frozen=True)
 class EquationsOfMotion:
-    """Those of a robot on one back end."""
+    """Equations of motion of a robot on one back end."""
 
     engine: ArrayBackend
     tau: Numbers | Given
-    """Torques (..., n), or what gives them."""
+    """Torques (..., n), or a function that gives them."""
     loads: ReadLoads | Given
-    """Loads, or what gives them."""
+    """Loads, or a function that gives them."""
     passive: bool
     ties: TiedMotion | None
-    """None for an open tree."""
+    """Motion under constraints; None for an open tree."""
 
     def motion(self, t: float, state: State) -> tuple[Numbers, Numbers]:
-        """q and qd of all joints, which keep the constraints."""
+        """Return q and qd of all joints, (..., n) each, which keep the constraints."""
         if self.ties is None:
             return state.q, state.v
         place = self.ties.place(t, state.q)
         return place.q, place.velocity(state.v)
 
     def rates(self, t: float, state: State) -> State:
-        """Rates of a state."""
+        """Return the rates of a state."""
         q, qd = self.motion(t, state)
         tau, pull = self.torques(t, q, qd), self.load_torque(t, q, qd)
         given = tau if pull is None else tau - pull
@@ -176,7 +176,7 @@ class EquationsOfMotion:
     def _accelerated(
         self, t: float, asked: Numbers, q: Numbers, qd: Numbers, given: Numbers, passive: bool
     ) -> Numbers:
-        """Accelerations of all joints, or of the independent ones at the place that `asked` leads to."""
+        """Return accelerations of all joints, or of the independent ones at the place for `asked`."""
         if self.ties is not None:
             return self.ties.accelerated(t, asked, qd, given, passive)
         answers = self.engine.answers
@@ -184,18 +184,18 @@ class EquationsOfMotion:
         return solve(q, qd, given)[0]
 
     def settled(self, t: float, state: State) -> State:
-        """The same state with its dependent joints where the constraints want them."""
+        """Return the state with its dependent joints where the constraints want them."""
         return state if self.ties is None else state._replace(q=self.ties.settled(t, state.q))
 
     def torques(self, t: float, q: Numbers, qd: Numbers) -> Numbers:
-        """What the actuators give, (..., n)."""
+        """Return the torques of the actuators, (..., n)."""
         if not callable(self.tau):
             return self.tau
         (tau,) = read_at(self.engine, q, {"tau": self.tau(t, q, qd)})
         return tau
 
     def load_torque(self, t: float, q: Numbers, qd: Numbers) -> Numbers | None:
-        """What loads ask of the joints, (..., n); None for none."""
+        """Return the torques that loads need from the joints, (..., n); None without loads."""
         found = self.loads
         if callable(found):
             loads = loads_of(self.engine, found(t, q, qd))
@@ -204,7 +204,7 @@ class EquationsOfMotion:
         return sum(torques[1:], torques[0]) if torques else None
 
     def energy(self, q: Numbers, qd: Numbers) -> Numbers:
-        """That of links, springs and armature, (...)."""
+        """Return the energy of links, springs and armature in J, (...)."""
         total = _conserved(self.engine, q, qd).sum(-1)
         if self.passive:
             sums = self.engine.structure.passive_sums
@@ -218,9 +218,10 @@ class EquationsOfMotion:
 def read_at(
     engine: ArrayBackend, q: Numbers, named: Mapping[str, object], beside: Mapping[str, Beside] = NOTHING
 ) -> list[Numbers]:
-    """What somebody gave at an instant, as q (..., n) is: by then it is settled how many motions there are.
+    """Return what a user's function gave at an instant, of the shape of q (..., n).
 
-    Raises ValueError for what is of more samples, and as `arrays` does.
+    By then the number of motions is settled. Raises ValueError for an argument with more samples, and as
+    `arrays` does.
     """
     at, *read = engine.arrays({"q": q, **named}, q.shape[-1], beside)
     if at.shape != q.shape:
@@ -232,9 +233,9 @@ def read_at(
 
 
 def _conserved(engine: ArrayBackend, q: Numbers, qd: Numbers) -> Numbers:
-    """qd . dK/dqd - K + P of each link, which nothing but torques and loads changes: K + P of rigid links.
+    """Return qd . dK/dqd - K + P of each link, (..., N), which only torques and loads change.
 
-    With K = K2 + K1 + K0 by its order in qd it is K2 - K0 + P.
+    For rigid links it is K + P. With K = K2 + K1 + K0 by its order in qd it is K2 - K0 + P.
     """
     kinetic, potential = engine.answers.energy(q, qd)
     if engine.tree is not None:

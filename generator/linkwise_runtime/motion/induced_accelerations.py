@@ -1,6 +1,6 @@
-"""What each source accelerates, and what it puts on constraints: sources side by side, solved for at once.
+"""Accelerations and constraint forces by source: sources side by side, solved for at once.
 
-Coordinates answer to forces freely, or with constraints A qd = 0 that they must keep.
+Coordinates respond to forces freely, or under constraints A qd = 0 that they must keep.
 
 With constraints each source x solves
 
@@ -29,38 +29,38 @@ from .source_forces import SourceForces, loads_of, source_forces, with_actuators
 
 
 class DrivenRobot(TiedRobot, Protocol):
-    """What induced accelerations ask of a robot."""
+    """Attributes of a robot that induced accelerations need."""
 
     @property
     def name(self) -> str:
-        """That of its package."""
+        """Name of the robot's package."""
 
     @property
     def constraints(self) -> Constraints[Any]:
-        """Those of its file."""
+        """Constraints of the robot's file."""
 
 
 @dataclass(frozen=True)
 class FreeResponse:
-    """An open tree's: M qdd = F."""
+    """Response of an open tree to forces: M qdd = F."""
 
     structure: Structure
     mass: Numbers
 
     def accelerations(self, forces: Numbers) -> Numbers:
-        """What columns of forces (..., n, X) accelerate."""
+        """Return the accelerations (..., n, X) that columns of forces (..., n, X) cause."""
         return solved_columns(self.mass, forces, self.structure.joint_names)
 
     def needed(self, forces: Numbers) -> Numbers:
-        """Torques of the actuators that bear these (..., n, X): all of them."""
+        """Return the torques of the actuators that carry forces (..., n, X): all of them."""
         return forces
 
     def of_velocities(self) -> Numbers:
-        """Accelerations of the constraints' own source, by cause (..., n, n)."""
+        """Return the accelerations of the constraints' own source, by cause (..., n, n): zeros."""
         return 0.0 * self.mass
 
     def reactions(self, forces: Numbers | None, accelerations: Numbers) -> Numbers:
-        """Raises ValueError: nothing reacts."""
+        """Raise ValueError: nothing reacts."""
         raise ValueError(
             f"nothing reacts on {self.structure.name}: it has no constraints; give some, such as "
             "robot.constrained(contacts=...)"
@@ -69,32 +69,32 @@ class FreeResponse:
 
 @dataclass(frozen=True)
 class TiedResponse:
-    """That of coordinates that keep constraints."""
+    """Response of coordinates to forces under constraints."""
 
     engine: ArrayBackend
     mass: Numbers
     constraints: Constraints[Any]
     place: ClosedPlace
     bias: Numbers
-    """beta by cause, (..., n, n)."""
+    """Accelerations beta by cause, (..., n, n)."""
 
     def accelerations(self, forces: Numbers) -> Numbers:
-        """What columns of forces (..., n, X) accelerate."""
+        """Return the accelerations (..., n, X) that columns of forces (..., n, X) cause."""
         g = self.place.found.map
         projected = g.mT @ self.mass @ g
         return g @ solved_columns(projected, g.mT @ forces, self.constraints.independent)
 
     def needed(self, forces: Numbers) -> Numbers:
-        """Torques of actuators at the independent joints that bear these (..., n, X)."""
+        """Return the torques of actuators at independent joints that carry forces (..., n, X)."""
         own = np.eye(self.mass.shape[-1])[:, list(self.constraints.ties.chosen.independent)]
         return self.engine.constant(own, self.mass) @ (self.place.found.map.mT @ forces)
 
     def of_velocities(self) -> Numbers:
-        """Accelerations of the constraints' own source, by cause (..., n, n)."""
+        """Return the accelerations of the constraints' own source, by cause (..., n, n)."""
         return self.bias - self.accelerations(self.mass @ self.bias)
 
     def reactions(self, forces: Numbers | None, accelerations: Numbers) -> Numbers:
-        """lambda (..., C, X), by columns of forces, None for none, and what they accelerate."""
+        """Return lambda (..., C, X), for columns of forces, or None, and their accelerations."""
         torque = self.mass @ accelerations
         return borne(self.place.found, torque if forces is None else torque - forces)
 
@@ -105,7 +105,7 @@ Response = FreeResponse | TiedResponse
 def response_of(
     engine: ArrayBackend, constraints: Constraints[Any] | None, q: Numbers, qd: Numbers, mass: Numbers
 ) -> Response:
-    """How coordinates answer at a state that has been read, with these constraints or none."""
+    """Return how coordinates respond at a state that has been read, with these constraints or none."""
     if constraints is None:
         return FreeResponse(engine.structure, mass)
     place = constraints.ties.place(engine, q)
@@ -113,9 +113,10 @@ def response_of(
 
 
 def constraints_of(robot: DrivenRobot, given: object) -> Constraints[Any] | None:
-    """What a motion keeps: that which is given, or the robot's own; None where it keeps nothing.
+    """Return the constraints of a motion: those given, or the robot's own; None where there are none.
 
-    Raises TypeError for what is no constraints, and ValueError for those of another robot.
+    given: False for none, None for the robot's own
+    Raises TypeError for what is not constraints, and ValueError for those of another robot.
     """
     if given is False:
         return None
@@ -134,11 +135,11 @@ def constraints_of(robot: DrivenRobot, given: object) -> Constraints[Any] | None
 
 
 CENTRE_OF_MASS = "centre of mass"
-"""What `frame` says for it; a frame of this name comes first."""
+"""Name that `frame` has for the centre of mass; a frame of this name comes first."""
 
 
 class Driven(NamedTuple):
-    """Arguments as `Dynamics.induced_accelerations` has them."""
+    """Arguments of `Dynamics.induced_accelerations`."""
 
     q: object
     qd: object
@@ -150,13 +151,13 @@ class Driven(NamedTuple):
 
 
 class DrivenSources(NamedTuple):
-    """A motion, the forces of all sources, and what answers to them."""
+    """Motion, the forces of all sources, and the response to them."""
 
     engine: ArrayBackend
     q: Numbers
     qd: Numbers
     point: dict[str, Numbers]
-    """Of the frame that is asked for, in as many samples; none where none is given."""
+    """Point of the frame that is asked for, in as many samples; empty where none is given."""
     forces: SourceForces
     response: Response
 
@@ -164,7 +165,7 @@ class DrivenSources(NamedTuple):
 def induced_accelerations(
     robot: DrivenRobot, asked: Driven, frame: object, point: object
 ) -> InducedAccelerations[Any]:
-    """See `Dynamics.induced_accelerations`."""
+    """Return the answer of `Dynamics.induced_accelerations`."""
     if frame is None and point is not None:
         raise ValueError("point is given without the frame that it is a point of; give frame too")
     at = _sources(robot, asked, point)
@@ -177,7 +178,7 @@ def induced_accelerations(
 
 
 def induced_reactions(robot: DrivenRobot, asked: Driven) -> InducedAccelerations[Any]:
-    """See `Dynamics.induced_reactions`."""
+    """Return the answer of `Dynamics.induced_reactions`."""
     at = _sources(robot, asked, None)
     by_velocity = at.response.reactions(None, at.response.of_velocities())
     moved = at.response.reactions(at.forces.columns, at.response.accelerations(at.forces.columns))
@@ -185,7 +186,7 @@ def induced_reactions(robot: DrivenRobot, asked: Driven) -> InducedAccelerations
 
 
 def _sources(robot: DrivenRobot, asked: Driven, point: object) -> DrivenSources:
-    """Raises ValueError and TypeError as `Dynamics.induced_accelerations` does."""
+    """Return motion, forces and response; raises as `Dynamics.induced_accelerations` does."""
     tau, qdd = asked.tau, asked.qdd
     if (tau is None) == (qdd is None):
         raise TypeError(

@@ -1,4 +1,4 @@
-"""How a robot moves over time: arguments are checked, the motion is integrated and collected."""
+"""Simulation of a robot over time: arguments are checked, the motion is integrated and collected."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -29,9 +29,9 @@ ADAPTIVE = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 def in_fixed_steps(
     rates: Rates, settle: Rates, start: State, times: Sequence[float], step: float | None
 ) -> Iterator[State]:
-    """States at `times`, between which there are as many equal steps as make none longer than `step`.
+    """Yield states at `times`, with as many equal steps between them as make none longer than `step`.
 
-    settle: what is made of an instant and a state after each step
+    settle: function of an instant and the state after each step, which returns the state to go on from
     """
     yield start
     state = start
@@ -51,7 +51,7 @@ def by_scipy(
     step: float | None,
     tolerances: tuple[float, float],
 ) -> Iterator[State]:
-    """States at `times` of NumPy arrays, by steps that keep the error of each within the tolerances.
+    """Return states at `times`, of NumPy arrays, by steps whose errors are each within the tolerances.
 
     Raises ImportError without SciPy, ValueError where the solver gives up.
     """
@@ -81,7 +81,7 @@ def by_scipy(
 
 
 def _step(rates: Rates, t: float, length: float, state: State) -> State:
-    """y + h/6 (k1 + 2 k2 + 2 k3 + k4)."""
+    """Return the state after a step of length h: y + h/6 (k1 + 2 k2 + 2 k3 + k4)."""
 
     def moved(by: float, slope: State) -> State:
         return State(*(a + by * b for a, b in zip(state, slope, strict=True)))
@@ -107,7 +107,7 @@ def _shaped(values: NDArray[np.float64], like: State) -> State:
 
 
 class Simulated(NamedTuple):
-    """Arguments as `Dynamics.simulate` has them."""
+    """Arguments of `Dynamics.simulate`."""
 
     q: object
     qd: object
@@ -123,7 +123,7 @@ class Simulated(NamedTuple):
 
 
 def simulated(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
-    """See `Dynamics.simulate`."""
+    """Return the answer of `Dynamics.simulate`."""
     constraints = constraints_of(robot, asked.constraints)
     q, qd = asked.q, asked.qd
     if constraints is not None:
@@ -161,7 +161,7 @@ def simulated(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
 
 
 def _of_all_joints(constraints: Constraints[Any], q: object, qd: object) -> tuple[object, object]:
-    """The start of all joints, where it is given of the independent ones."""
+    """Return q and qd of all joints at the start, also where they are given for the independent ones."""
     m = len(constraints.independent)
     if shape_of(q)[-1:] == (m,):
         q = constraints.closed(cast(Any, q))
@@ -173,7 +173,7 @@ def _of_all_joints(constraints: Constraints[Any], q: object, qd: object) -> tupl
 def _started(
     free: EquationsOfMotion, q: Numbers, qd: Numbers, constraints: Constraints[Any] | None
 ) -> tuple[EquationsOfMotion, State]:
-    """Equations of an open tree, or the same with constraints, and the state that they start from."""
+    """Return equations for an open tree, or with constraints, and the state that they start from."""
     work = 0.0 * q.sum(-1)
     if constraints is None:
         return free, State(q, qd, work)
@@ -183,7 +183,7 @@ def _started(
 
 
 def _finite(states: Iterator[State], times: Sequence[float], like: Numbers) -> Iterator[State]:
-    """The states; raises ValueError for the first that is not finite."""
+    """Yield the states; raises ValueError for the first that is not finite."""
     xp = namespace(like)
     for t, state in zip(times, states, strict=True):
         if not bool(xp.isfinite(state.q).all() & xp.isfinite(state.v).all()):
@@ -196,7 +196,7 @@ def _finite(states: Iterator[State], times: Sequence[float], like: Numbers) -> I
 def _collected(
     equations: EquationsOfMotion, times: Sequence[float], states: Iterator[State]
 ) -> Trajectory[Any]:
-    """The motion at all instants."""
+    """Return the motion at all instants."""
     rows = []
     for t, state in zip(times, states, strict=True):
         q, qd = equations.motion(t, state)
@@ -209,7 +209,7 @@ def _collected(
 
 
 def _instants(time: object) -> list[float]:
-    """Raises ValueError for what is not a list of rising finite numbers."""
+    """Return the instants in s; raises ValueError for what is not a list of rising finite numbers."""
     instants = as_array("time", time)
     if instants.ndim != 1 or not len(instants) or instants.dtype.kind not in "iuf":
         raise ValueError(

@@ -29,10 +29,10 @@ class SourceForces(NamedTuple):
     """M (..., n, n)."""
     columns: Numbers
     tails: tuple[tuple[int, ...], ...]
-    """Shape of the sources of each kind, which follow each other in the columns."""
+    """Shapes of the sources of each kind, which follow each other in the columns."""
 
     def split(self, columns: Numbers) -> list[Numbers]:
-        """What belongs to each kind of source, (..., r, *tail), of columns (..., r, X)."""
+        """Return the columns of each kind of source, (..., r, *tail), of columns (..., r, X)."""
         parts, start = [], 0
         for tail in self.tails:
             end = start + math.prod(tail)
@@ -44,9 +44,10 @@ class SourceForces(NamedTuple):
 def source_forces(
     engine: ArrayBackend, q: Numbers, qd: Numbers, pulls: Sequence[Numbers], passive: bool
 ) -> SourceForces:
-    """All sources but actuators: velocity (N, n), gravity (N), passive (3, n), loads (L).
+    """Return the forces of all sources but actuators.
 
-    pulls: what each load asks of the joints, (..., n)
+    In this order: velocity (N, n), gravity (N), passive (3, n), loads (L).
+    pulls: torques that each load needs from the joints, (..., n)
     """
     structure = engine.structure
     n, links, own = structure.n, structure.N, structure.passive_sums
@@ -66,17 +67,17 @@ def source_forces(
 
 
 def with_actuators(forces: SourceForces, tau: Numbers, identity: Numbers) -> SourceForces:
-    """The same with torques (..., n) of actuators before them."""
+    """Return the forces with columns for the torques (..., n) of actuators before them."""
     columns = namespace(tau).concat([identity * tau[..., None, :], forces.columns], -1)
     return SourceForces(forces.mass, columns, ((tau.shape[-1],), *forces.tails))
 
 
 class OnFrame(NamedTuple):
-    """A force and moment on a frame."""
+    """Force and moment on a frame."""
 
     frame: int
     vectors: Mapping[str, str]
-    """Names under which its vectors are read, by what they are."""
+    """Names under which its vectors are read, by what they are: force, moment, point or at."""
 
 
 @dataclass(frozen=True)
@@ -84,13 +85,13 @@ class AppliedLoads:
     """Loads as they were given, whose vectors are read beside motion."""
 
     each: Sequence[Sequence[OnFrame]]
-    """What counts as one load."""
+    """Forces and moments of each load."""
     beside: Mapping[str, Beside]
 
     def torques(self, engine: ArrayBackend, q: Numbers, vectors: Sequence[Numbers]) -> list[Numbers]:
-        """What each load adds to the torques that joints need, (..., n).
+        """Return the torques that each load adds to those that joints need, (..., n).
 
-        vectors: what `beside` was read as
+        vectors: values read for `beside`
         """
         named = dict(zip(self.beside, vectors, strict=True))
 
@@ -102,7 +103,7 @@ class AppliedLoads:
 
 
 def loads_of(backend: ArrayBackend, given: object) -> AppliedLoads:
-    """Loads of a robot on this back end; raises TypeError and ValueError, which tell which load is meant."""
+    """Return the loads of a robot on this back end; raises TypeError and ValueError, which name the load."""
     if isinstance(given, AppliedLoad):
         given = [given]
     if not isinstance(given, list | tuple) or hasattr(given, "_fields"):
@@ -132,7 +133,10 @@ def loads_of(backend: ArrayBackend, given: object) -> AppliedLoads:
 
 
 def _kind(given: object) -> str:
-    """How an error calls what is no load: one of another copy of the runtime, also in a list, by its own."""
+    """Return how an error names what is no load.
+
+    A load of another copy of the runtime, also in a list, is named with that copy.
+    """
     among = given if isinstance(given, list) else [given]
     alike = [one for one in among if type(one).__name__ == AppliedLoad.__name__]
     return known_kind(alike[0], AppliedLoad) if alike else f"a {type(given).__name__}"

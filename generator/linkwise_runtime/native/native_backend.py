@@ -30,40 +30,50 @@ Arrays = Sequence[NumberArray]
 
 
 class NativeAnswers(Answers):
-    """The rows that C has for arrays; the others are made of these."""
+    """Answers to the calls that C has for arrays; the other answers are composed of these."""
 
     contiguous = True
 
     def __init__(self, engine: ArrayBackend, quick: QuickCalls, control: ControlCalls | None) -> None:
-        """control: C functions that take one sample; links of energies have none."""
+        """Keep the compiled calls for arrays.
+
+        control: C functions that take one sample; None for links that are given by their energies.
+        """
         super().__init__(engine)
         self._quick, self._control, self._tied = quick, control, engine.ties_joints
 
     def compute_into(self, call: str, motion: Sequence[Numbers], into: Sequence[Numbers]) -> None:
-        """Compute a call's results where these arrays lie."""
+        """Compute a call's results and write them to the arrays `into`."""
         if call in FUNCTIONS:
             self._quick.run(call, cast(Arrays, motion), cast(Arrays, into))
         else:
             super().compute_into(call, motion, into)
 
     def mass_matrix(self, q: Numbers) -> Sequence[Numbers]:
-        """M."""
+        """Return the mass matrix M (..., n, n), the only entry of a sequence."""
         found = self._of_one("mass_matrix", (q,))
         return super().mass_matrix(q) if found is None else (found,)
 
     def forward_dynamics(self, q: Numbers, qd: Numbers, tau: Numbers) -> Sequence[Numbers]:
-        """Where C finds M singular, arrays say what is wrong."""
+        """Return qdd (..., n), the only entry of a sequence.
+
+        Where C finds M singular, the calls for arrays say what is wrong.
+        """
         found = self._accelerated("forward_dynamics", q, qd, tau)
         return super().forward_dynamics(q, qd, tau) if found is None else (found,)
 
     def forward_dynamics_of_links(self, q: Numbers, qd: Numbers, tau: Numbers) -> Sequence[Numbers]:
-        """The same; C has it apart where joints have anything of their own."""
+        """Return qdd (..., n) of the links alone, without springs, damping, friction or armature of joints.
+
+        It is the only entry of a sequence. C has a separate function for it only where joints have any of
+        these.
+        """
         call = "forward_dynamics_of_links" if self._structure.passive else "forward_dynamics"
         found = self._accelerated(call, q, qd, tau)
         return super().forward_dynamics_of_links(q, qd, tau) if found is None else (found,)
 
     def _accelerated(self, call: str, *motion: Numbers) -> Numbers | None:
-        """What C answers; None where it has no such function, as of joints that are tied."""
+        """Return the accelerations that C finds; None where it has no such function, as for tied joints."""
         return None if self._tied else self._of_one(call, motion)
 
     def _of_one(self, call: str, motion: Sequence[Numbers]) -> Numbers | None:
@@ -71,7 +81,7 @@ class NativeAnswers(Answers):
 
 
 def _of_c(key: str) -> Callable[..., Sequence[Numbers]]:
-    """A row that C has."""
+    """Return a method that answers the call `key` by the compiled C."""
 
     def row(self: NativeAnswers, *motion: Numbers) -> Sequence[Numbers]:
         return self._quick.run(key, cast(Arrays, motion))
@@ -84,7 +94,7 @@ for _name in FUNCTIONS.keys() & CALLS.keys():
 
 
 class NativeBackend(NumpyBackend):
-    """Arrays for arrays, of which this is what computes, tensors for tensors, on a side of their own.
+    """The native back end: computes with NumPy arrays itself, and with tensors through its `TorchSide`.
 
     Each parameter is one number for all samples.
     """
@@ -99,9 +109,10 @@ class NativeBackend(NumpyBackend):
         parameters: Mapping[str, float | Numbers],
         rule: RigidRule | None = None,
     ) -> None:
-        """`sources` is the package's folder of C; `links` or `rule` serve torch, which differentiates them.
+        """Compile the C at the first call for this package; raise RuntimeError where that is not possible.
 
-        Compiles at the first call for this package; raises RuntimeError where that cannot be.
+        sources: the package's folder of C
+        links, rule: what torch differentiates, one or the other
         """
         super().__init__(structure, links, {}, rule)
         self._forms = links
@@ -116,17 +127,17 @@ class NativeBackend(NumpyBackend):
 
     @property
     def threads(self) -> int:
-        """Threads that a large batch may use; as many as there are cores unless set."""
+        """Number of threads that a large batch may use: the number of cores unless set."""
         return self.calls.threads
 
     @threads.setter
     def threads(self, count: int) -> None:
-        """Raises TypeError or ValueError for what is not a whole number from 1 on."""
+        """Set the number of threads; raise TypeError or ValueError unless it is a whole number from 1 on."""
         self.threads_set = checked_threads(count)
 
     @property
     def threads_set(self) -> int | None:
-        """Threads that somebody has set; None where nobody has."""
+        """Number of threads that a user has set; None where nobody has."""
         return self.calls.threads_set
 
     @threads_set.setter
@@ -135,12 +146,12 @@ class NativeBackend(NumpyBackend):
 
     @cached_property
     def answers(self) -> Answers:
-        """Rows of the table, of arrays that have been read."""
+        """Answers to the calls of the call table, for arrays that have been read."""
         return NativeAnswers(self, self.quick, cast("ControlCalls | None", self.one_sample))
 
     @cached_property
     def on_torch(self) -> "TorchSide":
-        """What computes with tensors."""
+        """Back end that computes with tensors."""
         from .native_torch import TorchSide  # it needs torch, which arrays do without
 
         return TorchSide(self.calls, self.quick.run, self._forms, self.rule)
@@ -148,26 +159,26 @@ class NativeBackend(NumpyBackend):
     def read(
         self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
     ) -> tuple[ArrayBackend, Sequence[Numbers]]:
-        """What computes, and `arrays` as it computes with them: a tensor among them makes all tensors."""
+        """Return the back end that computes, and its `arrays`: all tensors if one argument is a tensor."""
         if "torch" in sys.modules and has_tensors(as_given(named, beside).values()):
             return self.on_torch, self.on_torch.arrays(named, n, beside)
         return self, self.arrays(named, n, beside)
 
     def controller(self, joints: object, frame: object) -> TorqueOfOne | None:
-        """C's torque of one sample."""
+        """Return the object that computes a controller's torque for one sample in C."""
         targets, framed = cast(JointTargets, joints), cast("FrameTargets | None", frame)
         return NativeTorque(self.calls, self.tree is not None, targets, framed)
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
+        """Return c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         return self._run("packed", q, qd, qdd)
 
     def torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
-        """tau (..., count) in the order of `Layout.torque`."""
+        """Return tau (..., count) in the order of `Layout.torque`."""
         return self._run("packed_torque", q, qd, qdd)[0]
 
     def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
-        """c0 (..., count) in the order of `Layout.velocity`."""
+        """Return c0 (..., count) in the order of `Layout.velocity`."""
         return self._run("packed_position_gradient", q, qd, qdd)[0]
 
     def _run(self, call: str, *motion: Numbers) -> Arrays:

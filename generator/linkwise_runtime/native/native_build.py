@@ -1,4 +1,4 @@
-"""Compiling a robot's C once, into a cache.
+"""Compiles a robot's C once, into a cache.
 
 A library's name is a hash of the sources, the flags, the compiler and the processor, so that a changed
 package, or another machine with the same home directory, gets a library of its own. LINKWISE_CACHE names
@@ -26,16 +26,16 @@ PARTS = {
     "regressors": ("REGRESSORS", "SINES"),
     "control": ("CONTROL", "SINES"),
 }
-"""Parts of a robot's file (see numbers.h) in its libraries; what nobody asks for is not compiled."""
+"""Parts of a robot's C file (see numbers.h) by library; a library is compiled when first asked for."""
 
 MADE = "library"
-"""Name of what is being made, but for its end."""
+"""File name of a library while it is being built, without its ending."""
 
 STACK = re.compile(r"none\s+takes\s+more\s+than\s+([\d,]+)\s+bytes")
-"""How NAME.h says what its functions take."""
+"""Pattern of the line in NAME.h that says how much stack its functions take."""
 
 Commands = Callable[[Path], Sequence[Sequence[Sequence[str]]]]
-"""Command lines that make a library in a folder: those that run side by side, then those after them."""
+"""Command lines that make a library in a folder: first those that run side by side, then those after them."""
 
 
 @dataclass(frozen=True)
@@ -45,26 +45,26 @@ class Sources:
     name: str
     directory: Path
     digest: str = ""
-    """Of what the directory held when the robot was loaded; empty where whatever it holds will do."""
+    """Hash of the directory's files when the robot was loaded; empty where any files will do."""
 
     def file(self, real: str) -> Path:
-        """File to compile for `real`, double or float."""
+        """Return the path of the file to compile for `real`, double or float."""
         return self.directory / f"{self.name}{'f' if real == 'float' else ''}.c"
 
 
 @cache
 def loaded(structure: Structure, directory: Path) -> Sources:
-    """A robot's C as it is at first: what is generated anew later does not go with the Python that runs."""
+    """Return a robot's C as first loaded: files generated later do not fit the Python that is running."""
     return Sources(structure.name, directory, digest_of(directory))
 
 
 def library(sources: Sources, real: str, what: str = "decomposition") -> Path:
-    """Path of a library, compiled if it isn't there or isn't whole; raises RuntimeError if it cannot be.
+    """Return the path of a library, compiled if it is missing or not whole.
 
-    It cannot be where the sources are not those that were loaded.
+    Raises RuntimeError where it cannot be compiled, and where the sources are not those that were loaded.
 
     real: double or float; what: decomposition, which holds the torques alone too, or another of PARTS.
-    A terminal is told of the wait on stderr.
+    On a terminal, stderr shows that it is being compiled.
     """
     digest = sources.digest or digest_of(sources.directory)
 
@@ -92,7 +92,7 @@ def library(sources: Sources, real: str, what: str = "decomposition") -> Path:
 
 
 def require_stack(name: str, directory: Path) -> None:
-    """Raise RuntimeError for a robot whose C takes more stack, as NAME.h has it, than a thread has here."""
+    """Raise RuntimeError where a robot's C takes more stack, by its NAME.h, than is safe on this system."""
     header = directory / f"{name}.h"
     text = header.read_text(encoding="utf-8") if header.is_file() else ""
     told, most = STACK.search(text), system_here().stack
@@ -104,9 +104,11 @@ def require_stack(name: str, directory: Path) -> None:
 
 
 def extension(source: Path, headers: Sequence[str], versions: Sequence[str]) -> Path:
-    """Path of a module for Python, made of one file, compiled likewise.
+    """Return the path of a Python extension module, made of one file and compiled into the cache.
 
-    versions: what it depends on beside its text and the compiler
+    Raises RuntimeError where it cannot be compiled.
+
+    versions: what it depends on besides its text and the compiler
     """
     compiler = find_compiler()
     if not compiler.makes_modules:
@@ -126,7 +128,7 @@ def extension(source: Path, headers: Sequence[str], versions: Sequence[str]) -> 
 
 
 def _kept(name: str, what: str, compiler: Compiler, commands: Commands, check: Callable[[], None]) -> Path:
-    """Path of a library in the cache, made there if need be; `check` raises for what is not to be kept."""
+    """Return a library's path in the cache, built there if need be; `check` raises for one not to be kept."""
     target = cache_directory() / f"{name}{system_here().library}"
     if not is_whole(target):
         lock = target.with_suffix(".lock")
@@ -141,7 +143,7 @@ def _made(folder: Path) -> Path:
 
 
 def digest_of(directory: Path) -> str:
-    """Hash of the names and the bytes of all files; raises RuntimeError where they cannot be read."""
+    """Return a hash of the names and bytes of all files; raise RuntimeError where they cannot be read."""
     digest = hashlib.sha256()
     try:
         for path in _inside(directory):
@@ -155,7 +157,7 @@ def digest_of(directory: Path) -> str:
 
 
 def _inside(directory: Path) -> Iterator[Path]:
-    """What a folder and its own folders hold, in order."""
+    """Yield the files in a folder and in its subfolders, in order."""
     for path in sorted(directory.iterdir()):
         if path.is_dir() and not path.is_symlink():
             yield from _inside(path)
@@ -164,7 +166,7 @@ def _inside(directory: Path) -> Iterator[Path]:
 
 
 def _fingerprint(digest: str, compiler: Compiler) -> str:
-    """Hash of everything that the library depends on."""
+    """Return a hash of everything that the library depends on."""
     place = (digest, compiler.command, compiler.flags, compiler.version(), platform.machine(), processor())
     return hashlib.sha256(repr(place).encode()).hexdigest()[:20]
 
@@ -172,10 +174,10 @@ def _fingerprint(digest: str, compiler: Compiler) -> str:
 def _build(
     compiler: Compiler, commands: Commands, target: Path, tell: Tell, check: Callable[[], None]
 ) -> None:
-    """Compile side by side, link, and move the library into place in one step."""
+    """Compile the parts side by side, link them, and move the library into place in one step."""
     folder = target.with_suffix(".build")
     try:
-        shutil.rmtree(folder, ignore_errors=True)  # of a process that was killed: this one holds the lock
+        shutil.rmtree(folder, ignore_errors=True)  # left by a killed process: this one holds the lock
         folder.mkdir(mode=0o700)
         made = _made(folder)
         try:
@@ -187,7 +189,7 @@ def _build(
             raise RuntimeError(f"{error}; the other back ends need no compiler") from None
         if not made.is_file():
             raise RuntimeError(f"{compiler.command[0]} made no library; point CC to a C compiler")
-        check()  # it may be of two texts
+        check()  # the sources may have changed while they were compiled
         keep(made, target)
     except OSError as error:
         place = error.filename or target

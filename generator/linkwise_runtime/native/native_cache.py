@@ -1,9 +1,9 @@
 """The directory that keeps compiled libraries: who may write there, and whether a library is still whole.
 
-Code that another user may change would run as this one, and a library cut short ends the interpreter that
-calls it. So the directory must belong to this user, or to root, and be closed to the others, as far as the
-system tells; beside each library lies the hash of its bytes, which are read and compared before they are
-loaded.
+A library that another user can change would run as this user, and a truncated library crashes the
+interpreter that calls it. So the directory must belong to this user, or to root, and be closed to others, as
+far as the system reports; beside each library lies the hash of its bytes, which are read and compared before
+the library is loaded.
 """
 
 import errno
@@ -19,19 +19,19 @@ from .native_system import system_here
 
 ELSEWHERE = "set LINKWISE_CACHE to another directory"
 SAFELY = sum(getattr(os, flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
-"""How a file is opened that somebody may have planted: as far as the system can, no link is followed."""
+"""Flags to open a file that another user may have planted: as far as the system can, no link is followed."""
 NOT_OWN = "it is not a plain file of your own; remove it"
 
 
 def cache_directory() -> Path:
-    """LINKWISE_CACHE, or linkwise in the user's cache directory; made if need be.
+    """Return LINKWISE_CACHE, or linkwise in the user's cache directory; made if need be.
 
     Raises RuntimeError where it cannot be made, and where another user may write to it.
     """
     path = _chosen_directory()
     try:
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
-        path = path.resolve()  # a link that leads there may lead elsewhere later
+        path = path.resolve()  # a link may point elsewhere later
         found = path.stat()
     except OSError as error:
         raise RuntimeError(f"cannot make the cache {path}: {error.strerror}; {ELSEWHERE}") from None
@@ -53,7 +53,7 @@ def _chosen_directory() -> Path:
 
 
 def is_whole(library: Path) -> bool:
-    """Whether a library is a file that no other user may change, with the bytes that its hash is of."""
+    """Return whether no other user may change a library's file, and its bytes have the stored hash."""
     try:
         with _opened(library) as file, _opened(_digest_of(library)) as digest:
             closed = not system_here().others_may_write(os.fstat(file.fileno()).st_mode)
@@ -68,16 +68,16 @@ def keep(made: Path, library: Path) -> None:
     with made.open("rb") as file:
         digest.write_text(hashlib.file_digest(file, "sha256").hexdigest(), encoding="ascii")
     made.chmod(0o644)
-    # Whoever looks between the two finds a hash that does not fit, waits for the lock, and looks again.
+    # A process that looks in between finds a hash that does not fit, waits for the lock, and looks again.
     system_here().moved(digest.replace, _digest_of(library))
     system_here().moved(made.replace, library)
 
 
 @contextmanager
 def locked(path: Path, tell: Callable[[str], None]) -> Iterator[None]:
-    """Keep other processes out while one builds; the lock goes with the process that holds it.
+    """Keep other processes out while one builds; the lock ends with the process that holds it.
 
-    `tell` is called where another one holds it. Raises RuntimeError if there can be no lock.
+    `tell` is called where another process holds it. Raises RuntimeError if no lock is possible.
     """
     system = system_here()
     with ExitStack() as held:
@@ -92,7 +92,7 @@ def locked(path: Path, tell: Callable[[str], None]) -> Iterator[None]:
 
 
 def _opened(path: Path, flags: int = os.O_RDONLY) -> BufferedReader:
-    """A plain file of a trusted user; raises OSError for another user's, for links and for pipes."""
+    """Open a plain file of a trusted user; raise OSError for another user's file, a link or a pipe."""
     try:
         descriptor = os.open(path, flags | SAFELY, 0o600)
     except OSError as error:
@@ -109,5 +109,5 @@ def _digest_of(library: Path) -> Path:
 
 
 def _trusted() -> tuple[int, int]:
-    """Numbers of the users whose files are taken: this one's own, and root's, who can do anything anyway."""
+    """Return the ids of the users whose files are trusted: this user, and root, who can do anything."""
     return system_here().user(), 0

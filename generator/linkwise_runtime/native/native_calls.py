@@ -1,4 +1,4 @@
-"""Calls of the compiled C: arrays in, arrays out, large batches on several threads."""
+"""Calls of the compiled C on arrays; large batches run on several threads."""
 
 import ctypes
 import math
@@ -29,11 +29,11 @@ PER_THREAD = 1 << 20
 """Bytes of results below which another thread costs more than it saves."""
 
 PACKED_GRADIENT = "packed_position_gradient"
-"""What gradients of a position are spread from; no row of the table, as no call of Python answers with it."""
+"""Packed derivatives by position; no row of the call table, as no call of Python answers with them."""
 FUNCTIONS = {key: row.c for key, row in CALLS.items() if row.c and not row.one} | {
     PACKED_GRADIENT: "position_gradient"
 }
-"""What the calls of many samples are called in C."""
+"""Names in C of the calls for many samples."""
 
 AT_REST = ("coefficients", "coefficient_regressors")
 """Calls that take no qdd."""
@@ -41,17 +41,17 @@ AT_REST = ("coefficients", "coefficient_regressors")
 
 @cache
 def pool(threads: int) -> ThreadPoolExecutor:
-    """Worker threads, shared by all robots; ctypes lets go of Python's lock while C runs."""
+    """Return worker threads, shared by all robots; ctypes releases Python's lock while C runs."""
     return ThreadPoolExecutor(threads, thread_name_prefix="linkwise")
 
 
-# Threads don't survive a fork; the child starts its own.
+# Threads do not survive a fork; the child process starts its own.
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=pool.cache_clear)
 
 
 def checked_threads(count: object) -> int:
-    """How many threads a large batch may use; raises TypeError or ValueError for what is no such number."""
+    """Return a number of threads; raise TypeError or ValueError unless it is a whole number from 1 on."""
     if isinstance(count, bool) or not isinstance(count, int | np.integer):
         raise TypeError(f"threads is a {type(count).__name__}; give a whole number from 1 on")
     if count < 1:
@@ -62,7 +62,7 @@ def checked_threads(count: object) -> int:
 class NativeCalls:
     """The C functions of a package for given parameters; each parameter is one number for all samples.
 
-    `threads` is how many a large batch may use.
+    `threads` is how many threads a large batch may use.
     """
 
     def __init__(
@@ -72,9 +72,9 @@ class NativeCalls:
         parameters: Mapping[str, float | Numbers],
         threads: int | None = None,
     ) -> None:
-        """Compile at the first call for this package; raises RuntimeError where that cannot be.
+        """Compile at the first call for this package; raise RuntimeError where that is not possible.
 
-        threads: as many as there are cores unless given
+        threads: the number of cores unless given
         """
         self.structure, self.parameters = structure, dict(parameters)
         self.sources = loaded(structure, sources)
@@ -91,11 +91,11 @@ class NativeCalls:
 
     @property
     def threads(self) -> int:
-        """How many threads a large batch may use."""
+        """Number of threads that a large batch may use."""
         return self.threads_set or self._cores
 
     def at_once(self, call: str, motion: Sequence[object]) -> list[NumberArray] | None:
-        """Results for what is plainly one sample of a call that there has been; else None."""
+        """Return the results for one plain sample of a call made before; None for anything else."""
         kind, shape = getattr(motion[0], "dtype", None), self._shape
         for a in motion:
             if type(a) is not np.ndarray or a.dtype is not kind or a.shape != shape:
@@ -106,14 +106,14 @@ class NativeCalls:
         arrays: Any = motion
         try:
             numbers = b"".join(arrays)
-        except TypeError:  # one has gaps
+        except TypeError:  # one of the arrays is not contiguous
             return None
         return self._of_one.results(key, numbers)
 
     def run(
         self, call: str, motion: Sequence[NumberArray], into: Sequence[NumberArray] | None = None
     ) -> Sequence[NumberArray]:
-        """Results of a call for arrays of one shape (..., n), written to `into`, or to new memory."""
+        """Return a call's results for arrays of one shape (..., n), written to `into`, or to new memory."""
         q = motion[0]
         kind, batch = q.dtype, q.shape[:-1]
         count = q.size // q.shape[-1]
@@ -130,7 +130,7 @@ class NativeCalls:
         if self.parameters:
             read.append(self.constants(kind))
         sizes = self.sizes[call]
-        # A robot may have none of a kind; its functions then take no array for it.
+        # A robot may lack entries of some kind; its functions then take no array for them.
         written = into if self._complete[call] else [a for a, size in zip(into, sizes, strict=True) if size]
         parts = min(self.threads, count * self._widths[call] * kind.itemsize // PER_THREAD)
         if parts <= 1:
@@ -146,7 +146,7 @@ class NativeCalls:
         return into
 
     def _one_sample(self, key: tuple[str, NumberType]) -> OneSampleCall:
-        """A call for one sample of a dtype."""
+        """Return a call for one sample of a dtype, with memory of its own."""
         call, kind = key
         compute = self._functions.get(key) or self._function(call, kind)
         motion = np.empty((2 if call in AT_REST else 3, self.structure.n), kind)
@@ -156,15 +156,15 @@ class NativeCalls:
         return one_sample_call(compute, False, given, motion, results)
 
     def constants(self, kind: NumberType) -> NumberArray:
-        """Values of the parameters in the order of the structure, as they are now."""
+        """Return the present values of the parameters in the order of the structure."""
         return self._numbers(kind) if self.learned else self._constants[kind]
 
     def address(self, call: str, kind: NumberType) -> int:
-        """Where the C function of a call that has been made stands in memory."""
+        """Return the address of the C function of a call that has been made before."""
         return start_of(self._functions[call, kind])
 
     def _function(self, call: str, kind: NumberType) -> "CFunction":
-        """C function of a call for a dtype, compiled if it is not there yet."""
+        """Return the C function of a call for a dtype, compiled if it is not there yet."""
         reads = 2 if call in AT_REST else 3
         arrays = reads + bool(self.parameters) + sum(size > 0 for size in self.sizes[call])
         found = self._functions[call, kind] = function(self.sources, FUNCTIONS[call], kind.str[1:], arrays)
@@ -178,10 +178,11 @@ class NativeCalls:
         parts: int,
         held: object,
     ) -> None:
-        """Call a C function in several parts; `arrays` are addresses, and bytes from one sample to the next.
+        """Call a C function in several parts, on several threads; return when all have ended.
 
-        Threads take shares of the samples; shares of 16 fill blocks of either type. `held` are the arrays:
-        each part holds them, so that their memory lasts as long as it runs.
+        Each thread takes a share of the samples; shares of a multiple of 16 fill blocks of either number
+        type. `arrays` are pairs of an address and the bytes from one sample to the next. Each part holds
+        `held`, the arrays themselves, so that their memory lasts as long as it runs.
         """
         share = -(-count // parts // 16) * 16
 
@@ -202,17 +203,17 @@ class NativeCalls:
                 future.cancel()
             raise
         finally:
-            wait(waiting)  # nobody may write to memory that has been given back
+            wait(waiting)  # no part may write to memory that has been freed
         for future in waiting:
             future.result()
 
     def values(self, kind: NumberType) -> dict[str, Numbers]:
-        """Parameters by name, as numbers of this dtype."""
+        """Return the parameters by name, as numbers of this dtype."""
         numbers = cast("Sequence[Numbers]", self.constants(kind))
         return dict(zip(self.structure.parameters, numbers, strict=True))
 
     def _numbers(self, kind: NumberType) -> NumberArray:
-        """Parameters in the order of the structure; a tensor's value is the one it has now."""
+        """Return the parameters in the order of the structure; a tensor counts with its present value."""
         for name in self.structure.parameters:
             if shape_of(self.parameters[name]) != ():
                 raise ValueError(
@@ -223,10 +224,10 @@ class NativeCalls:
 
 
 def plain(a: NumberArray) -> NumberArray:
-    """An array, or a copy of it that lies in memory as C reads it."""
+    """Return an array, or a copy of it that is contiguous and aligned, as C reads it."""
     return a if a.flags.c_contiguous and a.flags.aligned else np.array(a, order="C")
 
 
 def _number(value: float | Numbers) -> float:
-    """A parameter's value as it is now, without its gradient."""
+    """Return a parameter's present value, without its gradient."""
     return float(cast("Tensor", value).detach() if has_tensors([value]) else value)

@@ -1,4 +1,4 @@
-"""The C compiler of this system: what it is called, its flags, how it links, and what it lacks."""
+"""The C compiler of this system: its name, its flags, how it links, and what it lacks."""
 
 import os
 import platform
@@ -15,7 +15,7 @@ FLAGS = ("-std=c99", "-O2", "-ftree-vectorize", "-fno-tree-slp-vectorize", "-ffp
 """Flags of gcc and clang. Multiplications and additions may fuse, which -std=c99 alone forbids gcc."""
 
 EXTENSION = ("-std=c11", "-O2")
-"""Flags for a module of Python, whose headers C99 does not do for."""
+"""Flags for a Python extension module, whose headers need more than C99."""
 
 TUNING = {
     "x86_64": ("-march=native", "-mprefer-vector-width=512"),
@@ -23,35 +23,35 @@ TUNING = {
     "aarch64": ("-mcpu=native",),
     "arm64": ("-mcpu=native",),
 }
-"""What makes full use of this machine's processor, by its kind."""
+"""Flags that make full use of this machine's processor, by its kind."""
 
 ANSWERS = 30.0
-"""Seconds in which a compiler says its version."""
+"""Seconds in which a compiler must report its version."""
 
 
 MICROSOFT = ("cl", "clang-cl")
-"""Compilers whose options are others."""
+"""Compilers whose options are not those of gcc."""
 
 
 @dataclass(frozen=True)
 class Compiler:
-    """gcc or clang on Linux; the classes below are what is called like them on other systems."""
+    """gcc or clang on Linux; the subclasses are the compilers of other systems."""
 
     command: tuple[str, ...]
-    """How it is called, with any arguments that CC gives."""
+    """Command that calls it, with any arguments that CC gives."""
 
     anywhere: ClassVar[tuple[str, ...]] = ("-fPIC",)
-    """Flags for what is to be part of a shared library."""
+    """Flags for code that is to be part of a shared library."""
     shared: ClassVar[tuple[str, ...]] = ("-shared",)
-    """Flags that link one."""
+    """Flags that link a shared library."""
     open_symbols: ClassVar[tuple[str, ...]] = ()
-    """Flags that link one whose symbols are Python's."""
+    """Flags that link a library some of whose symbols are defined by Python."""
     makes_modules: ClassVar[bool] = True
-    """Whether it can link a module for Python, knowing no more than Python's headers."""
+    """True if it can link a Python extension module with nothing but Python's headers."""
 
     @classmethod
     def fault(cls, command: Sequence[str]) -> str:
-        """Why a program that is there cannot be the compiler, in words; nothing if it can."""
+        """Return why a program that exists cannot be the compiler, in words; "" if it can."""
         called = Path(command[0]).stem.lower()
         return f"{called}, whose options are not those of gcc" if called in MICROSOFT else ""
 
@@ -62,36 +62,36 @@ class Compiler:
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """What everything is compiled with, for a shared library on this machine."""
+        """Flags that compile code for a shared library on this machine."""
         return (*FLAGS, *self.tuning, *self.anywhere)
 
     def version(self) -> str:
-        """What it says of itself; raises RuntimeError for what is not a program, or does not answer."""
+        """Return the compiler's --version; raise RuntimeError for one that cannot run or does not answer."""
         return answer([*self.command, "--version"], ANSWERS).decode(errors="replace")
 
     def compiling(self, source: Path, part: str, target: str) -> list[str]:
-        """Command line that compiles one part of a robot's file."""
+        """Return the command line that compiles one part of a robot's file."""
         return [*self.command, *self.flags, f"-DLINKWISE_PART={part}", "-c", str(source), "-o", target]
 
     def extending(self, source: Path, headers: Sequence[str], target: str) -> list[str]:
-        """Command line that makes a module for Python, for any machine of this kind."""
+        """Return the command line that makes a Python extension module, for any machine of this kind."""
         flags = (*EXTENSION, *self.anywhere, *self.shared, *self.open_symbols)
         included = [f"-I{folder}" for folder in headers]
         return [*self.command, *flags, *included, str(source), "-o", target]
 
     def linking(self, objects: Sequence[str], target: str) -> list[str]:
-        """Command line that makes a shared library."""
+        """Return the command line that links a shared library."""
         return [*self.command, *self.shared, *objects, "-lm", "-o", target]
 
 
 class AppleCompiler(Compiler):
-    """clang as Apple has it, also where it is called gcc. On ARM its own choice of processor is Apple's."""
+    """clang as Apple ships it, also under the name gcc. On ARM, Apple's default processor is kept."""
 
     open_symbols = ("-undefined", "dynamic_lookup")
 
     @classmethod
     def fault(cls, command: Sequence[str]) -> str:
-        """Apple's system has programs of these names that do no more than offer to install the compiler."""
+        """Return why it cannot be the compiler: Apple's programs may do no more than offer to install it."""
         return super().fault(command) or ("" if cls(tuple(command)).version().strip() else "none installed")
 
     @property
@@ -103,8 +103,8 @@ class AppleCompiler(Compiler):
 class MinGW(Compiler):
     """gcc or clang of MinGW-w64, on Windows.
 
-    Nothing is tuned: with vectors of AVX, gcc counts on a stack that Windows does not align so (its bug
-    54412), and what it makes crashes at random. A module would need an import library of Python's.
+    No tuning: for AVX vectors, gcc relies on a stack alignment that Windows does not give (gcc bug 54412),
+    and the code crashes at random. An extension module would need an import library of Python's.
     """
 
     anywhere = ()
@@ -113,7 +113,7 @@ class MinGW(Compiler):
 
     @classmethod
     def fault(cls, command: Sequence[str]) -> str:
-        """clang for Microsoft's linker makes libraries that show no function unless each is marked."""
+        """Return why it cannot be the compiler: clang for Microsoft's linker exports no unmarked function."""
         if fault := super().fault(command):
             return fault
         microsoft = "windows-msvc" in cls(tuple(command)).version()
@@ -121,7 +121,7 @@ class MinGW(Compiler):
 
     @property
     def tuning(self) -> tuple[str, ...]:
-        """Nothing, see above."""
+        """No flags, for the reason given by the class."""
         return ()
 
 
@@ -130,11 +130,11 @@ KINDS: dict[type[OperatingSystem], type[Compiler]] = {
     MacOS: AppleCompiler,
     Windows: MinGW,
 }
-"""What compiles on each system."""
+"""Compiler of each system."""
 
 
 def find_compiler() -> Compiler:
-    """CC if set, else the first of the system's names for one; raises RuntimeError where there is none."""
+    """Return CC if set, else the first compiler found; raise RuntimeError where none is fit."""
     system = system_here()
     kind, unfit = KINDS[type(system)], []
     try:
@@ -154,5 +154,5 @@ def find_compiler() -> Compiler:
 
 
 def processor() -> str:
-    """What -march=native depends on."""
+    """Return a description of the processor, on which -march=native depends."""
     return system_here().processor()

@@ -19,13 +19,16 @@ RealType = type[ctypes.c_double] | type[ctypes.c_float]
 FieldType = RealType | type[ctypes.c_void_p] | type[ctypes.c_int]
 
 JOINTS = ("target", "target.qd", "target.qdd", "task", "external")
-"""What a call of joints may be given beside q and qd, in the order of C; a frame is given no task."""
+"""Arguments of joint control besides q and qd, in the order of C; control of a frame has no task."""
 ON_FRAME = {f"target.{name}": math.prod(axes) for name, (axes, _) in OF_FRAME.items()}
-"""What stands in place of a task for a frame, and how many numbers."""
+"""Targets that stand in place of the task where a frame is controlled, and how many numbers each has."""
 
 
 def joint_struct(real: RealType) -> type[ctypes.Structure]:
-    """NAME_impedance, of double or float; C has the last where joints have anything of their own."""
+    """Return the struct NAME_impedance of double or float.
+
+    Its last field is there in C only where joints have springs, damping, friction or armature.
+    """
     pointers = ("keep_inertia", "inertia", "keep_velocity", "damping", "stiffness")
     fields: list[tuple[str, FieldType]] = [(name, ctypes.c_void_p) for name in pointers]
     fields += [("regular", ctypes.c_int), ("friction_width", real)]
@@ -33,7 +36,7 @@ def joint_struct(real: RealType) -> type[ctypes.Structure]:
 
 
 def frame_struct(real: RealType) -> type[ctypes.Structure]:
-    """NAME_frame_impedance, of double or float."""
+    """Return the struct NAME_frame_impedance of double or float."""
     pointer = ctypes.c_void_p
     fields: list[tuple[str, FieldType]] = [
         ("frame", ctypes.c_int),
@@ -50,16 +53,16 @@ def frame_struct(real: RealType) -> type[ctypes.Structure]:
 
 
 class Settings(NamedTuple):
-    """What C is told of a controller in one number type."""
+    """A controller's settings, passed to C in one number type."""
 
     joints: ctypes.Structure
     frame: ctypes.Structure | None
     kept: list[NDArray[np.generic]]
-    """The memory that they point to."""
+    """Arrays whose memory the structs point to."""
 
 
 class ControlCalls:
-    """C functions that take one sample, each on memory of its own."""
+    """C functions that take one sample, each with memory of its own."""
 
     def __init__(self, calls: NativeCalls) -> None:
         self._calls = calls
@@ -68,10 +71,10 @@ class ControlCalls:
     def answer(
         self, call: str, motion: Sequence[Numbers], frame: int | None = None, point: Numbers | None = None
     ) -> NumberArray | None:
-        """The answer to a motion (..., n), of a frame and a point (..., 3) of it where there are such.
+        """Return the answer for a motion (..., n), and for a frame and a point (..., 3) of it where given.
 
-        None for what is not one sample in arrays, learned parameters, a singular mass matrix, and calls that
-        C does not have.
+        Returns None for anything but one sample in arrays, for learned parameters, for a singular mass
+        matrix, and for calls that C does not have.
         """
         q = motion[0]
         if call not in CONTROL:
@@ -84,7 +87,7 @@ class ControlCalls:
         return found[0].reshape(*q.shape[:-1], *found[0].shape) if found else None
 
     def _one_sample(self, key: tuple[str, int | None, bool, NumberType]) -> OneSampleCall:
-        """A call, in whose memory a point stands before the motion."""
+        """Return a call, in whose memory a point stands before the motion."""
         call, frame, at_origin, kind = key
         about, n = CONTROL[call], self._calls.structure.n
         (shape,) = self._calls.shapes[call if frame is None else f"kinematics.{call}"]
@@ -99,7 +102,7 @@ class ControlCalls:
 
 
 class NativeTorque:
-    """The torque of one controller: C has it for one sample in arrays."""
+    """The torque of one controller, computed by C for one sample in arrays."""
 
     def __init__(
         self, calls: NativeCalls, is_rigid: bool, targets: JointTargets, frame: FrameTargets | None
@@ -120,7 +123,7 @@ class NativeTorque:
         self._known = fixed and compensated and is_rigid
 
     def torque(self, given: Mapping[str, Numbers]) -> NumberArray | None:
-        """The torque (n,); None for what C does not answer, of which arrays say what is wrong."""
+        """Return the torque (n,); None where C has no answer: the calls for arrays then say what is wrong."""
         q = given["q"]
         if not self._known or self._calls.learned or type(q) is not np.ndarray or q.ndim > 1:
             return None
@@ -133,7 +136,7 @@ class NativeTorque:
         return found[0] if found else None
 
     def _one_sample(self, key: tuple[NumberType, tuple[str, ...]]) -> OneSampleCall:
-        """A call that is given these arrays beside q and qd."""
+        """Return a call that is given these arrays besides q and qd."""
         kind, names = key
         n, settings = self._structure.n, self._set(kind)
         sizes = [n, n, *(ON_FRAME.get(name, n) for name in names)]
@@ -148,7 +151,7 @@ class NativeTorque:
         return one_sample_call(found, True, [*given, *told[3:]], memory, [np.empty(n, kind)])
 
     def _set(self, kind: NumberType) -> Settings:
-        """What C is told, made once for each number type."""
+        """Return the settings for a number type, made once."""
         if kind not in self._settings:
             self._settings[kind] = self._made(kind)
         return self._settings[kind]
@@ -158,7 +161,7 @@ class NativeTorque:
         memory: list[NDArray[np.generic]] = []
 
         def at(numbers: ArrayLike | None) -> int | None:
-            """Where numbers stand; None for none of them."""
+            """Return the address of a copy of the numbers; None where there are none."""
             if numbers is None:
                 return None
             array = np.array(numbers, kind)
@@ -166,13 +169,16 @@ class NativeTorque:
             return address(array)
 
         def weights(kept: object) -> NumberArray | None:
-            """w, which is numbers or arrays: tensors are learned, and not for C."""
+            """Return w (n, N, n), or None for the number 1.
+
+            Tensors, which are learned, do not get here.
+            """
             if isinstance(kept, float) and kept == 1.0:
                 return None
             return np.broadcast_to(cast(NumberArray, kept), (n, links, n))
 
         inertia = None if targets.inertia.added is None else targets.inertia.added.numbers
-        if inertia is not None and targets.inertia.whole:  # C adds the armature to what links have
+        if inertia is not None and targets.inertia.whole:  # C adds the armature to the inertia of the links
             inertia = inertia - np.diag(self._structure.passive_sums.armature)
         real = ctypes.c_double if kind.itemsize == 8 else ctypes.c_float
         joints = joint_struct(real)(

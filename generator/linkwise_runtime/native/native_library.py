@@ -1,6 +1,6 @@
 """The functions of a robot's compiled C, and how they are called for one sample.
 
-One sample is copied to and from a known place: to find out where arrays lie costs more.
+One sample is copied to and from a fixed place in memory: finding the addresses of new arrays costs more.
 """
 
 import ctypes
@@ -22,7 +22,7 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 class Control(NamedTuple):
-    """A function of one sample: how many arrays of the motion it reads, and whether a point of a frame."""
+    """A function of one sample: number of arrays of motion it reads, and whether it takes a frame's point."""
 
     motion: int
     point: bool = False
@@ -31,12 +31,12 @@ class Control(NamedTuple):
 CONTROL = {row.c: Control(len(row.motion), "point" in row.options) for row in CALLS.values() if row.one}
 """Functions that take one sample and no count."""
 IMPEDANCE = ("partial_impedance", "frame_partial_impedance")
-"""Those beside them for control, the second one with a frame."""
+"""Functions of one sample for control; the second one is for a frame."""
 
 
 @cache
 def function(sources: Sources, call: str, kind: str, arrays: int) -> "CFunction":
-    """C function of a call that takes a count and `arrays` pointers; raises as `symbol` does."""
+    """Return the C function of a call that takes a count and `arrays` pointers; raises as `symbol` does."""
     found = symbol(sources, call, kind)
     found.argtypes = [ctypes.c_size_t] + [ctypes.c_void_p] * arrays
     found.restype = None
@@ -44,9 +44,9 @@ def function(sources: Sources, call: str, kind: str, arrays: int) -> "CFunction"
 
 
 def symbol(sources: Sources, call: str, kind: str) -> "CFunction":
-    """C function by its name; the first from a library compiles it.
+    """Return a C function by its name; the first one of a library compiles it.
 
-    kind: f8 or f4. Raises RuntimeError if it cannot be had.
+    kind: f8 or f4. Raises RuntimeError where it cannot be compiled or loaded.
     """
     real, suffix = {"f8": ("double", ""), "f4": ("float", "f")}[kind]
     path = library(sources, real, _library_of(call))
@@ -54,7 +54,7 @@ def symbol(sources: Sources, call: str, kind: str) -> "CFunction":
         return ctypes.CDLL(str(path))[f"{sources.name}_{call}{suffix}"]
     except (OSError, AttributeError) as error:
         with suppress(OSError):
-            path.unlink()  # whole as it is, it is of no use: the next time it is made anew
+            path.unlink()  # whole, but of no use: the next call compiles it anew
         raise RuntimeError(
             f"cannot load what was compiled: {error}; point CC to another C compiler, "
             "or LINKWISE_CACHE to a directory whose files may be run"
@@ -62,7 +62,7 @@ def symbol(sources: Sources, call: str, kind: str) -> "CFunction":
 
 
 def _library_of(call: str) -> str:
-    """Which of a robot's libraries has a function."""
+    """Return which of a robot's libraries, by its key in PARTS, has a function."""
     if call in CONTROL or call in IMPEDANCE:
         return "control"
     if call.endswith("position_gradient"):
@@ -71,17 +71,17 @@ def _library_of(call: str) -> str:
 
 
 def start_of(function: "CFunction") -> int:
-    """Where a C function stands in memory."""
+    """Return the address of a C function."""
     return ctypes.cast(function, ctypes.c_void_p).value or 0
 
 
 class OneSampleCall(NamedTuple):
-    """A C function that knows where its arguments lie: memory for one sample."""
+    """A C function bound to the memory of its arguments, for one sample."""
 
     compute: Callable[[], int | None]
-    """Of a function that may fail, a number other than 0 says that it did."""
+    """Calls the function; for a function that may fail, a number other than 0 says that it did."""
     motion: memoryview
-    """Bytes of what changes from call to call: q, qd and qdd, say, one after another."""
+    """Bytes of the arguments that change from call to call, such as q, qd and qdd, one after another."""
     results: list[NumberArray]
 
 
@@ -92,11 +92,11 @@ def one_sample_call(
     motion: NumberArray,
     results: list[NumberArray],
 ) -> OneSampleCall:
-    """A call of a C function that takes what is given, then results, and no arrays that are empty.
+    """Return a call of a C function that takes what is given, then results, and no arrays that are empty.
 
-    given: numbers as ctypes has them, None for NULL, and arrays, those of the motion in its memory
+    given: numbers of ctypes, None for NULL, and arrays; those of the motion lie in its memory
     """
-    # Without argtypes: its arguments are made here, not at every call.
+    # Without argtypes: the arguments are converted here, not at every call.
     bare = ctypes.CFUNCTYPE(ctypes.c_int if may_fail else None)(start_of(function))
     arguments = [
         _argument(value) for value in (*given, *results) if not isinstance(value, np.ndarray) or value.size
@@ -105,15 +105,15 @@ def one_sample_call(
 
 
 def _argument(value: object) -> object:
-    """As ctypes passes it on: an array by its place."""
+    """Return a value as ctypes passes it on: an array by its address."""
     buffer: Any = value
     return ctypes.byref(Place.from_buffer(buffer)) if isinstance(value, np.ndarray) else value
 
 
 class OneSamplePool(Generic[Key]):
-    """Calls for one sample by what they are for, made when there is none free.
+    """Calls for one sample by key, made when none is free.
 
-    One in use is not among them: no other thread, and no signal handler, finds it.
+    A call in use is not in the pool: no other thread, and no signal handler, finds it.
     """
 
     def __init__(self, make: Callable[[Key], OneSampleCall]) -> None:
@@ -121,7 +121,7 @@ class OneSamplePool(Generic[Key]):
         self.free: dict[Key, list[OneSampleCall]] = {}
 
     def results(self, key: Key, numbers: bytes) -> list[NumberArray]:
-        """Copies of the results for the bytes of a motion; none where the function failed."""
+        """Return copies of the results for the bytes of a motion; an empty list where the function failed."""
         try:
             free = self.free[key]
             one = free.pop()

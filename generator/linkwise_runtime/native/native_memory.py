@@ -1,9 +1,9 @@
-"""Memory for results: large ones lie in huge pages, taken again once nobody holds what was in them.
+"""Memory for results: large results lie in huge pages, used again once nobody holds what was in them.
 
-The system clears fresh memory page by page, which costs more than large results do, so blocks are kept.
-An array over a block has a `Lease` for a base: that is gone when the last array, view, tensor or buffer over
-it is, and only then is the block free again. Meanwhile the system may take its pages, if it needs them
-(MADV_FREE).
+The system clears fresh memory page by page, which costs more than computing large results, so blocks are
+kept. An array over a block has a `Lease` as its base: the lease ends with the last array, view, tensor or
+buffer over it, and only then is the block free again. Meanwhile the system may take the pages of a free
+block, if it needs them (MADV_FREE).
 """
 
 import ctypes
@@ -17,32 +17,32 @@ from numpy.typing import NDArray
 
 NumberArray = NDArray[np.floating]
 NumberType = np.dtype[np.floating]
-"""float64 or float32."""
+"""dtype of the numbers: float64 or float32."""
 
 Place = ctypes.c_char * 0
 
 CARRAY, WARNS = 0x501, 1 << 31
-"""Of `flags.num`: an array that C can read and write; one that warns where writing is spoken of."""
+"""Bits of `flags.num`: an array that C can read and write; an array that warns when it is written to."""
 
 LITTLE = 1 << 15
-"""Bytes below which where memory starts is of no account."""
+"""Bytes below which the alignment of memory does not matter."""
 
 LARGE = 1 << 20
 """Bytes from which results lie in blocks."""
 MOST = 1 << 29
-"""Bytes of blocks that are kept while nobody needs them."""
+"""Most bytes of blocks that are kept while nobody needs them."""
 PAGE = 1 << 21
 APART: dict[str, int] = (
     {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_ANONYMOUS") else {}
 )
-"""Has a fork have memory of its own, where there are forks."""
+"""Arguments that give a forked process memory of its own, on systems that fork."""
 
 _free: dict[int, list[mmap.mmap]] = {}
-"""Free blocks by size. Nothing is locked, as a lease may end anywhere: lists give and take in one step."""
+"""Free blocks by size. No lock is needed though a lease may end anywhere: lists append and pop atomically."""
 
 
 class Lease:
-    """A block that arrays lie in, until the last of them is gone."""
+    """A block of memory that arrays lie in, until the last of them is gone."""
 
     def __init__(self, size: int) -> None:
         try:
@@ -68,7 +68,7 @@ class Lease:
 
 
 def lasting(count: int) -> NDArray[np.uint8]:
-    """Bytes of a block, at least `count` of them, that start on a page."""
+    """Return the bytes of a block, at least `count` of them, which start on a page."""
     return np.asarray(Lease(-(-count // PAGE) * PAGE))
 
 
@@ -84,22 +84,22 @@ def _new(size: int) -> mmap.mmap:
 
 
 def address(array: NDArray[np.generic]) -> int:
-    """Where an array begins in memory."""
+    """Return the address of an array's first number."""
     start: int = array.__array_interface__["data"][0]
     return start
 
 
 def place(array: NumberArray) -> "ctypes.Array[ctypes.c_char] | int":
-    """What ctypes takes for an array's place in memory, quicker than its address where it is writable."""
-    buffer: Any = array  # which it is, and numpy says so from Python 3.12 on
+    """Return an array's place in memory for ctypes: quicker than its address where the array is writable."""
+    buffer: Any = array  # it is a buffer, which numpy declares from Python 3.12 on
     writable = array.flags.num & (CARRAY | WARNS) == CARRAY
     return Place.from_buffer(buffer) if writable else address(array)
 
 
 def memory(shape: tuple[int, ...], kind: NumberType) -> NumberArray:
-    """New memory for an array; unless it is little, it starts on a cache line, as C wants it.
+    """Return new memory for an array; unless it is small, it starts on a cache line, as C needs it.
 
-    It is never that of an earlier result that somebody still holds.
+    It is never the memory of an earlier result that somebody still holds.
     """
     count = math.prod(shape) * kind.itemsize
     if count < LITTLE:

@@ -1,6 +1,6 @@
-"""The module for Python that native_module.c is the text of: calls of C without a detour through Python.
+"""The Python extension module of native_module.c: calls of C without a detour through Python.
 
-It is there where Python's and NumPy's headers are; without it, ctypes calls the same functions.
+It is compiled where Python's and NumPy's headers are; without it, ctypes calls the same functions.
 """
 
 import sys
@@ -22,7 +22,7 @@ from .native_memory import LARGE, NumberArray, NumberType
 SOURCE = Path(__file__).with_suffix(".c")
 
 DTYPES = (np.dtype("f8"), np.dtype("f4"))
-"""In the order of the compiled module."""
+"""Number types in the order of the compiled module."""
 
 COMPILED = (
     "packed",
@@ -33,20 +33,20 @@ COMPILED = (
     "propagation",
     "position_gradient",
 )
-"""What the compiled module has of the calls of `Dynamics`."""
+"""Calls of `Dynamics` that the compiled module has."""
 CONVENTIONS = {"propagation": ("closing",), "gradient_propagation": ("gradient",)}
-"""What these are called with there, as calls of one name."""
+"""Extra arguments of calls that share one name in the compiled module."""
 
 
 class CompiledCalls(Protocol):
     """An object of the class `Calls` of native_module.c: one robot's calls, by name."""
 
     def learn(self, call: str, kind: int, address: int) -> None:
-        """Know from now on where the C function of a call stands in memory."""
+        """Store the address of the C function of a call."""
 
 
 class CompiledClass(Protocol):
-    """That class."""
+    """The class `Calls` of native_module.c."""
 
     def __call__(
         self,
@@ -57,11 +57,16 @@ class CompiledClass(Protocol):
         answers: Mapping[str, tuple[type | None, Sequence[tuple[int, ...]]]],
         /,
     ) -> CompiledCalls:
-        """most: bytes of results that it answers with; doubles, floats: the parameters; answers: of calls."""
+        """Make one robot's calls.
+
+        most: bytes of results up to which it answers itself
+        doubles, floats: values of the parameters
+        answers: type of the record and shapes of the results, by call
+        """
 
 
 def headers() -> tuple[str, ...]:
-    """Folders of the headers; empty where one is missing, or this Python cannot take the module."""
+    """Return the folders of the headers; () where one is missing, or this Python cannot load the module."""
     if sys.implementation.name != "cpython" or sysconfig.get_config_var("Py_GIL_DISABLED"):
         return ()
     paths = sysconfig.get_paths()
@@ -72,7 +77,7 @@ def headers() -> tuple[str, ...]:
 
 @cache
 def compiled_calls() -> CompiledClass | None:
-    """The class `Calls` of native_module.c, compiled if need be; None where it cannot be had."""
+    """Return the class `Calls` of native_module.c, compiled if need be; None where it is not to be had."""
     found = headers()
     if not found:
         return None
@@ -90,33 +95,33 @@ def compiled_calls() -> CompiledClass | None:
 
 
 class QuickCalls:
-    """C through the compiled module, where there is one and it has the call, else through ctypes."""
+    """Calls of C through the compiled module, where it exists and has the call, else through ctypes."""
 
     def __init__(self, calls: NativeCalls) -> None:
         self.calls = calls
         made = compiled_calls()
-        # What is learned may change from call to call.
+        # Learned parameters may change from call to call.
         self.compiled = None if made is None or calls.learned else self._made(made)
         self._known: set[tuple[str, NumberType]] = set()
 
     def _made(self, made: CompiledClass) -> CompiledCalls:
-        """The compiled module's side of this robot."""
+        """Return the compiled module's object for this robot."""
         doubles, floats = (self.calls.constants(kind) for kind in DTYPES)
         shapes = {key: shapes for key, shapes in self.calls.shapes.items() if key in CALLS}
         answers = {key: (CALLS[key].record, shapes) for key, shapes in shapes.items()}
         return made(self.calls.structure.n, LARGE - 1, doubles, floats, answers)
 
     def direct(self) -> Mapping[str, Callable[..., object]]:
-        """The compiled module's calls, where there is one."""
+        """Return the compiled module's calls by name; empty without the module."""
         calls = {call: getattr(self.compiled, call) for call in COMPILED} if self.compiled else {}
         for call in calls.values():
-            call.__module__ = __name__  # torch.jit asks where a function is from, before it calls it
+            call.__module__ = __name__  # torch.jit asks for a function's module before it calls it
         return calls
 
     def run(
         self, call: str, motion: Sequence[NumberArray], into: Sequence[NumberArray] | None = None
     ) -> Sequence[NumberArray]:
-        """Results of a call for arrays of one shape, written to `into`, or to new memory."""
+        """Return a call's results for arrays of one shape, written to `into`, or to new memory."""
         convention = CONVENTIONS.get(call, ())
         if not self.compiled or not (convention or call in COMPILED):
             return self.through_ctypes(call, motion, into)
@@ -130,7 +135,7 @@ class QuickCalls:
     def through_ctypes(
         self, call: str, motion: Sequence[NumberArray], into: Sequence[NumberArray] | None = None
     ) -> Sequence[NumberArray]:
-        """The same, and tell the compiled module of a function that it has not known so far."""
+        """Return a call's results by ctypes; tell the compiled module the address of a function new to it."""
         results = self.calls.run(call, motion, into)
         kind = motion[0].dtype
         if self.compiled and (call, kind) not in self._known and motion[0].size:
@@ -140,7 +145,10 @@ class QuickCalls:
 
 
 def _passed_on(name: str) -> Callable[..., object]:
-    """What the compiled module asks of its owner's class, if it has no answer: motion, and places or None."""
+    """Return the method that the compiled module calls where it has no answer.
+
+    The method takes the motion, and then the arrays for results, or None.
+    """
 
     def passed_on(self: QuickCalls, *given: object) -> object:
         *motion, out = given

@@ -1,4 +1,4 @@
-"""Running a compiler: several at a time, never for ever, and a terminal is told of the wait."""
+"""Runs a compiler: several commands at a time, with a time limit, and progress on a terminal."""
 
 import re
 import signal
@@ -17,17 +17,17 @@ PATIENCE = 3600.0
 WIDTH = 79
 
 STEP = 0.1
-"""Seconds between two looks at what runs."""
+"""Seconds between two checks of the running programs."""
 
 Tell = Callable[[str], None]
-"""Called with how far something is, in words."""
+"""Function that is called with the progress, in words."""
 
 
 @contextmanager
 def told(what: str) -> Iterator[Tell]:
-    """Show `what` is going on, and how far it is, on one line of stderr, if that is a terminal.
+    """Show on one line of stderr that `what` is going on, and its progress, if stderr is a terminal.
 
-    The line is wiped away in the end, so that nothing of it precedes a message.
+    The line is cleared in the end, so that no message is printed behind it.
     """
     shown = sys.stderr is not None and sys.stderr.isatty()
 
@@ -42,9 +42,9 @@ def told(what: str) -> Iterator[Tell]:
 
 
 def run_all(commands: Sequence[Sequence[str]], tell: Tell) -> None:
-    """Run commands side by side; raises RuntimeError, in one line, for one that fails or hangs.
+    """Run commands side by side; raise RuntimeError, in one line, for one that fails or hangs.
 
-    `tell` hears how many have ended.
+    `tell` is called with how many have ended.
     """
     running: list[_Running] = []
     try:
@@ -63,7 +63,7 @@ def run_all(commands: Sequence[Sequence[str]], tell: Tell) -> None:
 
 
 def answer(command: Sequence[str], seconds: float) -> bytes:
-    """What a command says on stdout; raises RuntimeError if it cannot be run or isn't done by then."""
+    """Return a command's stdout; raise RuntimeError if it cannot run or does not end in so many seconds."""
     one = _started(command, "stdout")
     try:
         if not _ended([one], seconds, lambda _: None):
@@ -77,9 +77,9 @@ def answer(command: Sequence[str], seconds: float) -> bytes:
 
 @dataclass(frozen=True)
 class _Running:
-    """A program that is listened to until it ends itself, not until all that it has started do.
+    """A program that is listened to until it ends itself, not until all programs that it started have ended.
 
-    A compiler's wrapper may leave a server behind, which has the same stdout and stderr open for hours.
+    A compiler's wrapper may leave a server behind, which keeps the same stdout and stderr open for hours.
     """
 
     process: "subprocess.Popen[bytes]"
@@ -87,13 +87,13 @@ class _Running:
     said: bytearray
 
     def has_ended(self) -> bool:
-        """Whether it has; what it has said so far is in `said`."""
-        ended = self.process.poll() is not None  # first: what it said before its end is there to be read
+        """Return whether the program has ended; add what it has written so far to `said`."""
+        ended = self.process.poll() is not None  # asked first: what it wrote before its end can then be read
         system_here().hear(self.stream, self.said, ended)
         return ended
 
     def close(self) -> None:
-        """End it, with whatever it has started, if it goes on."""
+        """End the program, and all that it started, if it still runs."""
         if self.process.poll() is None:
             system_here().stop(self.process)
             self.process.wait()
@@ -123,7 +123,7 @@ def _started(command: Sequence[str], listened: str) -> _Running:
 
 
 def _ended(running: Sequence[_Running], patience: float, tell: Tell) -> bool:
-    """Wait until all have ended; False if that takes longer than `patience`."""
+    """Wait until all have ended; return False if that takes longer than `patience` seconds."""
     start = time.monotonic()
     while left := [one for one in running if not one.has_ended()]:
         seconds = time.monotonic() - start
@@ -136,7 +136,7 @@ def _ended(running: Sequence[_Running], patience: float, tell: Tell) -> bool:
 
 
 def _reason(complaint: bytes, code: int) -> str:
-    """A compiler's first complaint, as one line."""
+    """Return a compiler's first error message, as one line."""
     lines = complaint.decode(errors="replace").splitlines()
     telling = (line for line in lines if re.search("error|fail|no space", line, re.IGNORECASE))
     said = " ".join(next(telling, " ".join(lines)).split())[:200]

@@ -1,4 +1,4 @@
-"""The operating system: what it is called, what it has and what it lacks; nothing else asks which it is."""
+"""The operating system: its names, its abilities and its limits; no other module asks which system it is."""
 
 import errno
 import importlib
@@ -21,47 +21,53 @@ STEP = 0.1
 
 
 class OperatingSystem:
-    """Linux, and whatever is like it; the classes below say how other systems differ."""
+    """Linux, and systems like it; the subclasses say how other systems differ."""
 
     compilers: ClassVar[tuple[str, ...]] = ("cc", "gcc", "clang")
-    """What C compilers are called, the first that is there first."""
+    """Names of C compilers, in the order in which they are tried."""
     install: ClassVar[str] = (
         "install the package gcc (Debian, Ubuntu: apt install gcc; Fedora: dnf install gcc) or point CC to "
         "one"
     )
     library: ClassVar[str] = ".so"
-    """How the names of shared libraries end."""
+    """Ending of the names of shared libraries."""
     keeps_open_files: ClassVar[bool] = False
-    """Whether a file, and the folder that it is in, keeps its name for as long as somebody has it open."""
+    """True if a file, and the folder that it is in, keeps its name while somebody has it open."""
     stack: ClassVar[int] = 5_000_000
-    """Bytes of a thread's stack that C may take; linkwise makes none that takes more."""
+    """Bytes of a thread's stack that C may take; linkwise makes no function that takes more."""
     patience: ClassVar[float] = 0.0
-    """Seconds for which a rename that an open file holds up is tried again."""
+    """Seconds for which a rename is retried while an open file blocks it."""
 
     @property
     def forks(self) -> bool:
-        """Whether a fork of this process can compute."""
+        """True if a fork of this process can compute."""
         return hasattr(os, "fork")
 
     def cache_home(self) -> Path:
-        """Where programs keep what they can make again; raises RuntimeError for a user without a home."""
+        """Return the folder for files that programs can make again.
+
+        Raises RuntimeError for a user without a home.
+        """
         shared = os.environ.get("XDG_CACHE_HOME", "")
-        # A relative one is void, by the rules that XDG stands for.
+        # By the rules of XDG, a relative path is void.
         return Path(shared) if os.path.isabs(shared) else self._own_cache_home()
 
     def _own_cache_home(self) -> Path:
         return Path.home() / ".cache"
 
     def user(self) -> int:
-        """Number of this user, as `os.stat` has it of a file's owner."""
+        """Return the id of this user, as `os.stat` reports it for a file's owner."""
         return os.geteuid()
 
     def others_may_write(self, mode: int) -> bool:
-        """Whether the mode of a file or a folder lets other users change it."""
+        """Return whether the mode of a file or a folder lets other users change it."""
         return bool(mode & (stat.S_IWGRP | stat.S_IWOTH))
 
     def lock(self, descriptor: int, wait: bool = False) -> bool:
-        """Lock an open file until it is closed; False where another has it. Raises OSError, ImportError."""
+        """Lock an open file until it is closed; return False where another process has locked it.
+
+        Raises OSError, ImportError.
+        """
         import fcntl
 
         try:
@@ -71,7 +77,7 @@ class OperatingSystem:
         return True
 
     def flush(self, path: Path) -> None:
-        """Have the disk hold a file, or the list of a folder's entries; raises OSError."""
+        """Force a file, or a folder's list of entries, to the disk; raise OSError where that fails."""
         self._flush(os.open(path, os.O_RDONLY))
 
     def _flush(self, descriptor: int) -> None:
@@ -84,7 +90,10 @@ class OperatingSystem:
             os.close(descriptor)
 
     def moved(self, move: Callable[[Path], object], there: Path) -> None:
-        """Rename or replace; once more for a while where open files, a scanner's say, hold it up."""
+        """Rename or replace a file.
+
+        It is tried again for a while where an open file, such as a virus scanner's, blocks it.
+        """
         end = time.monotonic() + self.patience
         while True:
             try:
@@ -96,28 +105,28 @@ class OperatingSystem:
                 time.sleep(STEP)
 
     def words(self, command: str) -> list[str]:
-        """Words of a command line; raises ValueError where a quotation mark is missing."""
+        """Return the words of a command line; raise ValueError where a quotation mark is missing."""
         return shlex.split(command)
 
     def outlet(self) -> int | IO[bytes]:
-        """What a program is to write to: see `hear`. Raises OSError."""
+        """Return what a program is to write to, which `hear` reads. Raises OSError."""
         return subprocess.PIPE
 
     def listen(self, stream: IO[bytes]) -> None:
-        """Make ready for `hear`."""
+        """Prepare a stream for `hear`."""
         os.set_blocking(stream.fileno(), False)
 
     def hear(self, stream: IO[bytes], said: bytearray, ended: bool) -> None:
-        """Add to `said` what a program, that may have ended, has written to a stream by now."""
+        """Add to `said` what a program, which may have ended, has written to a stream by now."""
         said.extend(stream.read() or b"")
 
     def stop(self, process: "subprocess.Popen[bytes]") -> None:
-        """End a program that was started in a session of its own, and all that it has started."""
+        """End a program that was started in a session of its own, and all that it started."""
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
 
     def processor(self) -> str:
-        """What -march=native depends on."""
+        """Return a description of the processor, on which -march=native depends."""
         try:
             lines = Path("/proc/cpuinfo").read_text().splitlines()
         except OSError:
@@ -126,7 +135,7 @@ class OperatingSystem:
 
 
 class MacOS(OperatingSystem):
-    """macOS: like Linux, but for names, and for forks that its own libraries do not survive."""
+    """macOS: like Linux, but for names, and for forks, which Apple's libraries do not survive."""
 
     install = "install Apple's (xcode-select --install) or point CC to one"
     forks = False
@@ -135,7 +144,7 @@ class MacOS(OperatingSystem):
         return Path.home() / "Library/Caches"
 
     def processor(self) -> str:
-        """What -march=native depends on."""
+        """Return a description of the processor, on which -march=native depends."""
         asked = ["sysctl", "-n", "machdep.cpu.brand_string"]
         with suppress(OSError):
             return subprocess.run(asked, capture_output=True, check=False).stdout.decode(errors="replace")
@@ -143,7 +152,7 @@ class MacOS(OperatingSystem):
 
 
 class Windows(OperatingSystem):
-    """Windows: who may write where is not told by modes, and what is open keeps its name."""
+    """Windows: modes do not show who may write where, and an open file keeps its name."""
 
     compilers = ("gcc", "clang", "cc", "clang-cl", "cl")
     install = (
@@ -157,20 +166,20 @@ class Windows(OperatingSystem):
     forks = False
 
     def cache_home(self) -> Path:
-        """The user's own part of the machine's data, which Windows closes to other users."""
+        """Return the user's own folder of local data, which Windows closes to other users."""
         local = os.environ.get("LOCALAPPDATA", "")
         return Path(local) if os.path.isabs(local) else Path.home() / "AppData/Local"
 
     def user(self) -> int:
-        """Number of this user, as `os.stat` has it of every file's owner here."""
+        """Return 0, which `os.stat` reports here as the owner of every file."""
         return 0
 
     def others_may_write(self, mode: int) -> bool:
-        """Nothing that a mode tells here."""
+        """Return False: a mode does not show that here."""
         return False
 
     def lock(self, descriptor: int, wait: bool = False) -> bool:
-        """Lock the first byte of an open file until it is closed; False where another has it."""
+        """Lock the first byte of an open file until it is closed; return False where another process did."""
         msvcrt: Any = importlib.import_module("msvcrt")
         while True:
             os.lseek(descriptor, 0, os.SEEK_SET)
@@ -184,29 +193,32 @@ class Windows(OperatingSystem):
             time.sleep(STEP)
 
     def flush(self, path: Path) -> None:
-        """Have the disk hold a file, which must be open to be written; folders are Windows' own matter."""
+        """Force a file, which must be writable, to the disk; folders are left to Windows."""
         if not path.is_dir():
             self._flush(os.open(path, os.O_RDWR | getattr(os, "O_BINARY", 0)))
 
     def words(self, command: str) -> list[str]:
-        """Words of a command line in which backslashes are those of paths."""
+        """Return the words of a command line in which backslashes belong to paths."""
         return [word.strip('"') for word in shlex.split(command, posix=False)]
 
     def outlet(self) -> int | IO[bytes]:
-        """A file without a name: pipes there can only be waited for."""
+        """Return a temporary file without a name: a pipe could not be read here without waiting."""
         return tempfile.TemporaryFile()
 
     def listen(self, stream: IO[bytes]) -> None:
-        """Nothing is to be made ready."""
+        """Do nothing: no preparation is needed."""
 
     def hear(self, stream: IO[bytes], said: bytearray, ended: bool) -> None:
-        """Add to `said` what a program has written, once it has ended: both write and read at one place."""
+        """Add to `said` what a program has written, once it has ended.
+
+        Writing and reading share one position in the file.
+        """
         if ended and not said:
             stream.seek(0)
             said.extend(stream.read())
 
     def stop(self, process: "subprocess.Popen[bytes]") -> None:
-        """End a program, and all that it has started."""
+        """End a program, and all that it started."""
         with suppress(OSError):
             tree = ["taskkill", "/T", "/F", "/PID", str(process.pid)]
             subprocess.run(tree, capture_output=True, check=False)
@@ -214,11 +226,11 @@ class Windows(OperatingSystem):
             process.kill()
 
     def processor(self) -> str:
-        """What Windows says of it."""
+        """Return Windows' description of the processor."""
         return platform.processor()
 
 
 def system_here() -> OperatingSystem:
-    """The system that this Python runs on."""
+    """Return the system that this Python runs on."""
     here: type[OperatingSystem] = {"win32": Windows, "darwin": MacOS}.get(sys.platform, OperatingSystem)
     return here()

@@ -1,6 +1,6 @@
 """Compiled C as torch operators, with gradients.
 
-Forward runs the C code; backward differentiates closed forms or rule in torch, which are there for that.
+The forward pass runs the C code; the backward pass differentiates the closed forms, or the rule, in torch.
 """
 
 import hashlib
@@ -26,40 +26,40 @@ from .native_memory import NumberArray
 FLOATS = (torch.float64, torch.float32)
 
 Run = Callable[[str, Sequence[NumberArray], Sequence[NumberArray] | None], Sequence[NumberArray]]
-"""A call by name: motion, and where results go, or None."""
+"""Function that answers a call by name, given the motion, and where results go, or None."""
 
 OPERATED = {
     "decomposition": "packed",
     "torque": "packed_torque",
     "position_gradient": "packed_position_gradient",
 }
-"""What torch is given as operators, from which all answers are composed, and what `NativeCalls` calls it."""
+"""Torch operators, of which all answers are composed, and the names of their calls in `NativeCalls`."""
 
 Results = Tensor | tuple[Tensor, ...]
-"""Of an operator: one by itself, or several."""
+"""Results of an operator: one tensor by itself, or several."""
 Operator = Callable[[Tensor, Tensor, Tensor, Tensor, int], Results]
-"""Of q, qd, qdd, parameters and threads."""
+"""Operator on q, qd, qdd, parameters and threads."""
 Inputs = tuple[Tensor, Tensor, Tensor, Tensor]
-"""What an operator has gradients of."""
+"""Inputs that an operator has gradients for: q, qd, qdd and the parameters."""
 Again = Callable[[Tensor, Tensor, Tensor, Tensor], Sequence[Tensor]]
-"""Results computed once more in torch."""
+"""Function that computes an operator's results once more in torch."""
 
 OPERATORS: dict[tuple[Sources, str], Operator] = {}
-"""Operators made so far; torch wants each to be made once."""
+"""Operators made so far; torch needs each to be defined only once."""
 
 
 class Context(Protocol):
-    """What torch keeps from a forward pass for the backward one."""
+    """Values that torch keeps from a forward pass for the backward pass."""
 
     saved_tensors: Inputs
     needs_input_grad: Sequence[bool]
 
     def save_for_backward(self, *tensors: Tensor) -> None:
-        """Have these as `saved_tensors`."""
+        """Keep these as `saved_tensors`."""
 
 
 class TorchSide(TorchBackend):
-    """What the native back end does with tensors."""
+    """The native back end's calls with tensors."""
 
     name: ClassVar = "native"
     traced: ClassVar = False
@@ -67,7 +67,7 @@ class TorchSide(TorchBackend):
     def __init__(
         self, calls: NativeCalls, run: Run, links: Sequence[ClosedForms] | None, rule: RigidRule | None
     ) -> None:
-        """run: what C answers for arrays."""
+        """Define the operators; `run` answers calls with arrays by C."""
         super().__init__(calls.structure, links, calls.parameters, rule)
         self.calls, self.run = calls, run
         self._given = [value for value in calls.parameters.values() if torch.is_tensor(value)]
@@ -75,13 +75,17 @@ class TorchSide(TorchBackend):
 
     @cached_property
     def answers(self) -> Answers:
-        """Rows of the table: C writes those that it has, where nothing is recorded."""
+        """Answers to the calls of the call table: by C where it has the call and nothing is recorded."""
         return TensorAnswers(self)
 
     def arrays(
         self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
     ) -> Sequence[Numbers]:
-        """Motion, then what is beside it, of one shape of samples; they must lie in the CPU's memory."""
+        """Return the motion, then the other arguments, in one shape of samples.
+
+        Raises TypeError for tensors that are not in the CPU's memory, and inside torch.func or forward-mode
+        differentiation.
+        """
         self.check_untraced()
         motion = cast("list[Tensor]", list(named.values()))
         q = motion[0]
@@ -102,15 +106,15 @@ class TorchSide(TorchBackend):
         return motion
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
-        """c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
+        """Return c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
         return list(self._run("decomposition", q, qd, qdd))
 
     def torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
-        """tau (..., count) in the order of `Layout.torque`."""
+        """Return tau (..., count) in the order of `Layout.torque`."""
         return self._run("torque", q, qd, qdd)[0]
 
     def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
-        """c0 (..., count) in the order of `Layout.velocity`."""
+        """Return c0 (..., count) in the order of `Layout.velocity`."""
         return self._run("position_gradient", q, qd, qdd)[0]
 
     def _run(self, call: str, *motion: Numbers) -> tuple[Tensor, ...]:
@@ -124,14 +128,14 @@ class TorchSide(TorchBackend):
         return operated if isinstance(operated, tuple) else (operated,)
 
     def needs_operators(self, motion: Sequence[Tensor]) -> bool:
-        """Whether torch has to know what is computed: a gradient is recorded, or a program compiled."""
+        """Return whether torch has to record the computation: for a gradient, or while it compiles."""
         if torch.compiler.is_compiling():
             return True
         return torch.is_grad_enabled() and any(t.requires_grad for t in (*motion, *self._given))
 
 
 class TensorAnswers(Answers):
-    """The rows that C has, where torch need not know what is computed."""
+    """Answers to the calls that C has, where torch need not record the computation."""
 
     contiguous = True
 
@@ -140,7 +144,7 @@ class TensorAnswers(Answers):
         self._side = side
 
     def compute_into(self, call: str, motion: Sequence[Numbers], into: Sequence[Numbers]) -> None:
-        """Compute a call's results where these tensors lie."""
+        """Compute a call's results and write them to the tensors `into`."""
         tensors = cast("Sequence[Tensor]", motion)
         if call in FUNCTIONS and not self._side.needs_operators(tensors):
             compute(self._side.run, call, tensors, cast("Sequence[Tensor]", into))
@@ -149,7 +153,7 @@ class TensorAnswers(Answers):
 
 
 def _of_c(key: str) -> Callable[..., Sequence[Numbers]]:
-    """A row that C has."""
+    """Return a method that answers the call `key` by the compiled C where torch need not record it."""
     composed = getattr(Answers, key)
 
     def row(self: TensorAnswers, *motion: Tensor) -> Sequence[Numbers]:
@@ -168,28 +172,28 @@ for _name in FUNCTIONS.keys() & CALLS.keys():
 def compute(
     run: Run, call: str, motion: Sequence[Tensor], into: Sequence[Tensor] | None = None
 ) -> tuple[Tensor, ...]:
-    """Results of the C code, which `run` calls with arrays, as tensors that share its memory."""
+    """Return results of the C code, which `run` calls with arrays, as tensors that share its memory."""
     try:
         arrays = [as_numbers(t) for t in motion]
-    except ValueError:  # of more than 64 axes
+    except ValueError:  # a tensor has more than 64 axes
         raise too_many_axes(dict(zip(QDD, motion, strict=False)), motion[0].shape[-1]) from None
     if into is None:
         return tuple(torch.from_numpy(result) for result in run(call, arrays, None))
     for t in into:
-        torch.autograd.graph.increment_version(t)  # so that no gradient is taken of what stood there
+        torch.autograd.graph.increment_version(t)  # no gradient may use the values that are overwritten
     run(call, arrays, [as_numbers(t) for t in into])
     return tuple(into)
 
 
 def as_numbers(t: Tensor) -> NumberArray:
-    """The array that a CPU tensor's numbers are; it shares its memory, unless they are to be negated."""
+    """Return a CPU tensor's numbers as an array, in the same memory unless a negation is pending."""
     return (t.detach() if t.requires_grad else t).resolve_neg().numpy()
 
 
 def operator(
     calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None, call: str
 ) -> Operator:
-    """Torch operator of a C function, with a gradient, made when first asked for."""
+    """Return the torch operator of a C function, with a gradient, defined when first asked for."""
     key = (calls.sources, call)
     if key not in OPERATORS:
         OPERATORS[key] = _define(calls, links, rule, call)
@@ -199,7 +203,7 @@ def operator(
 def _define(
     calls: NativeCalls, links: Sequence[ClosedForms] | None, rule: RigidRule | None, call: str
 ) -> Operator:
-    """Operator (q, qd, qdd, p, threads) -> results; p holds the parameters in the structure's order."""
+    """Define the operator (q, qd, qdd, p, threads) -> results; p has parameters in the structure's order."""
     structure, sources, sizes = calls.structure, calls.sources, calls.sizes[OPERATED[call]]
 
     def values(p: Tensor) -> dict[str, Tensor]:
@@ -238,9 +242,10 @@ def _define(
 
 
 def _differentiated(name: str, again: Again) -> Callable[..., list[Tensor]]:
-    """Operator (q, qd, qdd, p, which of them, slopes of results) -> slopes of these.
+    """Define the operator (q, qd, qdd, p, needed, slopes of results) -> slopes of the needed inputs.
 
-    A compiler takes it as it stands: what torch would record of the rule has tables that it may not see.
+    A compiler takes it as one opaque operator: what torch would record of the rule has tables that the
+    compiler may not see.
     """
 
     def forward(
@@ -262,7 +267,7 @@ def _differentiated(name: str, again: Again) -> Callable[..., list[Tensor]]:
 
 
 def _recorded_in_an_operator() -> AbstractContextManager[object]:
-    """Within operators torch records nothing for gradients, unless it is told to."""
+    """Let torch record for gradients within an operator, where it otherwise does not."""
     left_out = torch._C._dispatch_tls_local_exclude_set().remove(torch._C.DispatchKey.AutogradCPU)
     return torch._C._ForceDispatchKeyGuard(torch._C._dispatch_tls_local_include_set(), left_out)
 
@@ -270,14 +275,14 @@ def _recorded_in_an_operator() -> AbstractContextManager[object]:
 def _backward(
     again: Again, inputs: Inputs, needed: Sequence[bool], slopes: Sequence[Tensor | None]
 ) -> Sequence[Tensor]:
-    """Slopes of the needed inputs from those of the results, by computing these once more in torch."""
+    """Return the slopes of the needed inputs from those of the results, computed once more in torch."""
     differentiable = torch.is_grad_enabled()
     with torch.enable_grad():
         fresh = [t if differentiable else t.detach().requires_grad_() for t in inputs]
         results = again(*fresh)
         pairs = [(r, s) for r, s in zip(results, slopes, strict=True) if r.requires_grad and s is not None]
         wanted = [t for t, need in zip(fresh, needed, strict=True) if need]
-        if not pairs:  # constants alone, as the stiffness of a slide is
+        if not pairs:  # only constants, such as the stiffness of a prismatic joint
             return [torch.zeros_like(t) for t in wanted]
         reached, given = zip(*pairs, strict=True)
         return torch.autograd.grad(
@@ -286,7 +291,7 @@ def _backward(
 
 
 def _transformed(motion: Sequence[Tensor]) -> bool:
-    """Whether a transformation that needs more than values is under way; it would be lost without a word."""
+    """Return whether a transformation that needs more than values is active; it would be lost silently."""
     if torch.compiler.is_compiling():
         return False
     if torch._C._are_functorch_transforms_active():
@@ -300,11 +305,11 @@ def _has_tangent(t: Tensor) -> bool:
 
 
 def _bare(results: tuple[Tensor, ...]) -> Results:
-    """An operator with one result returns it by itself."""
+    """Return one result by itself, and several as a tuple, as torch's operators do."""
     return results if len(results) > 1 else results[0]
 
 
 def _namespace(sources: Sources) -> str:
-    """A namespace of torch operators for this package alone, also beside another of the same name."""
+    """Return a namespace of torch operators for this package alone, also beside another of the same name."""
     place = hashlib.sha256(f"{__name__} {sources.directory}".encode()).hexdigest()[:12]
     return f"linkwise_{sources.name}_{place}"

@@ -1,1 +1,1 @@
-"""The vectorised rule of rigid links: joints and links in motion, on arrays of any number of samples."""
+"""Vectorised rule of rigid links: joints and links in motion, on arrays of any number of samples."""

@@ -1,22 +1,23 @@
-"""Where the frames of a tree of joints are and how they move, all joints at once.
+"""Places and motion of the frames of a tree of joints, all joints at once.
 
 `xp` is the array namespace, numpy or torch. Arrays have their samples innermost and their joints (or links)
 before them: a vector is (3, joints, samples), and what all samples share has one. The number of array
 operations grows with the logarithm of the tree's depth alone: frames are composed over one joint, then two,
-four, eight, and so is what adds up along a chain of joints.
+four, eight, and sums along a chain of joints likewise.
 
-Vectors are in the base's axes, and moments and linear velocities about an origin o at rest: at the instant
-it is in the first hinge of each path, and places are counted from there, so that what is far from the base,
+Vectors are in the base's axes. Moments and linear velocities are about an origin o at rest, which at the
+instant is in the first hinge of each path; places are counted from there, so that what is far from the base,
 or from another arm, loses no digits. The screw of joint f, times its ratio, is S_f = (z, s): s = (p - o) x z
 for a hinge at p, and z = 0, s = axis for a slide, wherever it is.
 
 With d(q) the curve of a joint whose screw is sigma at a ratio of 1, all formulas stay as they are for its
-screw S = d' sigma, of which the rates have more terms:
+screw S = d' sigma, whose rates have more terms:
 
     Sd  = V x S  + d'' qd sigma
     Sdd = A x S + V x Sd + d'' qd V x sigma + (d''' qd^2 + d'' qdd) sigma
 
-and the position gradient c0_ik one for a joint's screw itself, d'' sigma . W with the wrench W of tau.
+The position gradient c0_ik has one more term, for a joint's screw itself: d'' sigma . W, with the wrench W of
+tau.
 """
 
 from collections.abc import Iterator
@@ -29,51 +30,51 @@ from ..interface import Namespace, Numbers
 from .joint_tree import JointTree, TreeCurve
 
 LINE = TreeCurve((0.0,), ((0.0, 1.0),))
-"""The curve of a joint that has none: what it moves by is its ratio's matter."""
+"""Curve d(q) = q of a joint that has none; the ratio is applied to it as to any other."""
 Positions = slice | Numbers
-"""What to take of an axis: entries in a row, or a table of positions."""
+"""Entries to take of an axis: a slice, or a table of positions."""
 Slopes = tuple[Numbers, Numbers, Numbers]
-"""The first three derivatives of all curves by q, (frames, samples) each."""
+"""First three derivatives of all curves by q, (frames, samples) each."""
 
 
 class CurveTables(NamedTuple):
     """Curves of all frames; each has as many pieces, and each piece as many powers, as the longest."""
 
     ends: Numbers
-    """Where each piece ends, (pieces - 1, frames, 1); infinite where there is none."""
+    """End of each piece, (pieces - 1, frames, 1); infinite where there is none."""
     first: Numbers
     """Index of each frame's first piece among all, (frames, 1)."""
     starts: Numbers
-    """Of all pieces, (frames * pieces)."""
+    """Starts of all pieces, (frames * pieces)."""
     powers: Numbers
     """Coefficients of the powers of the curve and its three derivatives, (4, powers, frames * pieces)."""
 
 
 class KinematicTables(NamedTuple):
-    """What kinematics needs of a tree. Frames are those of the joints, and one for the ground behind them."""
+    """Tables of a tree for kinematics. Frames are those of the joints, and one for the ground behind them."""
 
     coordinates: Numbers
     """Index of the coordinate of each frame."""
     turns: Numbers
-    """Ratio of a revolute joint, 0 of another, (frames, 1)."""
+    """Ratio of a revolute joint, 0 for others, (frames, 1)."""
     slides: Numbers | None
-    """Ratio of a prismatic joint, 0 of another, (frames, 1); None where no joint slides."""
+    """Ratio of a prismatic joint, 0 for others, (frames, 1); None where no joint slides."""
     still: Numbers
-    """(3, 3, frames, 1): axes of a frame in its parent's, without what follows."""
+    """(3, 3, frames, 1): axes of a frame in its parent's, without the two parts that follow."""
     cosine: Numbers
-    """The same: what its joint's cosine multiplies."""
+    """(3, 3, frames, 1): part of these axes that the cosine of the joint's angle multiplies."""
     sine: Numbers
-    """The same: what its joint's sine multiplies."""
+    """(3, 3, frames, 1): part of these axes that the sine of the joint's angle multiplies."""
     axes: Numbers
     """(3, frames, 1): direction of the joint in its parent's axes."""
     parents: Numbers
-    """Frame that carries each one."""
+    """Index of the frame that carries each one."""
     steps: tuple[Numbers, ...]
-    """For each step of composition the frame that each one's axes are in so far."""
+    """Frame in whose axes each one is so far, for each step of composition."""
     behind: Numbers
     """(frames, 1): ones for the frames that have a hinge before them, whose steps count."""
     curves: CurveTables | None
-    """What joints follow; None where none does."""
+    """Curves that joints follow; None where no joint follows one."""
 
 
 class Poses(NamedTuple):
@@ -82,9 +83,9 @@ class Poses(NamedTuple):
     axes: Numbers
     """(3, 3, frames, samples): [component, axis x, y or z]."""
     places: Numbers
-    """From the first hinge of the path, (3, frames, samples), in m; zero before it."""
+    """Places from the first hinge of the path, (3, frames, samples), in m; zero before it."""
     slopes: Slopes | None = None
-    """Of the joints' curves; None where no joint follows one."""
+    """Slopes of the joints' curves; None where no joint follows one."""
 
 
 class Twists(NamedTuple):
@@ -94,21 +95,21 @@ class Twists(NamedTuple):
     """
 
     screws: Numbers
-    """(5, 2, frames, samples): z and s of each joint times its ratio; none for the ground."""
+    """(5, 2, frames, samples): z and s of each joint times its ratio; zero for the ground."""
     rates: Numbers
-    """The same of their rates, zd and sd."""
+    """(5, 2, frames, samples): zd and sd, the rates of the screws."""
     twists: Numbers
-    """The same: omega and v of each frame; V x S is also that of what carries the joint, as S x S = 0."""
+    """(5, 2, frames, samples): omega and v of each frame; V x S may use its carrier's too, as S x S = 0."""
     accelerations: Numbers
-    """The same: their rates, from minus gravity."""
+    """(5, 2, frames, samples): rates of omega and v, from minus gravity."""
     second: Numbers | None = None
-    """The same: what curves add to the second rates of the screws; None where no joint follows one."""
+    """(5, 2, frames, samples): terms of curves in the second rates of the screws; None without curves."""
     bends: Numbers | None = None
-    """The same: how the screws change by their own coordinates; None likewise."""
+    """(5, 2, frames, samples): derivatives of the screws by their own coordinates; None without curves."""
 
 
 def kinematic_tables(tree: JointTree) -> KinematicTables:
-    """Tables of a tree, in float64."""
+    """Return the tables of a tree, in float64."""
     joints = tree.joints
     rotation = np.array([*(j.rotation for j in joints), np.eye(3)]).transpose(1, 2, 0)[..., None]
     ratio = np.array([*(j.ratio for j in joints), 0.0])[:, None]
@@ -133,7 +134,7 @@ def kinematic_tables(tree: JointTree) -> KinematicTables:
 
 
 def curve_tables(tree: JointTree) -> CurveTables | None:
-    """Tables of a tree, in float64; None where no joint follows a curve."""
+    """Return the tables of a tree's curves, in float64; None where no joint follows a curve."""
     if not any(joint.curve for joint in tree.joints):
         return None
     curves = [*(joint.curve or LINE for joint in tree.joints), LINE]
@@ -155,20 +156,20 @@ def curve_tables(tree: JointTree) -> CurveTables | None:
 
 
 def hinge_before(tree: JointTree) -> list[bool]:
-    """Whether each joint's path has a hinge before it."""
+    """Return whether each joint's path has a hinge before it."""
     hinges = [joint.kind == "revolute" for joint in tree.joints]
     return [any(hinges[f] for f in tree.chain(joint.parent)) for joint in tree.joints]
 
 
 def doubled(parents: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
-    """Frames 1, 2, 4, ... joints before each; the ground, the last one, stays where it is."""
+    """Yield the frames 1, 2, 4, ... joints before each; the ground, the last one, stays where it is."""
     while (parents != len(parents) - 1).any():
         yield parents
         parents = parents[parents]
 
 
 def displaced(tables: CurveTables, position: Numbers) -> tuple[Numbers, Slopes]:
-    """What each joint's ratio multiplies, d, and its slopes, for q of every frame's coordinate."""
+    """Return d, which each joint's ratio multiplies, and its slopes, for q of every frame's coordinate."""
     piece = tables.first + (position >= tables.ends).sum(0)
     at = position - tables.starts[piece]
     coefficients = tables.powers[:, :, piece]
@@ -179,19 +180,19 @@ def displaced(tables: CurveTables, position: Numbers) -> tuple[Numbers, Slopes]:
 
 
 def poses(xp: Namespace, tables: KinematicTables, translations: Numbers, position: Numbers) -> Poses:
-    """Forward kinematics of the whole tree.
+    """Return the poses of all frames of the tree, by forward kinematics.
 
     translations: of every frame in its parent's axes, (3, frames, samples); position: q of every frame's
     coordinate, (frames, samples)
     """
     way, slopes = (position, None) if tables.curves is None else displaced(tables.curves, position)
     angle = tables.turns * way
-    # Stacked, as a compiler then keeps them; else it works them out again for every entry of the axes.
+    # Stacked, so that a compiler keeps them; else it computes them again for every entry of the axes.
     cosine, sine = xp.stack([xp.cos(angle), xp.sin(angle)], 0)
     axes = tables.still + tables.cosine * cosine + tables.sine * sine
     for parents in tables.steps:
         axes = product(taken(axes, parents), axes)
-    # Each joint is so far from the one before: p_f - p_parent = R_parent t, and it all adds up.
+    # Each joint is p_f - p_parent = R_parent t from the one before; along a path these add up.
     step = translations
     if tables.slides is not None:
         step = step + tables.axes * (tables.slides * way)
@@ -201,13 +202,13 @@ def poses(xp: Namespace, tables: KinematicTables, translations: Numbers, positio
 
 
 def joint_screws(xp: Namespace, tables: KinematicTables, poses: Poses) -> Numbers:
-    """z and s of each joint times its ratio and slope, (5, 2, frames, samples); none for the ground."""
+    """Return z and s of joints times ratio and slope, (5, 2, frames, samples); zero for the ground."""
     screws = _straight_screws(xp, tables, poses)
     return screws if poses.slopes is None else screws * poses.slopes[0]
 
 
 def _straight_screws(xp: Namespace, tables: KinematicTables, poses: Poses) -> Numbers:
-    """The same without slopes."""
+    """Return z and s of each joint times its ratio, without slopes, (5, 2, frames, samples)."""
     axis = poses.axes[:, 2]
     z = axis * tables.turns
     s = cross(around(xp, poses.places), around(xp, z))
@@ -224,7 +225,7 @@ def twists(
     velocity: Numbers,
     acceleration: Numbers,
 ) -> Twists:
-    """Screws and motion of the tree.
+    """Return the screws and the motion of the tree.
 
     velocity, acceleration: qd and qdd of every frame's coordinate, (frames, samples); gravity: (3, 1,
     samples)
@@ -248,14 +249,17 @@ def twists(
 
 
 def _summed(tables: KinematicTables, a: Numbers) -> Numbers:
-    """Sums over the path of each frame, itself included; of (..., frames, samples), zero for the ground."""
+    """Return sums over the path of each frame, itself included, of (..., frames, samples).
+
+    The ground's entries must be zero.
+    """
     for parents in tables.steps:
         a = a + taken(a, parents)
     return a
 
 
 def taken(a: Numbers, index: Positions, axis: int = -2) -> Numbers:
-    """Some entries of an axis, counted from the end: -2 is that of the joints in (..., joints, samples)."""
+    """Return some entries of an axis, counted from the end: -2 is joints in (..., joints, samples)."""
     if isinstance(index, slice):
         return a[(..., index) + (slice(None),) * (-1 - axis)]
     either: Any = a
@@ -266,21 +270,21 @@ def taken(a: Numbers, index: Positions, axis: int = -2) -> Numbers:
 
 
 def product(a: Numbers, b: Numbers) -> Numbers:
-    """Products of matrices (3, 3, ...)."""
+    """Return the products of matrices (3, 3, ...)."""
     return a[:, 0:1] * b[0:1] + a[:, 1:2] * b[1:2] + a[:, 2:3] * b[2:3]
 
 
 def around(xp: Namespace, a: Numbers) -> Numbers:
-    """A vector with its x and y once more, (5, ...), for `cross`."""
+    """Return a vector with its x and y once more, (5, ...), for `cross`."""
     return xp.concat([a, a[:2]], 0)
 
 
 def cross(a: Numbers, b: Numbers) -> Numbers:
-    """a x b of vectors (5, ...), as a vector (3, ...)."""
+    """Return a x b of vectors (5, ...), as a vector (3, ...)."""
     return a[1:4] * b[2:5] - a[2:5] * b[1:4]
 
 
 def motion_cross(xp: Namespace, a: Numbers, b: Numbers) -> Numbers:
-    """(omega, v) x (z, s) = (omega x z, omega x s + v x z) of pairs of vectors (5, 2, ...)."""
+    """Return (omega, v) x (z, s) = (omega x z, omega x s + v x z) of pairs of vectors (5, 2, ...)."""
     both = cross(a[:, 0:1], b)
     return around(xp, xp.stack([both[:, 0], both[:, 1] + cross(a[:, 1], b[:, 0])], 1))

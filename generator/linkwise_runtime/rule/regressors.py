@@ -1,24 +1,24 @@
-"""Regressors on arrays: what the torques multiply the links' inertial parameters by.
+"""Regressors on arrays: factors of the links' inertial parameters in the torques.
 
 Torques are linear in what link j carries, pi_j = (m, mc_x, mc_y, mc_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz),
 with the inertia I about the origin of the link's frame and in its axes:
 
     tau_ij = Y_ij . pi_j        and so c2_ijk, c1_ijk and g_ij, each with a row of its own.
 
-In these axes, and about this origin, which is where a link's joint has it, coordinate i turns the link by z_i
-and moves the origin by u_i, its partial velocity; the link turns at omega. One row serves all,
+In these axes, and about this origin, that of the frame that the link's joint moves, coordinate i turns the
+link by z_i and moves the origin by u_i, its partial velocity; the link turns at omega. One row serves all,
 
     Y = [u_i . a,   a x z_i + u_i x alpha + (u_i x beta) x omega,   z_i alpha^T + y beta^T - 1/2 (y . beta) 1]
 
-with y = z_i x omega, a product of inertia meeting both entries of the matrix, for
+with y = z_i x omega, a product of inertia counting for both entries of the matrix, for
 
     tau:      a the origin's acceleration less gravity    alpha = omega-dot     beta = omega
     c2 of k:  a = u_k                                     alpha = z_k           beta = 0
-    c1 of k:  a = u_k's rate                              alpha = z_k's rate    beta = z_k
+    c1 of k:  a = rate of u_k                             alpha = rate of z_k   beta = z_k
     g:        a = minus gravity                           alpha = 0             beta = 0
 
-It is the rule of `rigid_rule` about that origin, sorted by mass, first moment h = mc and inertia. Arrays are
-those of `kinematics`: samples innermost.
+This is the rule of `rigid_rule` about that origin, sorted by mass, first moment h = mc and inertia. Arrays
+are those of `kinematics`: samples innermost.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,16 +37,16 @@ from .tree_arrays import TreeArrays
 
 
 class RegressorTables(NamedTuple):
-    """Rows of a robot: a pair is a link and a coordinate of its path, in the order of `Layout.torque`."""
+    """Tables of a robot's rows: pairs of a link and a coordinate of its path, in `Layout.torque`'s order."""
 
     joints: tuple[Numbers, ...]
     """Joints that follow each pair's coordinate, a table for each summand; the ground where there is none."""
     frames: Numbers
-    """Joint that moves each pair's link."""
+    """Index of the joint that moves each pair's link."""
     upper: tuple[Numbers, Numbers]
     """Pairs of i and of k, in the order of `Layout.acceleration`."""
     every: tuple[Numbers, Numbers]
-    """The same in the order of `Layout.velocity`."""
+    """Pairs of i and of k, in the order of `Layout.velocity`."""
 
 
 class LinkAxes(NamedTuple):
@@ -56,15 +56,15 @@ class LinkAxes(NamedTuple):
     u: Numbers
     omega: Numbers
     v: Numbers
-    """Of the origin, in m/s."""
+    """Velocity of the origin, in m/s."""
 
 
 Turn = Callable[[Numbers], tuple[Numbers, Numbers]]
-"""What turns screws (5, 2, pairs, samples) into the links' axes."""
+"""Function that turns screws (5, 2, pairs, samples) into the links' axes."""
 
 
 def inertial_parameters(bodies: Bodies[Own]) -> Own:
-    """pi_j of bodies, (..., N, 10), an array or a tensor as they are.
+    """Return pi_j of bodies, (..., N, 10), an array or a tensor as they are.
 
     I is about the origin: I = J + m (c . c 1 - c c^T), J about the centre c.
     """
@@ -87,7 +87,7 @@ def inertial_parameters(bodies: Bodies[Own]) -> Own:
 
 
 def regressor_tables(tree: JointTree) -> RegressorTables:
-    """Tables of a tree."""
+    """Return the tables of a tree."""
     chains = [np.array(tree.chain(link.joint)) for link in tree.links]
     found = [members(tree, j) for j in range(len(tree.links))]
     rows = [np.where(m < 0, -1, chain[m]).T for chain, m in zip(chains, found, strict=True)]
@@ -112,10 +112,10 @@ def torque_rows(
     numbers: TreeArrays,
     motion: Sequence[Numbers],
 ) -> list[Numbers]:
-    """Y of tau, (samples, pairs * 10), for q, qd and qdd (n, samples)."""
+    """Return Y of tau, (samples, pairs * 10), for q, qd and qdd (n, samples)."""
     moved, turn, link, _ = _moved(xp, frames, tables, numbers, motion)
     rate = turn(taken(moved.accelerations, tables.frames))
-    # a = vd + omega-dot x p + omega x v: where the origin is stands in `turn`.
+    # a = vd + omega-dot x p + omega x v: `turn` adds the part of the origin's place p.
     a = rate[1] + cross(link.omega, link.v)
     return [_rows(xp, link, around(xp, a), around(xp, rate[0]), link.omega)]
 
@@ -127,7 +127,7 @@ def coefficient_rows(
     numbers: TreeArrays,
     motion: Sequence[Numbers],
 ) -> list[Numbers]:
-    """Y of c2, c1 and g, (samples, entries * 10) each, for q, qd and qdd (n, samples)."""
+    """Return Y of c2, c1 and g, (samples, entries * 10) each, for q, qd and qdd (n, samples)."""
     moved, turn, link, gravity = _moved(xp, frames, tables, numbers, motion)
     zd, fixed = (around(xp, a) for a in turn(_of_pairs(moved.rates, tables)))
     # About the moving origin: u-dot = sd + zd x p + z x v.
@@ -147,7 +147,7 @@ def _moved(
     numbers: TreeArrays,
     motion: Sequence[Numbers],
 ) -> tuple[Twists, Turn, LinkAxes, Numbers]:
-    """Twists, what turns screws, the pairs in the links' axes, and gravity there."""
+    """Return twists, the function that turns screws, the pairs in the links' axes, and gravity there."""
     position, velocity, acceleration = (taken(a, frames.coordinates) for a in motion)
     placed = poses(xp, frames, numbers.translations, position)
     moved = twists(xp, frames, placed, numbers.gravity, velocity, acceleration)
@@ -170,7 +170,7 @@ def _moved(
 
 
 def _of_pairs(screws: Numbers, tables: RegressorTables) -> Numbers:
-    """Screws of frames for each pair, summed over the joints that follow its coordinate."""
+    """Return the screws of frames for each pair, summed over the joints that follow its coordinate."""
     first, *others = (taken(screws, joints) for joints in tables.joints)
     return sum(others, first)
 
@@ -180,7 +180,10 @@ def _taken(link: LinkAxes, pairs: Numbers) -> LinkAxes:
 
 
 def _rows(xp: Namespace, link: LinkAxes, a: Numbers, alpha: Numbers, beta: Numbers) -> Numbers:
-    """Y of the links' pairs, (samples, rows * 10), for vectors (5, rows, samples) or (3, rows, samples)."""
+    """Return Y of the links' pairs, (samples, rows * 10).
+
+    a, alpha, beta: vectors (5, rows, samples) or (3, rows, samples)
+    """
     z, u = link.z, link.u
     y = cross(z, link.omega)
     h = cross(a, z) + cross(u, alpha) + cross(around(xp, cross(u, beta)), link.omega)

@@ -22,19 +22,19 @@ from .tree_arrays import TreeArrays, given_numbers
 CACHE = 1 << 22
 """Bytes of the arrays of one chunk of samples, which are to stay in the processor's cache."""
 LINK_NUMBERS = 200
-"""Numbers that a link and its joint have of one sample, beside the products."""
+"""Numbers of a link and its joint for one sample, without the products."""
 ROW_NUMBERS = 6 * PARAMETERS
-"""Numbers that a row of a regressor takes while it is computed."""
+"""Numbers that a row of a regressor needs while it is computed."""
 
 
 Moving = Moment | FusedMoment | SpatialMoment
-"""Joints and links in motion, which packed numbers are made of."""
+"""Joints and links in motion, from which packed numbers are made."""
 Innermost = Callable[[Sequence[Numbers], TreeArrays, LinkNumbers], list[Numbers]]
-"""Answers for motion, the tree's numbers and those of its links, all with the samples innermost."""
+"""Function of motion, the tree's numbers and its links' that returns answers, all with samples innermost."""
 
 
 class RigidRule:
-    """The rule for a robot's tree; tables are made when first asked for, for each dtype and device."""
+    """Rigid-link rule for a robot's tree; tables are made when first asked for, for each dtype and device."""
 
     def __init__(self, tree: JointTree) -> None:
         self.tree = tree
@@ -42,7 +42,7 @@ class RigidRule:
 
     @cached_property
     def layout(self) -> RuleLayout:
-        """Where packed values stand."""
+        """Positions of packed values."""
         return rule_layout(self.tree)
 
     @cached_property
@@ -50,14 +50,14 @@ class RigidRule:
         return listed_tables(self.tree, self.layout)
 
     def tables(self, library: Library, like: Numbers) -> RuleTables:
-        """Constants to compute with `like`."""
+        """Return the constants to compute with `like`."""
         key = library.xp.__name__, like.dtype, getattr(like, "device", None)
         if key not in self._tables:
             self._tables[key] = converted(self._listed, library, like)
         return self._tables[key]
 
     def bodies(self) -> Bodies[NDArray[np.float64]]:
-        """What the links carry, as the package has it."""
+        """Return the bodies that the links carry, as the package has them."""
         links = self.tree.links
         return Bodies(
             np.array([link.mass for link in links]),
@@ -72,7 +72,7 @@ class RigidRule:
         p: Mapping[str, Numbers],
         bodies: Bodies[Numbers] | None,
     ) -> list[Own]:
-        """c2, c1, g and tau, (..., count) each."""
+        """Return c2, c1, g and tau, (..., count) each."""
         return self._answers(library, motion, p, bodies, lambda at: [*at.coefficients(), *at.singles((3, 4))])
 
     def torque(
@@ -82,7 +82,7 @@ class RigidRule:
         p: Mapping[str, Numbers],
         bodies: Bodies[Numbers] | None,
     ) -> Own:
-        """tau (..., count)."""
+        """Return tau (..., count)."""
         return self._answers(library, motion, p, bodies, lambda at: at.singles((4,)))[0]
 
     def position_gradient(
@@ -92,7 +92,7 @@ class RigidRule:
         p: Mapping[str, Numbers],
         bodies: Bodies[Numbers] | None,
     ) -> Own:
-        """c0 (..., count)."""
+        """Return c0 (..., count)."""
         diagonal = self.tables(library, motion[0]).diagonal
 
         def answer(at: Moving) -> list[Numbers]:
@@ -111,7 +111,7 @@ class RigidRule:
         p: Mapping[str, Numbers],
         bodies: Bodies[Numbers] | None,
     ) -> list[Own]:
-        """Kinetic and potential energies (..., N) for q and qd."""
+        """Return the kinetic and potential energies (..., N) in J, for q and qd."""
         xp, tables = library.xp, self.tables(library, motion[0])
 
         def answer(own: Sequence[Numbers], some: TreeArrays, carried: LinkNumbers) -> list[Numbers]:
@@ -121,7 +121,7 @@ class RigidRule:
         return self._of_tree(library, motion, p, bodies, answer, 0)
 
     def regressor(self, library: Library, motion: Sequence[Own], p: Mapping[str, Numbers]) -> Own:
-        """Y of tau, (..., count * 10)."""
+        """Return Y of tau, (..., count * 10)."""
         tables = self.tables(library, motion[0])
 
         def answer(own: Sequence[Numbers], some: TreeArrays, carried: LinkNumbers) -> list[Numbers]:
@@ -133,7 +133,7 @@ class RigidRule:
     def coefficient_regressors(
         self, library: Library, motion: Sequence[Own], p: Mapping[str, Numbers]
     ) -> list[Own]:
-        """Y of c2, c1 and g, (..., count * 10) each."""
+        """Return Y of c2, c1 and g, (..., count * 10) each."""
         tables = self.tables(library, motion[0])
 
         def answer(own: Sequence[Numbers], some: TreeArrays, carried: LinkNumbers) -> list[Numbers]:
@@ -151,7 +151,10 @@ class RigidRule:
         answer: Innermost,
         products: int,
     ) -> list[Own]:
-        """What `answer` gives of the tree's numbers alone, (..., n) each; products: see `_in_pieces`."""
+        """Return the results of `answer` from the tree's numbers alone, (..., count) each.
+
+        products: see `_in_pieces`
+        """
         batch, tables = tuple(motion[0].shape[:-1]), self.tables(library, motion[0])
         own = tables.own, tables.sources
         numbers = given_numbers(library.xp, self.tree, own, p, bodies, batch)
@@ -166,7 +169,7 @@ class RigidRule:
         bodies: Bodies[Numbers] | None,
         answer: Callable[[Moving], list[Numbers]],
     ) -> list[Own]:
-        """What `answer` gives for the samples of a motion, (..., n) each."""
+        """Return the results of `answer` for the samples of a motion, (..., count) each."""
         q = motion[0]
         batch, n = tuple(q.shape[:-1]), q.shape[-1]
         tables = self.tables(library, q)
@@ -195,12 +198,12 @@ class RigidRule:
         answer: Innermost,
         products: int,
     ) -> list[Numbers]:
-        """What `answer` gives with the samples innermost, as many at once as the back end wants.
+        """Return the results of `answer` with samples innermost, as many at once as the back end wants.
 
-        products: numbers of one sample that it computes beside those of joints and links
+        products: numbers of one sample that it computes besides those of joints and links
         """
         xp, n = library.xp, motion[0].shape[-1]
-        # A copy: with views a compiler would gather from rows of samples in every loop.
+        # A copy: with views, a compiler would gather from rows of samples in every loop.
         samples = math.prod(motion[0].shape[:-1])
         flat = xp.stack([xp.swapaxes(a.reshape(samples, n), 0, 1) for a in motion], 0)
         joined: list[Numbers] = []
@@ -219,7 +222,7 @@ class RigidRule:
     def _pieces(
         self, library: Library, motion: Sequence[Numbers], samples: int, products: int
     ) -> Sequence[slice]:
-        """Slices of the samples, each to be computed at once."""
+        """Return slices of the samples, each to be computed at once."""
         links = len(self.tree.links)
         most = CACHE // (motion[0].itemsize * (products + LINK_NUMBERS * links)) + 1
         size = library.chunk(motion, max(most, 16))
@@ -231,7 +234,7 @@ class RigidRule:
 def _moment(
     library: Library, tables: RuleTables, motion: Sequence[Numbers], numbers: TreeArrays, links: LinkNumbers
 ) -> Moment | FusedMoment:
-    """Motion of joints and links for q, qd and qdd (n, samples)."""
+    """Return the motion of joints and links for q, qd and qdd (n, samples)."""
     xp, frames = library.xp, tables.frames
     position, velocity, acceleration = (taken(a, frames.coordinates) for a in motion)
     placed = poses(xp, frames, numbers.translations, position)
@@ -243,5 +246,5 @@ def _moment(
 
 
 def _samples(a: Numbers, piece: slice) -> Numbers:
-    """The numbers of some samples; one that all share stays."""
+    """Return the numbers of some samples; one that all share stays."""
     return a[..., piece] if a.shape[-1] > 1 else a

@@ -1,8 +1,8 @@
-"""Where the numbers of the rigid-link rule stand in packed results.
+"""Positions of the rigid-link rule's numbers in packed results.
 
 The rule answers group by group: for every link of a group and every two joints on the group's path a dense
-block, (i, link, kind, k), whether the link hangs on these joints or not. A packed value is one of its
-entries; where several joints follow one coordinate, as mimic joints do, it is the sum of several.
+block, (i, link, kind, k), whether these joints carry the link or not. A packed value is one of its entries;
+where several joints follow one coordinate, as mimic joints do, it is the sum of several.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .joint_tree import JointTree
 
 SPAN = 16
-"""Links of one group at most: links near the base of a long chain need not pay for the joints behind them."""
+"""Most links of one group: links near the base of a long chain need not pay for the joints behind them."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class LinkGroup:
 
 
 def link_groups(tree: JointTree) -> tuple[LinkGroup, ...]:
-    """Every link in one group, the longest ways first."""
+    """Return groups of links, with every link in one of them, the longest ways first."""
     chains = [tree.chain(link.joint) for link in tree.links]
     left, groups = set(range(len(chains))), []
     for end in sorted(left, key=lambda j: -len(chains[j])):
@@ -49,16 +49,16 @@ class RuleLayout:
     velocity: NDArray[np.intp]
     position_gradient: NDArray[np.intp]
     zero: int
-    """Entries of all groups together."""
+    """Number of entries of all groups together."""
     torque: NDArray[np.intp]
-    """Those of tau in answers (joint, kind, link), of which gravity is the second kind."""
+    """Positions of tau in answers (joint, kind, link), of which gravity is the second kind."""
     gravity: NDArray[np.intp]
     diagonal: NDArray[np.intp]
-    """Of each packed c0_ik with i = k the packed tau_i, of others the number of these."""
+    """Position of the packed tau_i for each packed c0_ik with i = k; for others, the number of packed tau."""
 
 
 def rule_layout(tree: JointTree) -> RuleLayout:
-    """Positions for a tree; packed values are in the order of `Layout`."""
+    """Return the positions for a tree; packed values are in the order of `Layout`."""
     groups = link_groups(tree)
     blocks, total = dict[int, _Block](), 0
     for group in groups:
@@ -99,7 +99,7 @@ def _diagonal(counts: Sequence[int]) -> NDArray[np.intp]:
 
 @dataclass(frozen=True)
 class PairLayout:
-    """The same values where every pair of a link and a joint on its way has wrenches of its own.
+    """Positions of values where every pair of a link and a joint on its way has wrenches of its own.
 
     A value is the sum of S_e . (wrench) over rows of e and of the wrench: pairs of the first kind, then of
     the second. Joint e is the ground, which has no screw, where there is no summand.
@@ -109,11 +109,11 @@ class PairLayout:
     joints: NDArray[np.intp]
     """Link and joint of each pair."""
     entries: tuple[tuple[tuple[NDArray[np.intp], NDArray[np.intp]], ...], ...]
-    """For each of the tables given the rows (e, wrench)."""
+    """Rows (e, wrench) for each of the given tables."""
 
 
 def pair_layout(layout: RuleLayout, tables: Sequence[NDArray[np.intp]], ground: int) -> PairLayout:
-    """Pairs for positions in the answers of all groups."""
+    """Return the pairs for positions in the answers of all groups."""
     starts = np.cumsum([0, *(2 * len(g.links) * len(g.path) ** 2 for g in layout.groups)])
     every = np.arange(layout.zero)
     e, j, kind, f = np.empty((4, layout.zero), dtype=np.intp)
@@ -138,7 +138,7 @@ def pair_layout(layout: RuleLayout, tables: Sequence[NDArray[np.intp]], ground: 
 
 @dataclass(frozen=True)
 class _Block:
-    """The entries of one link: members (coordinates, joints), place in its group, where that begins."""
+    """Entries of one link: members (coordinates, joints), place in its group, and where the group begins."""
 
     members: NDArray[np.intp]
     at: int
@@ -147,11 +147,14 @@ class _Block:
 
     @property
     def count(self) -> int:
-        """Coordinates that move the link."""
+        """Number of coordinates that move the link."""
         return len(self.members)
 
     def entries(self, kind: int | NDArray[np.intp]) -> NDArray[np.intp]:
-        """Positions (summands, i and k) of a kind, or of one for each two joints (path, path); -1: none."""
+        """Return positions (summands, i and k) of a kind, or of one for each two joints (path, path).
+
+        They are -1 where there is no entry.
+        """
         i, k = self.members[:, :, None, None], self.members[None, None]
         if not isinstance(kind, int):
             kind = kind[i, k]
@@ -160,13 +163,16 @@ class _Block:
         return where.transpose(1, 3, 0, 2).reshape(-1, self.count**2)
 
     def slopes(self) -> NDArray[np.intp]:
-        """Positions of c0: of the second kind where joint i is not behind joint k."""
+        """Return the positions of c0: of the second kind where joint i is not behind joint k."""
         d = len(self.group.path)
         return self.entries(np.triu(np.ones((d, d), dtype=np.intp)))
 
 
 def members(tree: JointTree, link: int) -> NDArray[np.intp]:
-    """For each coordinate of a link's path, ascending, where its joints stand on the way; -1 behind them."""
+    """Return where the joints of each coordinate of a link's path stand on the way.
+
+    Rows are the coordinates, ascending, with -1 behind the joints.
+    """
     chain = tree.chain(tree.links[link].joint)
     found: dict[int, list[int]] = {}
     for at, joint in enumerate(chain):
@@ -176,7 +182,7 @@ def members(tree: JointTree, link: int) -> NDArray[np.intp]:
 
 
 def joined(blocks: Sequence[NDArray[np.intp]], zero: int) -> NDArray[np.intp]:
-    """Rows of all links side by side, the missing ones those of a zero."""
+    """Return the rows of all links side by side, with `zero` in place of missing entries."""
     most = max(len(block) for block in blocks)
     filled = [np.pad(block, ((0, most - len(block)), (0, 0)), constant_values=-1) for block in blocks]
     joined = np.concatenate(filled, 1)

@@ -2,10 +2,10 @@
 
 Matrix products answer for whole groups of links and joints; what is packed is picked from them.
 
-To a compiler, which makes one loop of many operations, a matrix product is a wall. For it every pair of a
-link and a joint on its way has the wrenches of `rigid_rule`, written by components: the loop over pairs and
-samples then reads each number once and works out all of them. What later loops pick from is stacked, which
-makes it kept and not worked out again.
+A compiler makes one loop of many operations, but not across a matrix product. For it every pair of a link and
+a joint on its way has the wrenches of `rigid_rule`, written by components: the loop over pairs and samples
+then reads each number once and computes all of them. What later loops pick from is stacked, so that it is
+kept and not computed again.
 """
 
 import math
@@ -28,13 +28,13 @@ from .rigid_rule import (
 from .rule_tables import RuleTables
 
 Vector = Numbers | Sequence[Numbers]
-"""Components, (pairs, samples) each; of a wrench six: moment, then force."""
+"""Components, (pairs, samples) each; a wrench has six: moment, then force."""
 Columns = Numbers | Sequence[Vector]
-"""Of a matrix."""
+"""Columns of a matrix."""
 
 
 class Moment(NamedTuple):
-    """Samples side by side: how joints and links move, and with which numbers."""
+    """Motion of joints and links, and the links' numbers, with samples side by side."""
 
     xp: Namespace
     tables: RuleTables
@@ -43,26 +43,26 @@ class Moment(NamedTuple):
     states: LinkStates
 
     def coefficients(self) -> list[Numbers]:
-        """Packed c2 and c1."""
+        """Return packed c2 and c1."""
         dense = _products(self.xp, self, self._matrices(), decomposition_columns(self.xp, self.moved))
         return [packed(self.xp, dense, positions) for positions in self.tables.positions[:2]]
 
     def gradient(self) -> list[Numbers]:
-        """Packed c0."""
+        """Return packed c0."""
         xp, tables = self.xp, self.tables
         matrices = gradient_matrices(xp, tables.links, self._matrices(), self.states.wrenches[:, 0])
         dense = _products(xp, self, matrices, gradient_columns(xp, self.moved))
         return [packed(xp, dense, tables.positions[2])]
 
     def own_bends(self) -> Numbers | None:
-        """What tau's wrench does along how S changes by its own coordinate, packed as tau; or None."""
+        """Return dS/dq . (wrench) of tau, S by its own coordinate, packed as tau; None without curves."""
         bends = self.moved.bends
         return (
             None if bends is None else self._replace(moved=self.moved._replace(screws=bends)).singles((4,))[0]
         )
 
     def singles(self, fields: Sequence[int]) -> list[Numbers]:
-        """Packed S_e . (wrench) of g or tau, or both."""
+        """Return packed S_e . (wrench) of g or tau, or both."""
         xp = self.xp
         axes, wrenches = _outermost(xp, _screws(xp, self.moved)), _outermost(xp, self.states.wrenches)
         samples, joints, links = axes.shape[0], axes.shape[2], wrenches.shape[3]
@@ -75,9 +75,9 @@ class Moment(NamedTuple):
 
 
 def _products(xp: Namespace, at: Moment, matrices: Numbers, columns: Numbers) -> Numbers:
-    """S_e . (L column) for each group's links and any two joints e and f on its path, (samples, entries).
+    """Return S_e . (L column) for each group's links and any two joints e and f on its path.
 
-    Entries are ordered by e, link, column, f; groups stand in a row.
+    The answer is (samples, entries). Entries are ordered by e, link, column, f; groups stand in a row.
     """
     screws = _screws(xp, at.moved)
     left, axes, right = (_outermost(xp, a) for a in (matrices, screws, columns))
@@ -94,12 +94,12 @@ def _products(xp: Namespace, at: Moment, matrices: Numbers, columns: Numbers) ->
 
 
 def _screws(xp: Namespace, moved: Twists) -> Numbers:
-    """z and s of the joints, (6, joints, samples)."""
+    """Return z and s of the joints, (6, joints, samples)."""
     return xp.concat([moved.screws[:3, 0, :-1], moved.screws[:3, 1, :-1]], 0)
 
 
 def _outermost(xp: Namespace, a: Numbers) -> Numbers:
-    """An array (..., samples) as (samples, ...), in one piece of memory."""
+    """Return an array (..., samples) as (samples, ...), in one piece of memory."""
     shape, samples = tuple(a.shape[:-1]), a.shape[-1]
     flat: Any = xp.swapaxes(a.reshape(math.prod(shape), samples), 0, 1)
     flat = np.ascontiguousarray(flat) if isinstance(flat, np.ndarray) else flat.contiguous()
@@ -108,7 +108,10 @@ def _outermost(xp: Namespace, a: Numbers) -> Numbers:
 
 
 def packed(xp: Namespace, values: Numbers, positions: Sequence[Numbers]) -> Numbers:
-    """Entries (samples, count) of values (samples, entries), or sums of some; behind them stands a zero."""
+    """Return entries (samples, count) of values (samples, entries), or sums of some.
+
+    For sums, a zero stands behind the values.
+    """
     if len(positions) > 1:
         values = xp.concat([values, 0.0 * values[:, :1]], 1)
     found = taken(values, positions[0], -1)
@@ -118,7 +121,7 @@ def packed(xp: Namespace, values: Numbers, positions: Sequence[Numbers]) -> Numb
 
 
 class FusedMoment(NamedTuple):
-    """How joints and links move; its methods are those of `Moment`."""
+    """Motion of joints and links, for compilers; its methods are those of `Moment`."""
 
     xp: Namespace
     tables: RuleTables
@@ -126,7 +129,7 @@ class FusedMoment(NamedTuple):
     states: LinkStates
 
     def coefficients(self) -> list[Numbers]:
-        """Packed c2 and c1."""
+        """Return packed c2 and c1."""
         link, (z, s), (zd, sd) = self._links(), *map(self._pairs, (self.moved.screws, self.moved.rates))
         c1 = _sum(link.accelerated(zd, sd), link.turning(z))
         kept = self.xp.stack([*link.accelerated(z, s), *c1], 0)
@@ -134,7 +137,7 @@ class FusedMoment(NamedTuple):
         return [self._gathered(w, rows) for w, rows in zip((kept[:6], kept[6:]), entries, strict=True)]
 
     def gradient(self) -> list[Numbers]:
-        """Packed c0: wrenches for joints behind joint f, then for it and those before."""
+        """Return packed c0: wrenches for joints behind joint f, then for it and those before."""
         moved, link = self.moved, self._links()
         (z, s), (zd, _), (zdd, sdd) = map(
             self._pairs, (moved.screws, moved.rates, second_rates(self.xp, moved))
@@ -147,32 +150,32 @@ class FusedMoment(NamedTuple):
         return [self._gathered(kept, self.tables.entries[2])]
 
     def own_bends(self) -> Numbers | None:
-        """What tau's wrench does along how S changes by its own coordinate, packed as tau; or None."""
+        """Return dS/dq . (wrench) of tau, S by its own coordinate, packed as tau; None without curves."""
         bends = self.moved.bends
         return (
             None if bends is None else self._replace(moved=self.moved._replace(screws=bends)).singles((4,))[0]
         )
 
     def singles(self, fields: Sequence[int]) -> list[Numbers]:
-        """Packed S_e . (wrench) of g or tau, or both."""
+        """Return packed S_e . (wrench) of g or tau, or both."""
         wrenches = self.states.wrenches
         flat = wrenches.reshape(6, wrenches.shape[1] * wrenches.shape[2], wrenches.shape[3])
         return [self._gathered(flat, self.tables.entries[field]) for field in fields]
 
     def _links(self) -> "_Links":
-        """The moments of each pair's link."""
+        """Return the moments of each pair's link."""
         m, h, inertia, momentum, b = (taken(a, self.tables.pairs[0]) for a in self.states.moments)
         # Of a symmetric matrix each entry is read once.
         upper = [[inertia[min(i, k), max(i, k)] for i in range(3)] for k in range(3)]
         return _Links(m, h[:3], upper, momentum[:3], b)
 
     def _pairs(self, screws: Numbers) -> tuple[Numbers, Numbers]:
-        """z and s of each pair's joint, of pairs of vectors (5, 2, frames, samples)."""
+        """Return z and s of each pair's joint, from pairs of vectors (5, 2, frames, samples)."""
         found = taken(screws, self.tables.pairs[1])
         return found[:3, 0], found[:3, 1]
 
     def _gathered(self, wrenches: Numbers, entries: Sequence[tuple[Numbers, Numbers]]) -> Numbers:
-        """Sums of S_e . (wrench), of wrenches (6, rows, samples), as (samples, count)."""
+        """Return sums of S_e . (wrench), of wrenches (6, rows, samples), as (samples, count)."""
         screws = self.moved.screws
         parts = [
             taken(screws[axis % 3, axis // 3], e) * taken(wrenches[axis], row)
@@ -183,7 +186,7 @@ class FusedMoment(NamedTuple):
 
 
 class _Links(NamedTuple):
-    """The link of each pair: m, h, I, P and B of `LinkMoments`."""
+    """Link of each pair: m, h, I, P and B of `LinkMoments`."""
 
     m: Numbers
     h: Vector
@@ -192,17 +195,17 @@ class _Links(NamedTuple):
     b: Columns
 
     def accelerated(self, z: Vector, s: Vector) -> Vector:
-        """N = h x s + I z over f = m s + z x h."""
+        """Return N = h x s + I z over f = m s + z x h."""
         moment = _sum(_cross(self.h, s), _applied(self.inertia, z))
         return [*moment, *_sum([self.m * a for a in s], _cross(z, self.h))]
 
     def turning(self, z: Vector) -> Vector:
-        """N = B z over f = z x P."""
+        """Return N = B z over f = z x P."""
         return [*_applied(self.b, z), *_cross(z, self.momentum)]
 
 
 def _applied(matrix: Columns, z: Vector) -> Vector:
-    """A matrix, columns first, times a vector."""
+    """Return a matrix, columns first, times a vector."""
     return [matrix[0][i] * z[0] + matrix[1][i] * z[1] + matrix[2][i] * z[2] for i in range(3)]
 
 

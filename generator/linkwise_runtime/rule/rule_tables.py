@@ -1,12 +1,13 @@
-"""The constants of the rigid-link rule for one robot, as each back end has them.
+"""Constants of the rigid-link rule for one robot, as each back end has them.
 
-Those of `spatial_rule` are matrices, 6 x 6. Motions are ordered (s, z), linear before angular, and wrenches
-(f, N), so that S . W is the part of wrench W on the joint of screw S. A frame turned by R and moved by t has
+Constants of `spatial_rule` are matrices, 6 x 6. Motions are ordered (s, z), linear before angular, and
+wrenches (f, N), so that S . W is the part of wrench W on the joint of screw S. A frame turned by R and moved
+by t has
 
     X = |R     0|     which brings its wrenches into the axes, and to the place, of what carries it,
         |[t]xR R|     and its spatial inertia too: X I X^T.
 
-Their samples are outermost, and what all samples share has one.
+Samples of these matrices are outermost, and what all samples share has one.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,55 +28,55 @@ Table = TypeVar("Table")
 
 
 class SpatialTables(NamedTuple):
-    """What a tree's joints are. Frames are those of the joints, and one for the ground behind them."""
+    """Constants of a tree's joints. Frames are those of the joints, and one for the ground behind them."""
 
     coordinates: Numbers
     """Index of the coordinate of each frame."""
     own: Positions
-    """The same of each joint."""
+    """Index of the coordinate of each joint."""
     turns: Numbers
-    """Ratio of a revolute joint, 0 of another, (frames,)."""
+    """Ratio of a revolute joint, 0 for others, (frames,)."""
     slides: Numbers | None
-    """Ratio of a prismatic joint, 0 of another, (frames,); None where no joint slides."""
+    """Ratio of a prismatic joint, 0 for others, (frames,); None where no joint slides."""
     turned: Numbers
-    """X without t: still, and what cosine and sine multiply; (3, 1, frames, 6, 6)."""
+    """X without t: the constant part, and those of cosine and sine; (3, 1, frames, 6, 6)."""
     axes: Numbers
     """(frames, 3): direction of the joint in its parent's axes; zeros before the first hinge."""
     behind: Numbers
     """(frames, 1): ones for the frames that have a hinge before them, whose translations count."""
     steps: tuple[Numbers, ...]
-    """For each step of composition the frame that each one's X leads to so far."""
+    """Frame that each one's X leads to so far, for each step of composition."""
     units: Numbers
     """(joints, 6, 1): (z, s) of each joint in its own frame, times its ratio."""
     chains: Numbers
     """(joints, joints): ones for the joints on each one's path, itself included."""
     joints: Positions
-    """Joint of each link."""
+    """Index of the joint of each link."""
     swapped: Numbers
-    """(s, z) of (z, s)."""
+    """Positions that make (s, z) of (z, s)."""
     offset: Numbers
-    """Where t stands in [0 0; [t]x 0], (3, 36)."""
+    """Table that places t in [0 0; [t]x 0], (3, 36)."""
     body: Numbers
-    """Where mass and inertia stand in those of a body about its centre, (10, 36)."""
+    """Table that places mass and inertia in the matrix of a body about its centre, (10, 36)."""
     motion_cross: Numbers
-    """Where (v, omega) stands in the matrix of V x, (6, 36)."""
+    """Table that places (v, omega) in the matrix of V x, (6, 36)."""
     force_cross: Numbers
-    """Where W = (f, N) stands in the matrix of S -> S x* W, (6, 36)."""
+    """Table that places W = (f, N) in the matrix of S -> S x* W, (6, 36)."""
 
 
 class SpatialNumbers(NamedTuple):
-    """The numbers of a tree in matrices."""
+    """Numbers of a tree in matrices."""
 
     frames: Numbers
-    """X of each frame: still, and what cosine, sine and q multiply; (3 or 4, samples, frames, 6, 6)."""
+    """X of each frame: constant, and parts of cosine, sine and q; (3 or 4, samples, frames, 6, 6)."""
     inertias: Numbers
-    """In the axes of the links' frames, about their origins; (samples, N, 6, 6)."""
+    """Spatial inertias in the axes of the links' frames, about their origins; (samples, N, 6, 6)."""
     gravity: Numbers
-    """(samples, 1, 6), as an acceleration of the base's axes."""
+    """Gravity as an acceleration in the base's axes, (samples, 1, 6)."""
 
 
 class RuleTables(NamedTuple):
-    """All constants of a robot, of one dtype on one device."""
+    """Constants of a robot, of one dtype on one device."""
 
     frames: KinematicTables
     links: LinkTables
@@ -83,23 +84,23 @@ class RuleTables(NamedTuple):
     numbers: LinkNumbers
     spatial: SpatialTables
     matrices: SpatialNumbers
-    """The tree's own."""
+    """Matrices of the tree's own numbers."""
     sources: Numbers
     groups: tuple[tuple[Positions, Positions], ...]
-    """Links and path of each."""
+    """Links and path of each group."""
     positions: tuple[tuple[Numbers, ...], ...]
-    """Of c2, c1, c0, g and tau in the answers, a table for each summand."""
+    """Positions of c2, c1, c0, g and tau in the answers, a table for each summand."""
     diagonal: Numbers
-    """Of each c0_ik with i = k the packed tau_i, of others a zero behind."""
+    """Position of the packed tau_i for each c0_ik with i = k; for others, that of a zero behind."""
     pairs: tuple[Numbers, Numbers]
     """Links and joints of the pairs of `PairLayout`."""
     entries: tuple[tuple[tuple[Numbers, Numbers], ...], ...]
-    """Of c2, c1 and c0, its rows, and of g and tau those of joint and of kind and link."""
+    """Rows (e, wrench) of c2, c1 and c0; for g and tau rows of joint, and of kind and link."""
     regressors: RegressorTables
 
 
 def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
-    """All constants in float64, of NumPy."""
+    """Return all constants as NumPy's arrays, in float64."""
     xp = cast("Namespace", np)
     own, eye = own_numbers(tree), np.eye(3)[:, :, None, None]
     # (a, -a, 0)
@@ -111,7 +112,7 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
     # c2 and c1 have wrenches of one kind each.
     count = len(pairs.links)
     each = (tuple((e, row % count) for e, row in table) for table in pairs.entries[:2])
-    # The place of no entry is that of the ground, which has no screw.
+    # The position for no entry is that of the ground, which has no screw.
     width = 2 * len(tree.links)
     singles = (tuple((row // width, row % width) for row in t) for t in (layout.gravity, layout.torque))
     fields = ("acceleration", "velocity", "position_gradient", "gravity", "torque")
@@ -133,7 +134,7 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
 
 
 def converted(table: Table, library: Library, like: Numbers) -> Table:
-    """A table, with what it holds, for a dtype and device."""
+    """Return a table, with what it holds, for a dtype and device."""
     if isinstance(table, np.ndarray):
         made = library.index if table.dtype.kind == "i" else library.constant
         return cast("Table", made(table, like))
@@ -144,7 +145,7 @@ def converted(table: Table, library: Library, like: Numbers) -> Table:
 
 
 def _span(positions: Sequence[int]) -> Positions:
-    """Positions in a row as a slice, which takes no copy."""
+    """Return positions in a row as a slice, which makes no copy; others as an array."""
     first, count = positions[0], len(positions)
     if list(positions) == list(range(first, first + count)):
         return slice(first, first + count)
@@ -152,7 +153,7 @@ def _span(positions: Sequence[int]) -> Positions:
 
 
 def spatial_tables(tree: JointTree, joints: Positions, own: Positions) -> SpatialTables:
-    """Tables of a tree, in float64; joints of the links and coordinates of the joints as given."""
+    """Return the tables of a tree, in float64; joints: of the links; own: coordinates of the joints."""
     moved, count = tree.joints, len(tree.joints)
     hinge = np.array([*(joint.kind == "revolute" for joint in moved), True])
     ratio = np.array([*(joint.ratio for joint in moved), 0.0])
@@ -182,7 +183,7 @@ def spatial_tables(tree: JointTree, joints: Positions, own: Positions) -> Spatia
 
 
 def spatial_numbers(xp: Namespace, tables: SpatialTables, numbers: TreeArrays) -> SpatialNumbers:
-    """The numbers of a tree in matrices, from those with their samples innermost."""
+    """Return the numbers of a tree in matrices, from those with samples innermost."""
     gravity, translations, masses, centres, inertias, _ = (xp.moveaxis(a, -1, 0) for a in numbers)
     # X = (1 + [0 0; [t]x 0]) diag(R, R)
     offset = as_matrices(xp.swapaxes(translations, 1, 2) * tables.behind, tables.offset)
@@ -204,14 +205,17 @@ def spatial_numbers(xp: Namespace, tables: SpatialTables, numbers: TreeArrays) -
 
 
 def as_matrices(entries: Numbers, places: Numbers) -> Numbers:
-    """Matrices whose entries are numbers (..., m) at their places, (m, 36)."""
+    """Return matrices (..., 6, 6) whose entries are numbers (..., m) at their places, (m, 36)."""
     flat = entries @ places
     matrices: Numbers = flat.reshape(*flat.shape[:-1], 6, 6)
     return matrices
 
 
 def _turned(rotation: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
-    """R Rz(a) = [x cos a + y sin a, y cos a - x sin a, z]: what stands still, and of cosine and sine."""
+    """Yield the constant part, and those of cosine and sine, of R Rz(a).
+
+    R Rz(a) = [x cos a + y sin a, y cos a - x sin a, z]
+    """
     x, y, z = (rotation[:, :, i] for i in range(3))
     none = np.zeros_like(x)
     for columns in ((none, none, z), (x, y, none), (y, -x, none)):
@@ -219,13 +223,13 @@ def _turned(rotation: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
 
 
 def _twice(part: NDArray[np.float64]) -> NDArray[np.float64]:
-    """diag(R, R)"""
+    """Return diag(R, R)."""
     none = np.zeros_like(part)
     return np.block([[part, none], [none, part]])
 
 
 def _places() -> Iterator[NDArray[np.float64]]:
-    """The tables `offset`, `body`, `motion_cross` and `force_cross`."""
+    """Yield the tables `offset`, `body`, `motion_cross` and `force_cross`."""
     eye = np.eye(3)
     skew = np.cross(eye[:, None], eye).swapaxes(1, 2)
     none = np.zeros((3, 3, 3))

@@ -1,8 +1,9 @@
-"""The rigid-link rule in spatial matrices: few array operations, for few samples.
+"""Rigid-link rule in spatial matrices: few array operations, for few samples.
 
 The formulas are those of `rigid_rule` with S = (s, z), V = (v, omega) and A its rate, from minus gravity, and
-with 6 x 6 matrices in place of 3-vectors, see `rule_tables`. With V x S = (omega x s + v x z, omega x z),
-V x* its negative transpose, and I the spatial inertia of a link about the base's origin,
+with 6 x 6 matrices in place of 3-vectors, see `rule_tables`. Here V x S = (omega x s + v x z, omega x z), its
+negative transpose is V x*, and I is the spatial inertia of a link in the base's axes, about the first hinge
+of its path:
 
     Sd = V x S       Sdd = A x S + V x Sd                  rates of a joint's screw
     P = I V          W = I A + V x* P                      wrench of a link in motion
@@ -14,8 +15,8 @@ V x* its negative transpose, and I the spatial inertia of a link about the base'
 Errors of tau are those of W, as `rigid_rule` says.
 
 (Wensing and Slotine's factorisation of the Coriolis terms; Singh, Russell and Wensing's derivatives.) Every
-small matrix is a product of its own inside of numpy or torch, so samples in great number are better
-innermost, as `rigid_rule` has them.
+small matrix is a product of its own inside numpy or torch, so for many samples it is quicker to have samples
+innermost, as in `rigid_rule`.
 """
 
 from collections.abc import Sequence
@@ -30,7 +31,7 @@ from .rule_tables import RuleTables, SpatialNumbers, as_matrices
 class SpatialMoment(NamedTuple):
     """Joints and links in motion, about the first hinge of their path; samples outermost.
 
-    Its methods are those of `Moment`.
+    Methods are those of `Moment`.
     """
 
     xp: Namespace
@@ -38,33 +39,33 @@ class SpatialMoment(NamedTuple):
     screws: Numbers
     """S of each joint, (samples, joints, 6)."""
     rates: Numbers
-    """Sd, the same."""
+    """Sd of each joint, (samples, joints, 6)."""
     accelerations: Numbers
-    """A, the same."""
+    """A of each joint, (samples, joints, 6)."""
     crosses: Numbers
     """V x of each joint, (samples, joints, 6, 6)."""
     inertias: Numbers
     """I of each link, (samples, N, 6, 6)."""
     momenta: Numbers
-    """P, (samples, N, 6)."""
+    """P of each link, (samples, N, 6)."""
     wrenches: Numbers
-    """W, (samples, N, 6)."""
+    """W of each link, (samples, N, 6)."""
     weights: Numbers
-    """I of minus gravity, the same."""
+    """I of each link times minus gravity, (samples, N, 6)."""
     second: Numbers | None = None
-    """What curves add to Sdd of each joint, (samples, joints, 6); None where no joint follows one."""
+    """Terms of curves in Sdd of each joint, (samples, joints, 6); None without curves."""
     bends: Numbers | None = None
-    """The same: how S changes by its own coordinate; None likewise."""
+    """Derivative of each S by its own coordinate, (samples, joints, 6); None without curves."""
 
     def coefficients(self) -> list[Numbers]:
-        """Packed c2 and c1."""
+        """Return packed c2 and c1."""
         z = self.screws[..., 3:]
         columns = [self.screws, 0.0 * z], [self.rates, z]
         dense = self._products(self._matrices(), columns)
         return [packed(self.xp, dense, positions) for positions in self.tables.positions[:2]]
 
     def gradient(self) -> list[Numbers]:
-        """Packed c0."""
+        """Return packed c0."""
         s, rate = self.screws, self.rates
         second = _applied(self._cross(self.accelerations), s) + _applied(self.crosses, rate)
         second = second if self.second is None else second + self.second
@@ -73,18 +74,18 @@ class SpatialMoment(NamedTuple):
         return [packed(self.xp, self._products(matrices, columns), self.tables.positions[2])]
 
     def own_bends(self) -> Numbers | None:
-        """What tau's wrench does along how S changes by its own coordinate, packed as tau; or None."""
+        """Return dS/dq . (wrench) of tau, S by its own coordinate, packed as tau; None without curves."""
         return None if self.bends is None else self._replace(screws=self.bends).singles((4,))[0]
 
     def singles(self, fields: Sequence[int]) -> list[Numbers]:
-        """Packed S_e . (wrench) of g or tau, or both."""
+        """Return packed S_e . (wrench) of g or tau, or both."""
         both = self.xp.concat([self.wrenches, self.weights], 1)
         dense = self.screws @ both.mT
         dense = dense.reshape(dense.shape[0], dense.shape[1] * dense.shape[2])
         return [packed(self.xp, dense, self.tables.positions[field]) for field in fields]
 
     def _matrices(self) -> Numbers:
-        """[I B] of each link, of B the columns that meet z, (samples, N, 6, 9)."""
+        """Return [I B] of each link, with only those columns of B that meet z, (samples, N, 6, 9)."""
         own = self.inertias @ taken(self.crosses, self.tables.spatial.joints, -3)
         b = 0.5 * (self._wrench_cross(self.momenta) - own - own.mT)
         return self.xp.concat([self.inertias, b[..., 3:]], -1)
@@ -96,10 +97,12 @@ class SpatialMoment(NamedTuple):
         return as_matrices(wrenches, self.tables.spatial.force_cross)
 
     def _products(self, matrices: Numbers, columns: Sequence[Sequence[Numbers]]) -> Numbers:
-        """S_e . (L column) for each group's links and any two joints e and f on its path, (samples, entries).
+        """Return S_e . (L column) for each group's links and any two joints e and f on its path.
+
+        The answer is (samples, entries). Entries are ordered by e, link, kind, f; groups stand in a row.
 
         matrices: L, (samples, N, 6, m); columns: of each kind the parts that make one of m entries, (samples,
-        joints, ...). Entries are ordered by e, link, kind, f; groups stand in a row.
+        joints, ...)
         """
         xp, answers = self.xp, []
         right = xp.stack([xp.concat(list(parts), -1) for parts in columns], 1)
@@ -117,7 +120,7 @@ class SpatialMoment(NamedTuple):
 def spatial_moment(
     xp: Namespace, tables: RuleTables, numbers: SpatialNumbers, motion: Sequence[Numbers]
 ) -> SpatialMoment:
-    """Motion of joints and links for q, qd and qdd, (samples, n) each."""
+    """Return the motion of joints and links for q, qd and qdd, (samples, n) each."""
     spatial = tables.spatial
     way, slopes = _moved(xp, tables, taken(motion[0], spatial.coordinates, -1))
     x = _placed(xp, tables, numbers, way)
@@ -151,7 +154,7 @@ def spatial_moment(
 
 
 def _moved(xp: Namespace, tables: RuleTables, position: Numbers) -> tuple[Numbers, Slopes | None]:
-    """What all joints move by and its slopes, (samples, frames), for q of each."""
+    """Return the displacements of all joints and their slopes, (samples, frames), for q of each."""
     if tables.frames.curves is None:
         return position, None
     way, slopes = displaced(tables.frames.curves, xp.swapaxes(position, 0, 1))
@@ -160,7 +163,7 @@ def _moved(xp: Namespace, tables: RuleTables, position: Numbers) -> tuple[Number
 
 
 def _placed(xp: Namespace, tables: RuleTables, numbers: SpatialNumbers, position: Numbers) -> Numbers:
-    """X of all frames into the base's axes, (samples, frames, 6, 6); position: (samples, frames)."""
+    """Return X of all frames into the base's axes, (samples, frames, 6, 6); position: (samples, frames)."""
     angle = tables.spatial.turns * position
     x = numbers.frames[0] + numbers.frames[1] * xp.cos(angle)[..., None, None]
     x = x + numbers.frames[2] * xp.sin(angle)[..., None, None]
@@ -172,5 +175,5 @@ def _placed(xp: Namespace, tables: RuleTables, numbers: SpatialNumbers, position
 
 
 def _applied(matrices: Numbers, vectors: Numbers) -> Numbers:
-    """Matrices (..., 6, 6) times vectors (..., 6)."""
+    """Return matrices (..., 6, 6) times vectors (..., 6)."""
     return (matrices @ vectors[..., None])[..., 0]

@@ -1,4 +1,4 @@
-"""The numbers of a tree of joints as arrays: its own, formulas of run-time parameters, bodies in their place.
+"""Numbers of a tree of joints as arrays: its own, formulas of run-time parameters, bodies in their place.
 
 Samples are innermost; what all of them share has one. See `kinematics` for `xp`.
 """
@@ -16,16 +16,16 @@ from ..parameter_values import fits
 from .joint_tree import Bodies, JointTree, Own
 
 SHAPES = {"masses": (), "centres": (3,), "inertias": (3, 3)}
-"""What `Bodies` holds of each link."""
+"""Shape of each field of `Bodies` for one link."""
 
 
 class TreeArrays(NamedTuple):
-    """The numbers of a tree."""
+    """Numbers of a tree."""
 
     gravity: Numbers
-    """(3, 1, samples), in the base's axes."""
+    """Gravity in the base's axes, (3, 1, samples)."""
     translations: Numbers
-    """Of each frame, and none of the ground, (3, frames, samples)."""
+    """Translation of each frame, zero for the ground, (3, frames, samples)."""
     masses: Numbers
     """(N, samples)"""
     centres: Numbers
@@ -33,7 +33,7 @@ class TreeArrays(NamedTuple):
     inertias: Numbers
     """(3, 3, N, samples)"""
     offsets: Numbers
-    """Of the frames that have names, in the axes of what carries them, (3, frames, samples)."""
+    """Origins of the frames that have names, in the axes of what carries them, (3, frames, samples)."""
 
     @property
     def carried(self) -> tuple[Numbers, Numbers, Numbers]:
@@ -42,7 +42,7 @@ class TreeArrays(NamedTuple):
 
 
 def own_numbers(tree: JointTree) -> TreeArrays:
-    """The numbers as listed, in float64."""
+    """Return the numbers as listed, in float64."""
     return TreeArrays(
         np.array(tree.gravity)[:, None, None],
         np.array([*(joint.translation for joint in tree.joints), (0.0, 0.0, 0.0)]).T[..., None],
@@ -54,7 +54,7 @@ def own_numbers(tree: JointTree) -> TreeArrays:
 
 
 def formula_sources(tree: JointTree) -> NDArray[np.intp]:
-    """For every number where it stands in all the listed ones followed by those of the formulas, flat."""
+    """Return for every number its position in all listed ones followed by those of the formulas, flat."""
     listed = {place: at for at, place in enumerate(_places(tree))}
     sources = np.arange(len(listed))
     for number, place in enumerate(tree.formulas):
@@ -63,7 +63,7 @@ def formula_sources(tree: JointTree) -> NDArray[np.intp]:
 
 
 def _places(tree: JointTree) -> Iterator[str]:
-    """Names of the numbers in the order of `own_numbers`."""
+    """Yield the names of the numbers, in the order of `own_numbers`."""
     frames, links = range(len(tree.joints) + 1), range(len(tree.links))
     yield from (f"gravity[{i}]" for i in range(3))
     yield from (f"joints[{f}].translation[{i}]" for i in range(3) for f in frames)
@@ -81,7 +81,7 @@ def _with_formulas(
     p: Mapping[str, Numbers],
     batch: tuple[int, ...],
 ) -> TreeArrays:
-    """The numbers for values of the parameters, each one for all samples or one for each, (...)."""
+    """Return the numbers for values of the parameters, each one for all samples or one for each, (...)."""
     if not tree.formulas:
         return own
     values = [formula(xp, p) for formula in tree.formulas.values()]
@@ -103,7 +103,10 @@ def _with_formulas(
 def _with_bodies(
     xp: Namespace, numbers: TreeArrays, bodies: Bodies[Numbers], batch: tuple[int, ...]
 ) -> TreeArrays:
-    """The numbers with bodies in place of the tree's; they may have an axis for each of the batch."""
+    """Return the numbers with bodies in place of the tree's.
+
+    Bodies may have axes of the batch in front.
+    """
     given: dict[str, Numbers] = {}
     for name, value in bodies._asdict().items():
         own = len(SHAPES[name]) + 1
@@ -130,7 +133,7 @@ def given_numbers(
     bodies: Bodies[Numbers] | None,
     batch: tuple[int, ...],
 ) -> TreeArrays:
-    """The numbers for values of the parameters and, where they are given, bodies.
+    """Return the numbers for values of the parameters and, where they are given, bodies.
 
     own: `own_numbers` and `formula_sources` of the tree, to compute with
     """
@@ -139,9 +142,10 @@ def given_numbers(
 
 
 def checked_bodies(given: object, links: int, read: Callable[[str, object], Own]) -> Bodies[Own]:
-    """Bodies as `read` makes arrays or tensors of them by name; arrays are copied, tensors may be learned.
+    """Return bodies of the arrays or tensors that `read` makes by name.
 
-    Raises TypeError for what is no number, and ValueError for a wrong shape.
+    Arrays are copied, tensors may be learned. Raises TypeError for what is not numbers, and ValueError for a
+    wrong shape.
     """
     if not isinstance(given, tuple) or len(given) != len(SHAPES):
         raise TypeError(

@@ -7,7 +7,7 @@
    Beside these, SHARED marks a function that one part calls and another defines.
 
    In the kernels, vectors have components _x, _y and _z; numbers in names count joints from 1, and 0 is the base:
-       s3, c3          sine and cosine of joint 3 (3b: of another joint that follows coordinate 3)
+       sin3, cos3      sine and cosine of joint 3 (3b: of another joint that follows coordinate 3)
        x3, y3, z3      axes of the frame that joint 3 moves; z3 is the joint's own axis
        s3_x, s3_y ...  moment (p - o) x z3 of the axis about the origin o, p a point on it
        zd3, sd3        how z3 and that moment change by the joints before

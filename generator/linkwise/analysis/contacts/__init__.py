@@ -1,4 +1,4 @@
-"""Contacts with the ground in a movement: what they bear, found by the equations of what nothing drives."""
+"""Contacts with the ground in a movement: their forces, found from the equations of unactuated joints."""
 
 from linkwise.analysis.contacts.given_contacts import Contacts, WhileColumn
 

@@ -1,12 +1,12 @@
-"""What contacts leave of torques, by the recursion's own velocities: what a result is held against."""
+"""Reference for the joint torques that contacts leave, computed from the velocities of the recursion."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from linkwise.analysis.contacts.ground_contacts import GroundContacts
-from linkwise.check.contact_equations import contact_rows
-from linkwise.check.newton_euler import NewtonEuler
+from linkwise.oracle.contacts import contact_rows
+from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import Array
 from linkwise.package.manifest import RigidTree
 
@@ -15,16 +15,17 @@ RANK = 1e-11
 
 
 class ContactReference(NamedTuple):
-    """Contacts of a tree whose frames move as the recursion says."""
+    """Contacts of a tree whose frames move as the recursion computes."""
 
     recursion: NewtonEuler
     tree: RigidTree
     contacts: GroundContacts
 
     def left(self, torque: Array, q: Array, shares: Array, mapped: Array | None) -> Array:
-        """What contacts of shares (S, contacts) leave of torques (S, n, X).
+        """Return what contacts with shares (S, contacts) leave of torques (S, n, X), of that shape.
 
-        mapped: G (S, n, m) of the joints that do not follow, in whose places torques stand; None of all
+        mapped: G (S, n, m) from the m joints that do not follow others, at whose indices the torques stand to
+        all joints; None if no joint follows
         """
         frames = {frame.name: frame for frame in self.tree.frames}
         each = [
@@ -48,7 +49,10 @@ class ContactReference(NamedTuple):
 
 
 def _least(equations: Array, weights: Array, torque: Array) -> Array:
-    """lambda (S, C, X) of B lambda = tau, by its equations: lambda = w B^T mu, (B w B^T) mu = tau."""
+    """Return lambda (S, C, X) with B lambda = tau and the least sum of lambda^2 / w.
+
+    It is found from lambda = w B^T mu and (B w B^T) mu = tau.
+    """
     scaled = weights[..., None] * np.swapaxes(equations, 1, 2)
     found: Array = scaled @ np.linalg.pinv(equations @ scaled, rcond=RANK, hermitian=True) @ torque
     return found

@@ -1,10 +1,10 @@
-"""Torque terms of a robot that stands on contacts: each link's weight and motion reach joints by the ground.
+"""Torque terms of a robot on contacts: each link's weight and motion load joints through the ground too.
 
-With T of `Standing.transfer`, of every term c_ijk of the free robot
+With T of `Standing.transfer`, each term c_ijk of the free robot becomes
 
     c^_ijk = c_ijk - sum_b T_ib c_bjk
 
-is left with joint i. It is of the link and the cause that c_bjk is of, and no longer symmetric in i and k.
+at joint i. It belongs to the link j and the cause k of c_bjk, and is no longer symmetric in i and k.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,20 +23,20 @@ Index = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class _Kind:
-    """Values of one kind: a block (joints, pairs) of joints that contacts load, then those of the others."""
+    """Values of one kind: a block (joints, pairs) for joints that contacts load, then those of others."""
 
     rows: tuple[tuple[int, ...], ...]
     block: tuple[int, int]
     places: tuple[Index, Index]
-    """In the block, of the packed values of its joints."""
+    """Row and column in the block of each packed value of its joints."""
     sources: Index
-    """Those packed values."""
+    """Indices of these packed values."""
     others: Index
-    """Packed values of the other joints."""
+    """Indices of the packed values of the other joints."""
 
     @classmethod
     def of(cls, rows: Sequence[tuple[int, ...]], joints: Sequence[int]) -> "_Kind":
-        """Of rows (i, j[, k], source) of the free robot."""
+        """Return the kind for rows (i, j[, k], source) of the free robot."""
         mine = [row for row in rows if row[0] in joints]
         rest = [row for row in rows if row[0] not in joints]
         pairs = sorted({row[1:-1] for row in mine})
@@ -53,7 +53,7 @@ class _Kind:
         )
 
     def left(self, packed: Array, standing: Standing, joints: Sequence[int], n: int) -> Array:
-        """Values (S, count) in the order of the sources of `rows`."""
+        """Return the values (S, count) that contacts leave, in the order of the sources of `rows`."""
         samples = len(packed)
         whole = np.zeros((samples, n, self.block[1]))
         whole[:, np.asarray(joints)[self.places[0]], self.places[1]] = packed[:, self.sources]
@@ -63,24 +63,24 @@ class _Kind:
 
 @dataclass(frozen=True, eq=False)
 class ContactTerms:
-    """All kinds of terms."""
+    """Terms of all kinds, for a robot on contacts."""
 
     kinds: tuple[_Kind, ...]
     joints: tuple[int, ...]
 
     @classmethod
     def of(cls, free: TermRows, contacts: GroundContacts) -> "ContactTerms":
-        """Of the terms that the free robot has."""
+        """Return the terms for those of the free robot."""
         kinds = tuple(_Kind.of(getattr(free, name), contacts.joints) for name in NAMES)
         return cls(kinds, contacts.joints)
 
     @property
     def rows(self) -> TermRows:
-        """Rows (i, j[, k], source), in which `left` has values."""
+        """Rows (i, j[, k], source) of the values that `left` returns."""
         return TermRows(**{name: kind.rows for name, kind in zip(NAMES, self.kinds, strict=True)})
 
     def left(self, packed: Side, standing: Standing, n: int) -> Side:
-        """Values of packed ones of the free robot with n joints."""
+        """Return the values that contacts leave, from the packed ones of the free robot with n joints."""
         found = (
             kind.left(np.asarray(getattr(packed, name)), standing, self.joints, n)
             for name, kind in zip(NAMES, self.kinds, strict=True)

@@ -1,4 +1,4 @@
-"""When contacts are on: always, by a column of the motion's log, or by measured loads on their bodies."""
+"""Times at which contacts are on: always, by a column of the motion's log, or by measured loads."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,40 +26,40 @@ from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 FLOOR = 1e-3
-"""Of the largest measured force, that a contact which is on has at least: a plate may be missed."""
+"""Least weight of a contact that is on, relative to the largest measured force: a plate may be missed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Switch:
-    """A column of the motion's log, (S, 2) of time in s and value, above which value a contact is on."""
+    """A column of the motion's log, (S, 2) of time in s and value; above a limit a contact is on."""
 
     given: WhileColumn
     rows: Array
 
     def on(self, time: Array) -> NDArray[np.bool_]:
-        """At instants (S,)."""
+        """Return whether the contact is on at each of the instants (S,)."""
         is_on: NDArray[np.bool_] = np.interp(time, self.rows[:, 0], self.rows[:, 1]) > self.given.above
         return is_on
 
 
 @dataclass(frozen=True, eq=False)
 class ContactTimes:
-    """Which contacts are on at an instant, and what was measured of them."""
+    """Contacts that are on at an instant, and the loads measured on them."""
 
     switches: tuple[Switch | None, ...]
-    """Of each contact, where a column says when it is on."""
+    """Switch of each contact, None where no column says when it is on."""
     measured: tuple[tuple[PlacedLoad, ...], ...]
-    """Of each contact the loads on its body, where such were given."""
+    """Measured loads on the body of each contact, empty where none were given."""
     least_force: float
-    """In N."""
+    """Force in N above which measured loads switch a contact on."""
 
     @property
     def loads(self) -> tuple[PlacedLoad, ...]:
-        """Those of all contacts."""
+        """Measured loads of all contacts."""
         return tuple(load for some in self.measured for load in some)
 
     def record(self, number: int) -> dict[str, Any]:
-        """When a contact is on, as plain data."""
+        """Return, as plain data, when a contact is on and which loads were measured on it."""
         switch, loads = self.switches[number], self.measured[number]
         told: dict[str, Any] = {"on": "always"}
         if switch is not None:
@@ -69,7 +69,7 @@ class ContactTimes:
         return told | ({"measured": [load.record() for load in loads]} if loads else {})
 
     def largest(self, number: int) -> str:
-        """What was seen at most of what says that a contact is on, in words."""
+        """Return in words the largest value of what switches a contact on: a column, or measured loads."""
         switch = self.switches[number]
         if switch is not None:
             return f"{switch.given.column!r} is {switch.rows[:, 1].max():.4g} at most"
@@ -77,10 +77,10 @@ class ContactTimes:
         return f"the loads on its body are {sum(force):.4g} N at most"
 
     def shares(self, model: Dynamics, time: Array, q: Array) -> Array:
-        """Of what contacts could bear in several ways, (S, contacts): 0 of those that are off, 1 in all.
+        """Return the share (S, contacts) of each contact in forces that several could carry, 1 in all.
 
-        At instants (S,) with the robot at q (S, n). In proportion to the measured forces where all contacts
-        have such, else alike.
+        The share of a contact that is off is 0. The instants are (S,), with the robot at q (S, n). Shares are
+        in proportion to the measured forces if all contacts have them, else equal.
         """
         force = np.stack([self._force(number, model, time, q) for number in range(len(self.switches))], 1)
         on = np.stack([self._on(number, time, force[:, number]) for number in range(len(self.switches))], 1)
@@ -103,17 +103,17 @@ class ContactTimes:
         return is_on
 
     def _force(self, number: int, model: Dynamics, time: Array, q: Array) -> Array:
-        """Size of what was measured of a contact, (S,)."""
+        """Return the magnitude (S,) of the force measured on a contact, in N."""
         pushes = [wrench.force for wrench in _wrenches(self.measured[number], model, time, q)]
         size: Array = np.linalg.norm(sum(pushes, np.zeros((len(time), 3))), axis=1)
         return size
 
     def torque(self, model: Dynamics, time: Array, q: Array) -> Array:
-        """What joints would take to bear the measured loads, (S, n)."""
+        """Return the torques (S, n) that joints would need to carry the measured loads."""
         return sum((load.torque(model, time, q) for load in self.loads), np.zeros_like(q))
 
     def wrench(self, number: int, model: Dynamics, time: Array, q: Array, place: Array) -> Array:
-        """What was measured of a contact: moment about a place (S, 3) in the world, and force, (S, 6)."""
+        """Return the measured wrench (S, 6) in the world: moment about a place (S, 3), then force."""
         out = np.zeros((len(time), 6))
         for load in _wrenches(self.measured[number], model, time, q):
             out[:, :3] += load.moment + np.cross(load.place - place, load.force)
@@ -134,9 +134,9 @@ def contact_times(
     progress: Progress,
     buffer: Path | None,
 ) -> ContactTimes | None:
-    """When a robot's contacts are on over the motion's time (S,) of its log; None without contacts.
+    """Return when a robot's contacts are on over the time (S,) of the motion; None without contacts.
 
-    Raises LinkwiseError for columns that are not there, and loads that belong to no contact.
+    Raises LinkwiseError for columns that do not exist, and for loads that belong to no contact.
     """
     if robot.contacts is None:
         return None
@@ -159,7 +159,10 @@ def _told(loads: Sequence[PlacedLoad]) -> str:
 
 
 def switch_columns(contacts: Contacts, log: Log) -> tuple[str, ...]:
-    """Columns of the motion's log that say when contacts are on; raises LinkwiseError for one not there."""
+    """Return the columns of the motion's log that say when contacts are on.
+
+    Raises LinkwiseError for a column that the log does not have.
+    """
     for name, given in contacts.columns.items():
         if given.column not in log.columns:
             near = listed(map(repr, nearest_first(given.column, log.columns)))
@@ -171,24 +174,27 @@ def switch_columns(contacts: Contacts, log: Log) -> tuple[str, ...]:
 
 
 def read_switch(given: WhileColumn, log: Log, reading: Reading, progress: Progress) -> Switch:
-    """Read a column that the log has, and its time."""
+    """Read the column of a switch from the log, with its time."""
     with within(str(log.path)):
         columns = time_column(log.columns, reading), list(log.columns).index(given.column)
     return Switch(given, collected(finite_blocks(log, columns, progress), 2, None))
 
 
 def _by_contact(robot: LoadedRobot, loads: Sequence[PlacedLoad]) -> tuple[tuple[PlacedLoad, ...], ...]:
-    """Loads on the body of each contact; raises LinkwiseError for one on another, or on that of two."""
+    """Return the loads on the body of each contact.
+
+    Raises LinkwiseError for a load on another body, or on a body with two contacts.
+    """
     tree, ground = robot.package.manifest.tree, robot.contacts
     assert tree is not None
     assert ground is not None
-    body = {frame.name: frame.body for frame in tree.frames}
+    body = {frame.name: frame.joint for frame in tree.frames}
     found: list[list[PlacedLoad]] = [[] for _ in ground.contacts]
     for load in loads:
         there = [
             number
             for number, contact in enumerate(ground.contacts)
-            if body[str(contact.frame)] == load.seat.frame.body
+            if body[str(contact.frame)] == load.seat.frame.joint
         ]
         if len(there) != 1:
             mend = "where no contact is; give it with --loads, or leave it out"

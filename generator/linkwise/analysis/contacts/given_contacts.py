@@ -1,4 +1,4 @@
-"""Contacts as a user gives them: frames that the ground holds in a movement, and when it does."""
+"""Contacts as a user gives them: frames that the ground holds in a movement, and when it holds them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,12 +11,12 @@ from linkwise.analysis.loads import Load, Loads
 from linkwise.errors import LinkwiseError
 
 THRESHOLD = 20.0
-"""N; of a force plate's reading below it nothing stands there."""
+"""Force in N; where a force plate reads less, nothing stands on it."""
 
 
 @dataclass(frozen=True)
 class WhileColumn:
-    """A contact is on while a column of the motion's log is above a value."""
+    """Condition that a contact is on: a column of the motion's log is above a value."""
 
     column: str
     above: float = 0.5
@@ -28,13 +28,13 @@ class WhileColumn:
 
 @dataclass(frozen=True)
 class Contacts:
-    """Frames that the ground holds while the robot moves, and what they bear is asked of the motion.
+    """Frames that the ground holds while the robot moves; the forces on them are found from the motion.
 
-    A contact is on all the time; or by name in `columns` while a column of the motion's log is above a value;
-    or, where `loads` are given, while the measured loads on its body come to more than `threshold` in N.
-    These loads load nothing: what contacts bear is held against them, and what several contacts could bear is
-    theirs in proportion to them. `unactuated` are the joints that nothing drives, by whose equations
-    reactions are found: those of the floating base unless given.
+    A contact is on all the time; or, if `columns` has its name, while a column of the motion's log is above a
+    value; or, if `loads` are given, while the measured loads on its body exceed `threshold` in N. These loads
+    do not load the robot: contact forces are compared with them, and forces that several contacts could carry
+    are shared in proportion to them. `unactuated` names the joints that nothing drives, from whose equations
+    the contact forces are found: the joints of the floating base unless given.
 
     Raises LinkwiseError for values that do not go together.
     """
@@ -44,7 +44,7 @@ class Contacts:
     loads: tuple[Load | str | Path, ...] = ()
     threshold: float | None = None
     cutoff: float | None = None
-    """Of the low-pass that these loads get, in Hz; none unless given."""
+    """Cutoff in Hz of the low-pass filter for these loads; no filter unless given."""
     unactuated: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -74,15 +74,15 @@ class Contacts:
 
     @classmethod
     def of(cls, given: "Contacts | Sequence[Contact]") -> "Contacts":
-        """Themselves, or contacts that are on all the time."""
+        """Return the contacts themselves, or from a sequence, contacts that are on all the time."""
         return given if isinstance(given, Contacts) else cls(given)
 
     @property
     def measured(self) -> Loads:
-        """Its loads, and the files that they are in."""
+        """Measured loads, given as values or as files."""
         return Loads.of(self.loads, self.cutoff)
 
     @property
     def least_force(self) -> float:
-        """Of the loads, in N, above which a contact is on."""
+        """Force in N above which the measured loads switch a contact on."""
         return THRESHOLD if self.threshold is None else self.threshold

@@ -1,17 +1,17 @@
-"""What the ground bears at contacts, found by the equations of the joints that nothing drives.
+"""Forces of the ground at contacts, found from the equations of the joints that nothing drives.
 
-A measured motion does not keep a contact to the last digit, so none of it is replaced. With the rows A of the
-contacts that are on, and the unactuated joints b,
+A measured motion does not keep a contact to the last digit, so no part of it is replaced. With the rows A of
+the contacts that are on, and the unactuated joints b,
 
     A_b^T lambda^(j) = tau_bj        tau^_ij = tau_ij - (A^T lambda^(j))_i
 
-says what the ground bears of link j, and what is left for the joints. It is the split of forces of closed
-chains, by the joints b in place of the dependent ones.
+gives the contact forces due to link j, and the torques that remain at the joints. It is the split of the
+forces of closed chains, with the joints b in place of the dependent ones.
 
-Where contacts could bear it in several ways, as two feet can, that is taken for which the sum of
-lambda^2 / w is least, in N and N m, with a share w of each contact: two that bear alike bear in proportion
-to their shares. Where they cannot bear it, as a foot that only touches at a point cannot, what is left over
-stays with the joints b: a residual.
+If contacts could carry the load in several ways, as two feet can, the solution is the one with the least sum
+of lambda^2 / w, in N and N m, where each contact has a share w: two equivalent contacts carry in proportion
+to their shares. If they cannot carry it, as a foot that touches at a single point cannot, the rest stays at
+the joints b: a residual.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,28 +29,28 @@ from linkwise.package.load import Array
 
 WRENCH = ("moment_x", "moment_y", "moment_z", "force_x", "force_y", "force_z")
 BLIND = 1e-4
-"""Part of the most that the least turn of a base moves: below it the base's torques do not tell a moment."""
+"""Least ratio of singular values of a base's Jacobian; below it the base's torques leave moments unknown."""
 RANK = 1e-6
 """Singular values of A_b below this part of the largest are zero."""
 
 
 @dataclass(frozen=True, eq=False)
 class GroundContacts:
-    """Contacts of a robot, with C rows of forces in all."""
+    """Contacts of a robot, with C rows of constraint forces in all."""
 
     names: tuple[str, ...]
     contacts: tuple[Contact, ...]
     constraints: tuple[Any, ...]
-    """Of each contact the package's own, which may have rows of ties beside it."""
+    """The package's constraints for each contact; these may have rows of ties too."""
     unactuated: tuple[int, ...]
     joints: tuple[int, ...]
-    """Those that contacts load, the unactuated ones too."""
+    """Indices of the joints that contacts load, the unactuated ones included."""
     tied: ConstrainedModel | None
-    """Of a robot whose joints are tied: the others follow."""
+    """Model of a robot whose joints are tied, None for others; the dependent joints follow."""
 
     @cached_property
     def rows(self) -> tuple[str, ...]:
-        """What each row bears: "foot force_x", say."""
+        """Names of the constraint force of each row: "foot force_x", for example."""
         return tuple(row for _, row in self._rows())
 
     @cached_property
@@ -66,7 +66,7 @@ class GroundContacts:
 
     @cached_property
     def wrench_rows(self) -> tuple[int | None, ...]:
-        """Of each row its number in a wrench, moments then forces in the world; None along a body's axes."""
+        """Index of each row in a wrench, moments then forces in the world; None along a body's axes."""
         held = [self.contacts[owner].kind == "held" for owner in self.owners]
         parts = [row.rpartition(" ")[2] for row in self.rows]
         return tuple(
@@ -75,9 +75,11 @@ class GroundContacts:
         )
 
     def wrench(self, number: int, model: Dynamics, q: Array, forces: Array) -> Array:
-        """What a contact puts on its body, (S, 6): moment about its point, and force, in the world's axes.
+        """Return the wrench (S, 6) of a contact on its body, in the world's axes.
 
-        forces: of all rows, (S, C)
+        It is the moment about the contact's point, then the force.
+
+        forces: constraint forces of all rows, (S, C)
         """
         contact, own = self.contacts[number], forces[:, self.owners == number]
         force, moment = own[:, -3:], np.zeros((len(own), 3))
@@ -94,7 +96,7 @@ class GroundContacts:
         return np.concatenate([moment, force], axis=1)
 
     def touch(self, number: int) -> Array:
-        """From a contact's point to where it touches, (3,): of what rolls down its radius."""
+        """Return the vector (3,) from a contact's point to where it touches: for rolling, down the radius."""
         contact = self.contacts[number]
         if contact.kind != "rolling" or contact.normal is None:
             return np.zeros(3)
@@ -103,7 +105,7 @@ class GroundContacts:
         return down
 
     def record(self, joints: Sequence[str]) -> dict[str, Any]:
-        """As plain data, to record in the outputs; m."""
+        """Return the contacts as plain data, to record in the outputs; lengths are in m."""
         held = [
             {
                 "name": name,
@@ -122,7 +124,7 @@ class GroundContacts:
         return {"held": held, "unactuated": [joints[i] for i in self.unactuated]}
 
     def places(self, model: Dynamics, q: Array) -> list[Array]:
-        """Where in the world the point of each contact is, (S, 3), in m."""
+        """Return the point of each contact in the world, (S, 3), in m."""
         found = []
         for contact in self.contacts:
             pose = np.asarray(model.kinematics.pose(q, contact.frame))
@@ -130,14 +132,15 @@ class GroundContacts:
         return found
 
     def blind(self, model: Dynamics, q: Array) -> int | None:
-        """The first sample at which torques of the unactuated joints do not tell all that they ask for.
+        """Return the first sample at which torques of the unactuated joints do not give all forces.
 
-        A base's turns lose one where two of its joints turn about one axis: pitched by 90 degrees.
+        It is None where there is no such sample. A base loses a rotation where two of its joints rotate about
+        one axis: at a pitch of 90 degrees.
         """
         base = list(self.unactuated)
         for contact in self.contacts:
             moved = np.asarray(model.kinematics.jacobian(q, contact.frame))[..., base]
-            moved[:, 3:] /= max(1.0, np.abs(moved[:, 3:]).max(initial=0.0))  # of far turns, beside turns
+            moved[:, 3:] /= max(1.0, np.abs(moved[:, 3:]).max(initial=0.0))  # lengths scaled to angles
             moving = moved[..., np.abs(moved).max(axis=(0, 1), initial=0.0) > 0.0]
             values = np.linalg.svd(moving, compute_uv=False)
             lost = values[:, -1:] < BLIND * values[:, :1]
@@ -146,7 +149,7 @@ class GroundContacts:
         return None
 
     def standing(self, q: Array, shares: Array) -> "Standing":
-        """How the ground holds the robot at q (S, n), by shares w (S, contacts), 0 of what is off."""
+        """Return how the ground holds the robot at q (S, n), by shares w (S, contacts), 0 if off."""
         found = []
         for name, constraints in zip(self.names, self.constraints, strict=True):
             own = [at for at, row in enumerate(constraints.rows) if row.rpartition(" ")[0] == name]
@@ -162,31 +165,34 @@ class GroundContacts:
 
 
 def weighted_inverse(equations: Array, weights: Array) -> Array:
-    """B^+ (S, C, b) of B (S, b, C) for which the sum of x^2 / w is least: R (B R)^+ with R^2 = w (S, C)."""
+    """Return the inverse B^+ (S, C, b) of B (S, b, C) for which the sum of x^2 / w is least.
+
+    It is R (B R)^+ with R^2 = w (S, C).
+    """
     roots = np.sqrt(weights)
     found: Array = roots[..., None] * np.linalg.pinv(equations * roots[:, None], rcond=RANK)
     return found
 
 
 class Standing:
-    """Rows of the contacts that are on at S samples, those of others zero."""
+    """Rows of the contacts that are on at S samples; the rows of other contacts are zero."""
 
     def __init__(self, every: Array, moved: Array, weights: Array, unactuated: list[int]) -> None:
-        """Rows (S, C, n) by all joints' motion, and by that of the joints which do not follow others."""
+        """Take rows (S, C, n) by all joints' motion, and by that of joints which do not follow others."""
         self.every, self.moved, self._unactuated = every, moved, unactuated
         self._solved = weighted_inverse(np.swapaxes(moved[..., unactuated], 1, 2), weights)
 
     def reactions(self, torque: Array) -> Array:
-        """lambda (S, C, X) of torques (S, n, X)."""
+        """Return the contact forces lambda (S, C, X) due to torques (S, n, X)."""
         found: Array = self._solved @ torque[:, self._unactuated]
         return found
 
     @cached_property
     def transfer(self) -> Array:
-        """T (S, n, b): torques tau leave the joints with tau - T tau_b.
+        """Matrix T (S, n, b) by which contacts change torques: tau - T tau_b remains at the joints.
 
-        Where contacts bear all that the unactuated joints ask for, its rows of these are those of 1, without
-        rounding: of what they are left with, nothing is there to be seen.
+        Where contacts carry the whole load of the unactuated joints, the rows of T for these joints are
+        exactly the identity, without rounding, so that no residual appears where there is none.
         """
         found: Array = np.swapaxes(self.moved, 1, 2) @ self._solved
         own = found[:, self._unactuated]
@@ -196,20 +202,20 @@ class Standing:
         return found
 
     def left(self, torque: Array) -> Array:
-        """What torques (S, n, ...) leave to the joints, of that shape."""
+        """Return the torques that contacts leave of torques (S, n, ...), of the same shape."""
         flat = torque.reshape(*torque.shape[:2], -1)
         return (flat - self.transfer @ flat[:, self._unactuated]).reshape(torque.shape)
 
     def loads(self, reactions: Array) -> Array:
-        """Torques (S, n, X) that reactions (S, C, X) take from all joints, followers too."""
+        """Return the torques (S, n, X) that contact forces (S, C, X) take from all joints, followers too."""
         return np.swapaxes(self.every, 1, 2) @ reactions
 
     def fed(self, qd: Array, reactions: Array, owners: Array, count: int) -> Array:
-        """Power (S, contacts, X) that contacts give as they slip, of reactions (S, C, X)."""
+        """Return the power (S, contacts, X) that contacts supply as they slip, from forces (S, C, X)."""
         power = self.slip(qd)[..., None] * reactions
         return np.stack([power[:, owners == c].sum(1) for c in range(count)], axis=1)
 
     def slip(self, qd: Array) -> Array:
-        """A q̇ (S, C): how the motion moves what is held, in m/s and rad/s."""
+        """Return A q̇ (S, C), the velocity of what contacts hold, in m/s and rad/s."""
         found: Array = np.einsum("scn,sn->sc", self.every, qd)
         return found

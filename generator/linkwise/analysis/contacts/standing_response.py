@@ -1,12 +1,13 @@
-"""How coordinates answer to forces while contacts hold frames of the robot.
+"""Response of coordinates to forces while contacts hold frames of the robot.
 
-With the rows A of the contacts that are on, and M the mass matrix by which the robot answers without them,
+With the rows A of the contacts that are on, and the mass matrix M of the response without contacts,
 
     q̈_x = P M⁻¹ F_x        P = 1 − K A        K = M⁻¹ Aᵀ (A M⁻¹ Aᵀ)⁺
 
-is what a force does while what is held stays. A measured motion does not quite stay: K A q̈ is what the
-contacts do themselves, as what they hold turns and slips, and with it all sources sum to q̈. Forces that
-contacts could bear move nothing, so that it does not matter how they share them.
+is the acceleration due to a force while the held frames stay fixed. In a measured motion they are not quite
+fixed: K A q̈ is the acceleration due to the contacts themselves, as the held frames turn and slip, and with
+it all sources sum to q̈. Forces that contacts could carry move nothing, so that it does not matter how
+contacts share them.
 """
 
 from dataclasses import dataclass
@@ -23,22 +24,25 @@ RANK = 1e-11
 
 @dataclass(frozen=True)
 class StandingResponse:
-    """Of a robot at S samples; `free` is how it answers without contacts."""
+    """Response of a robot at S samples; `free` is its response without contacts."""
 
     free: Any
     rows: Array
-    """A (S, C, n)."""
+    """Contact rows A (S, C, n)."""
 
     def accelerations(self, forces: Array) -> Array:
-        """Of columns of forces (S, n, X)."""
+        """Return the accelerations (S, n, X) due to columns of forces (S, n, X)."""
         return self._kept(self.free.accelerations(forces))
 
     def of_velocities(self) -> Array:
-        """Accelerations of the ties' own source, by cause (S, n, n)."""
+        """Return the accelerations due to the velocity terms of ties, by cause (S, n, n)."""
         return self._kept(self.free.of_velocities())
 
     def of_contacts(self, qdd: Array, owners: Array, count: int) -> Array:
-        """What each of `count` contacts does itself, (S, n, contacts); owners: contact of each row."""
+        """Return the accelerations (S, n, contacts) due to each contact itself.
+
+        owners: contact of each row; count: number of contacts
+        """
         moved = np.einsum("scn,sn->sc", self.rows, qdd)
         each = np.zeros((*moved.shape, count))
         each[:, np.arange(len(owners)), owners] = moved
@@ -51,7 +55,7 @@ class StandingResponse:
 
     @cached_property
     def _by_rows(self) -> Array:
-        """K (S, n, C)."""
+        """Matrix K (S, n, C)."""
         answered = self.free.accelerations(np.swapaxes(self.rows, 1, 2))
         found: Array = answered @ np.linalg.pinv(self.rows @ answered, rcond=RANK, hermitian=True)
         return found

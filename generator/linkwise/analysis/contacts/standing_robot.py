@@ -1,4 +1,4 @@
-"""A robot that stands on contacts: which joints nothing drives, and which ones contacts load."""
+"""A robot on contacts: the joints that nothing drives, and the joints that contacts load."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,10 +19,10 @@ from linkwise.escape import listed
 
 
 def standing_on(robot: LoadedRobot, contacts: Contacts) -> LoadedRobot:
-    """The robot with contacts.
+    """Return the robot with contacts.
 
-    Raises LinkwiseError for frames that are not there or stand on the ground, contacts that leave nothing to
-    move, two of one name, and a robot of which every joint is driven.
+    Raises LinkwiseError for frames that do not exist or stand on the ground, contacts that leave nothing to
+    move, two contacts of one name, and a robot of which every joint is driven.
     """
     if not contacts.given:
         return robot
@@ -39,7 +39,7 @@ def standing_on(robot: LoadedRobot, contacts: Contacts) -> LoadedRobot:
     unactuated = _unactuated(robot, contacts.unactuated)
     given = tuple(_named(robot, contact) for contact in contacts.given)
     made = tuple(_constraints(robot, contact) for contact in given)
-    loaded = robot.borne_by({i for frame in frames for i in moving_joints(tree, frame.body)})
+    loaded = robot.borne_by({i for frame in frames for i in moving_joints(tree, frame.joint)})
     ground = GroundContacts(
         tuple(names),
         given,
@@ -52,7 +52,7 @@ def standing_on(robot: LoadedRobot, contacts: Contacts) -> LoadedRobot:
 
 
 def _unactuated(robot: LoadedRobot, given: Sequence[str]) -> tuple[int, ...]:
-    """Joints that nothing drives, as told, or of the floating base."""
+    """Return the joints that nothing drives: those given, or those of the floating base."""
     for name in given:
         if name not in robot.driven_joints:
             raise LinkwiseError(
@@ -72,7 +72,7 @@ def _unactuated(robot: LoadedRobot, given: Sequence[str]) -> tuple[int, ...]:
 
 
 def _named(robot: LoadedRobot, contact: Contact) -> Contact:
-    """The contact with its name, and the ground across gravity."""
+    """Return the contact with its name, and if it rolls, the ground's normal: given, or against gravity."""
     tree = robot.package.manifest.tree
     gravity = (0.0, 0.0, 0.0) if tree is None else tree.gravity
     name = contact.name or str(contact.frame)

@@ -1,4 +1,4 @@
-"""Contacts as commands and studies have them written, in short texts."""
+"""Contacts written as short texts in commands and study files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +11,7 @@ from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.errors import LinkwiseError
 
 NUMBERS = {"held": (), "point": (), "hinged": ("AX", "AY", "AZ"), "rolling": ("RADIUS",)}
-"""What stands behind a kind."""
+"""Names of the numbers that follow each kind of contact."""
 
 
 def chosen_contacts(
@@ -23,9 +23,9 @@ def chosen_contacts(
     unactuated: Sequence[str],
     robot: LoadedRobot,
 ) -> Contacts:
-    """Contacts as the flags say; raises LinkwiseError for what is written otherwise.
+    """Return the contacts that the flags describe; raise LinkwiseError for text of any other form.
 
-    cutoff: of the low-pass that loads get, in Hz
+    cutoff: cutoff of the low-pass filter for loads, in Hz
     """
     given = tuple(_contact(text, robot) for text in contact)
     columns: dict[str, WhileColumn] = {}
@@ -39,7 +39,7 @@ def chosen_contacts(
 
 
 def _contact(text: str, robot: LoadedRobot) -> Contact:
-    """Of [NAME:]FRAME=KIND[,NUMBERS][@X,Y,Z]."""
+    """Return the contact of a text [NAME:]FRAME=KIND[,NUMBERS][@X,Y,Z]."""
     where, sign, rest = text.rpartition("=")
     what, at, place = rest.partition("@")
     kind, *numbers = what.split(",")
@@ -63,7 +63,7 @@ def _contact(text: str, robot: LoadedRobot) -> Contact:
 
 
 def _while(text: str, names: Sequence[str]) -> tuple[str, WhileColumn]:
-    """Of NAME=COLUMN[>VALUE]; a name that has a sign of its own is found too."""
+    """Return the name and column of a text NAME=COLUMN[>VALUE]; the name may have an equals sign."""
     name, sign, rest = text.partition("=")
     for own in names:
         if text.startswith(f"{own}=") and len(own) > len(name):

@@ -1,4 +1,4 @@
-"""Loads from outside: forces and moments on bodies, constant or from logs, and what they ask of joints."""
+"""External loads: forces and moments on bodies, constant or from logs, and the torques that they require."""
 
 from linkwise.analysis.loads.given_loads import Load, Loads
 

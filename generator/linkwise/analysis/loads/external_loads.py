@@ -19,19 +19,19 @@ from linkwise.input_file import require_file
 
 GROUND = "ground"
 LOADS, FORCE = "ExternalLoads", "ExternalForce"
-"""Elements; what stands among <defaults> is no load."""
+"""Names of elements; an element inside <defaults> is no load."""
 NONE = ("", "Unassigned")
-"""What OpenSim writes where there is nothing."""
+"""Texts that OpenSim writes where nothing is given."""
 AXES = ("xyz", "123")
-"""What the names of three columns differ in: the second where OpenSim has flattened a table of vectors."""
+"""Letters in which three columns' names differ; digits where OpenSim has flattened a table of vectors."""
 IDENTIFIERS = {"force": "force_identifier", "moment": "torque_identifier", "point": "point_identifier"}
 
 
 def external_loads(path: Path) -> tuple[LoadColumns, ...]:
-    """The forces that are not switched off, each with the columns of its data file; warns of the others.
+    """Return the forces that are on, each with the columns of its data file; warn of the others.
 
-    Raises LinkwiseError for a file without any, misspelt names, data that are not there, and identifiers of
-    other than three columns.
+    Raises LinkwiseError for a file without any, misspelt names, missing data, and identifiers of other than
+    three columns.
     """
     with within(str(path)):
         forces, told = _forces(path)
@@ -46,7 +46,7 @@ def external_loads(path: Path) -> tuple[LoadColumns, ...]:
 
 
 def data_files(path: Path) -> tuple[Path, ...]:
-    """The files that external loads have their numbers in, each once, there or not.
+    """Return the files that hold the numbers of external loads, each once, whether they exist or not.
 
     Raises LinkwiseError for a file of loads without any.
     """
@@ -55,8 +55,8 @@ def data_files(path: Path) -> tuple[Path, ...]:
 
 
 def _forces(path: Path) -> tuple[list[tuple[Element, Path]], list[str]]:
-    """The forces that are on, each with the file of its numbers; and what is left out, in words."""
-    # The readers' room brings SymPy, which other loads can do without.
+    """Return the forces that are on, each with its data file, and notes on what is left out."""
+    # Imported here, as the readers need SymPy, which other loads can do without.
     from linkwise.analysis.loads.external_names import unread_names
     from linkwise.robot.readers.osim_elements import yes
     from linkwise.robot.readers.xml_file import parse
@@ -95,7 +95,7 @@ def _name(force: Element) -> str:
 
 
 def _with_columns(load: LoadColumns, force: Element) -> LoadColumns:
-    """The load with the numbers of its columns: those three whose names begin with an identifier."""
+    """Return the load with the numbers of its columns: the three whose names begin with each identifier."""
     columns = open_log(load.log).columns
     found = {}
     for part, key in IDENTIFIERS.items():
@@ -108,7 +108,10 @@ def _with_columns(load: LoadColumns, force: Element) -> LoadColumns:
 
 
 def _three(load: LoadColumns, key: str, identifier: str, columns: Sequence[str]) -> tuple[int, ...]:
-    """The columns of x, y and z, whose names say so; OpenSim takes three in whatever order they stand."""
+    """Return the numbers of the columns x, y and z.
+
+    Raises LinkwiseError unless their names stand in that order: OpenSim accepts three columns in any order.
+    """
     found = [at for at, name in enumerate(columns) if name in {identifier + axis for axis in "xyz"}]
     if len(found) != 3:
         found = [at for at, name in enumerate(columns) if name.startswith(identifier)]
@@ -131,13 +134,13 @@ def _three(load: LoadColumns, key: str, identifier: str, columns: Sequence[str])
 
 
 def _parts(names: Sequence[str]) -> str:
-    """In what names differ, in small letters: xyz of Fx_left, Fy_left and Fz_left."""
+    """Return the letters in which names differ, in lower case: xyz for Fx_left, Fy_left and Fz_left."""
     beside = zip_longest(*names, fillvalue=" ")
     return "".join("".join(letters) for letters in beside if len(set(letters)) > 1).lower()
 
 
 def _data_file(path: Path, loads: Element | None, force: Element) -> Path:
-    """The storage file of all forces, or of this one."""
+    """Return the path of the storage file of all forces, or of this one."""
     told = "" if loads is None else (loads.findtext("datafile") or "").strip()
     if told in NONE:
         told = _told(force, "data_source_name")
@@ -152,7 +155,7 @@ def _told(force: Element, key: str) -> str:
 
 
 def _body(force: Element, key: str, default: str) -> str:
-    """A body's name, without the path of the set that it is in."""
+    """Return a body's name, without the path of the set that contains it."""
     return _told(force, key).rpartition("/")[2] or default
 
 

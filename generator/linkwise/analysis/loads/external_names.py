@@ -1,4 +1,4 @@
-"""The names of OpenSim's ExternalLoads: what is misspelt there would move or take away a force unsaid."""
+"""Names in OpenSim's ExternalLoads: a misspelt one would silently move or remove a force."""
 
 from xml.etree.ElementTree import Element
 
@@ -25,9 +25,9 @@ OF_TAG = {
         attributes=NAME,
     ),
 }
-"""What is read of each element; no force here depends on the model's kinematics, which are the log's."""
+"""Names read in each element; no force here depends on the model's kinematics, which are the log's."""
 
 
 def unread_names(root: Element) -> tuple[str, ...]:
-    """What a file has beside what is read, in words; raises LinkwiseError for a name near one that is."""
+    """Return notes on what is not read of a file; raise LinkwiseError for a name close to a known one."""
     return effects(ignored([root], lambda element: OF_TAG.get(str(element.tag)), "OpenSim's ExternalLoads"))

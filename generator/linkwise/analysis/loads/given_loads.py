@@ -11,7 +11,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 
 FORCE, MOMENT, POINT = slice(1, 4), slice(4, 7), slice(7, 10)
-"""Columns of a load's table behind the time in s: N, N·m, m."""
+"""Columns of a load's table after the time in s: force in N, moment in N·m, point in m."""
 WIDTH = 10
 WORLD = "world"
 
@@ -20,9 +20,9 @@ WORLD = "world"
 class Load:
     """A force in N and a moment in N·m on a body of the robot's file, (3,), or (S, 3) at `time` (S,) in s.
 
-    `axes` is whose axes they are in: the world's, or a body's by its name. The force acts at `point` in m, as
-    seen in `point_in`: the world, a body, or the loaded body itself where there is none. Between the samples
-    all is linear in time.
+    `axes` names the frame in whose axes they are given: the world, or a body. The force acts at `point` in m,
+    given in `point_in`: the world, a body, or if None the loaded body itself. Values are linear in time
+    between samples.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Load:
     point_in: str | None = None
 
     def table(self) -> Array:
-        """Rows of time, force, moment, point, (S, 10); one row, of time 0, where all is constant.
+        """Return rows (S, 10) of time, force, moment, point; a single row, at time 0, if all is constant.
 
         Raises LinkwiseError for other shapes and for values that are not finite.
         """
@@ -59,8 +59,8 @@ class Load:
 class Loads:
     """All loads of an analysis: values, and files, which are logs or OpenSim's external-loads XML.
 
-    `cutoff` in Hz is that of the low-pass for what the files hold, of second order, run forwards and
-    backwards; None for none. Raises LinkwiseError for a cutoff that cannot be.
+    `cutoff` in Hz is that of a low-pass filter for the data of files, of second order, run forwards and
+    backwards; None for no filter. Raises LinkwiseError for a cutoff that is not above 0, or without files.
     """
 
     given: tuple[Load, ...] = ()
@@ -75,6 +75,6 @@ class Loads:
 
     @classmethod
     def of(cls, several: Sequence[Load | str | Path], cutoff: float | None = None) -> "Loads":
-        """Values and files in one list."""
+        """Return the loads of one list of values and files."""
         given = tuple(one for one in several if isinstance(one, Load))
         return cls(given, tuple(Path(one) for one in several if not isinstance(one, Load)), cutoff)

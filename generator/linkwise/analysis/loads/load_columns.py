@@ -1,4 +1,4 @@
-"""Which columns of a log hold which load: BODY/force_x, NAME:BODY/force_x, moment and point likewise."""
+"""Columns of loads in a log: BODY/force_x, NAME:BODY/force_x, and likewise for moment and point."""
 
 import re
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ NAMED = re.compile(r"(?P<load>.+)/(?P<part>force|moment|point)_(?P<axis>[xyz])")
 
 @dataclass(frozen=True)
 class LoadColumns:
-    """A load in a log: which column, by number, is the time, and which three are force, moment and point."""
+    """A load in a log: numbers of its time column, and of its three columns of force, moment and point."""
 
     name: str
     body: str
@@ -30,15 +30,15 @@ class LoadColumns:
     columns: dict[str, tuple[int, ...]]
     axes: str = WORLD
     point_in: str | None = None
-    """None for the loaded body, at the origin of which a force without a point acts."""
+    """None for the loaded body; a force without a point acts at its origin."""
     warnings: tuple[str, ...] = ()
-    """What was noticed in the file that says so, which each names."""
+    """Warnings about the file that describes the load; each names the file."""
 
 
 def load_columns(
     log: Path, columns: Sequence[str], robot: LoadedRobot, ignore_extra: bool
 ) -> tuple[LoadColumns, ...]:
-    """The loads of a log, all in the world's axes; raises LinkwiseError for columns that make none."""
+    """Return the loads of a log, all in the world's axes; raise LinkwiseError for columns that form none."""
     time = time_column(columns, Reading())
     found: dict[str, dict[str, dict[str, int]]] = {}
     extra = []

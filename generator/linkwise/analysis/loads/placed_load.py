@@ -1,8 +1,8 @@
-"""A load on a robot: its samples brought to the motion's instants and into the world, and its torques.
+"""A load on a robot: its samples at the motion's instants and in the world, and its joint torques.
 
-A load that is given in the world alone is kept as its wrench about the world's origin, for that is what a
-force plate measures: it is what is filtered and interpolated, and a centre of pressure that leaps while
-nothing presses does no harm. Of other loads force, moment and point are interpolated each.
+A load that is given entirely in the world is kept as its wrench about the world's origin, because a force
+plate measures that. The wrench is filtered and interpolated, so that a centre of pressure which jumps while
+nothing presses does no harm. For other loads, force, moment and point are interpolated separately.
 """
 
 from collections.abc import Callable
@@ -11,16 +11,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.rule.joint_tree import TreeFrame
 
 from linkwise.analysis.body_names import body_frame
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WORLD
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
-from linkwise.package.manifest import FrameEntry, RigidTree
+from linkwise.package.manifest import RigidTree
 
-Pose = Callable[[FrameEntry, Array], Array]
-"""Homogeneous matrices (S, 4, 4) of a frame at q (S, n)."""
+Pose = Callable[[TreeFrame, Array], Array]
+"""Function that returns the homogeneous matrices (S, 4, 4) of a frame at q (S, n)."""
 
 
 class Wrench(NamedTuple):
@@ -33,37 +34,37 @@ class Wrench(NamedTuple):
 
 @dataclass(frozen=True)
 class Seat:
-    """Where a load acts, and the frames that its numbers are given in, None for the world."""
+    """Frame on which a load acts, and the frames in which its numbers are given, None for the world."""
 
-    frame: FrameEntry
-    axes: FrameEntry | None
-    point_in: FrameEntry | None
+    frame: TreeFrame
+    axes: TreeFrame | None
+    point_in: TreeFrame | None
     joints: tuple[int, ...]
-    """Coordinates that move the body."""
+    """Indices of the coordinates that move the body."""
 
     @property
     def in_world(self) -> bool:
-        """Whether all is given in the world, so that the moments of a table are about its origin."""
+        """True if all is given in the world, so that the moments of a table are about its origin."""
         return self.axes is None and self.point_in is None
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedLoad:
-    """A load that a robot bears."""
+    """A load that a robot carries."""
 
     name: str
     seat: Seat
     table: Array
-    """Rows of time, force, moment, point (S, 10); moments are about the origin where all is in the world."""
+    """Rows of time, force, moment, point (S, 10); moments are about the origin if all is in the world."""
     source: str
-    """The file that it is from, "" for none."""
+    """Name of the file that it is from, "" for none."""
     cutoff: float | None = None
-    """Of the low-pass that it got, in Hz."""
+    """Cutoff in Hz of the low-pass filter that was applied, None for none."""
     warnings: tuple[str, ...] = ()
-    """What was noticed in the file, which each names."""
+    """Warnings about the file; each names it."""
 
     def wrench(self, time: Array, q: Array, pose: Pose) -> Wrench:
-        """What acts at instants (S,) with the robot at q (S, n)."""
+        """Return the wrench that acts at instants (S,) with the robot at q (S, n)."""
         rows, seat = self._at(time), self.seat
         force, moment, point = rows[:, FORCE], rows[:, MOMENT], rows[:, POINT]
         if seat.in_world:
@@ -77,18 +78,18 @@ class PlacedLoad:
         return Wrench(force, moment, point)
 
     def torque(self, model: Dynamics, time: Array, q: Array) -> Array:
-        """What it asks of each joint, τ_ie (S, n) in N·m or N."""
+        """Return the joint torques τ_ie (S, n) that the load requires, in N·m or N."""
         force, moment, place = self.wrench(time, q, model_pose(model))
         found: Any = model.kinematics.load_torque(q, self.seat.frame.name, force, moment, at=place)
         return np.asarray(found)
 
     def record(self) -> dict[str, Any]:
-        """As plain data, to record in the outputs."""
+        """Return the load as plain data, to record in the outputs."""
         body = self.seat.frame.name
         return {"name": self.name, "body": body, "file": self.source, "cutoff": self.cutoff}
 
     def _at(self, time: Array) -> Array:
-        """The table's rows (S, 10) at instants: linear between its samples."""
+        """Return the table's rows (S, 10) at instants, linear between its samples."""
         own = self.table[:, 0]
         low = max(0, int(np.searchsorted(own, time[0], side="right")) - 1)
         some = self.table[low : int(np.searchsorted(own, time[-1])) + 1]
@@ -98,12 +99,15 @@ class PlacedLoad:
 
 
 def model_pose(model: Dynamics) -> Pose:
-    """Poses as a model has them."""
+    """Return the function for the poses of a model's frames."""
     return lambda frame, q: np.asarray(model.kinematics.pose(q, frame.name))
 
 
 def seat_of(load: str, body: str, axes: str, point_in: str | None, robot: LoadedRobot) -> Seat:
-    """Where a load acts; raises LinkwiseError for bodies that are not there, and for one on the ground."""
+    """Return the seat of a load: its frame, and the frames of its numbers.
+
+    Raises LinkwiseError for bodies that do not exist, for one on the ground, and for links that are energies.
+    """
     tree = robot.package.manifest.tree
     if tree is None:
         raise LinkwiseError(
@@ -112,22 +116,22 @@ def seat_of(load: str, body: str, axes: str, point_in: str | None, robot: Loaded
         )
     what = f"load {load!r}"
     frame = body_frame(f"{what} on", body, robot)
-    if frame.body is None:
+    if frame.joint is None:
         raise LinkwiseError(f"{what} on {body!r}: that stands on the ground, so that no joint bears it")
     seen = frame if point_in is None else _seen_in(what, point_in, robot, tree)
-    return Seat(frame, _seen_in(what, axes, robot, tree), seen, moving_joints(tree, frame.body))
+    return Seat(frame, _seen_in(what, axes, robot, tree), seen, moving_joints(tree, frame.joint))
 
 
-def _seen_in(what: str, name: str, robot: LoadedRobot, tree: RigidTree) -> FrameEntry | None:
-    """The frame of a name, None for the world, which OpenSim calls ground."""
+def _seen_in(what: str, name: str, robot: LoadedRobot, tree: RigidTree) -> TreeFrame | None:
+    """Return the frame of a name, None for the world, which OpenSim calls ground."""
     own = next((frame for frame in tree.frames if frame.name == name), None)
-    if name in (WORLD, "ground") and (own is None or own.body is None):
+    if name in (WORLD, "ground") and (own is None or own.joint is None):
         return None
     return own or body_frame(f"{what}, given in the axes of", name, robot)
 
 
 def moving_joints(tree: RigidTree, body: int | None) -> tuple[int, ...]:
-    """Coordinates that move a body of the tree; none move the ground."""
+    """Return the coordinates that move a body of the tree, in ascending order; none move the ground."""
     found = set()
     while body is not None:
         found.add(tree.bodies[body].coordinate)

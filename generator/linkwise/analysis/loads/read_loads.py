@@ -1,4 +1,4 @@
-"""From files and values of loads to what a robot bears, checked against its bodies and the motion's time."""
+"""Loads on a robot, read from files and values and checked against its bodies and the motion's time."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -32,9 +32,12 @@ def placed_loads(
     progress: Progress,
     buffer: Path | None = None,
 ) -> tuple[PlacedLoad, ...]:
-    """All loads, over the motion's time (S,) in s; `buffer` is a folder that keeps their samples, not memory.
+    """Return all loads, over the motion's time (S,) in s.
 
-    Raises LinkwiseError that names file, row and column for what is not there, has gaps or is too short.
+    buffer: a folder that keeps their samples, in place of memory
+
+    Raises LinkwiseError that names file, row and column for data that are missing, have gaps or are too
+    short.
     """
     loads = [_given(load, robot, motion) for load in wanted.given]
     listed = [(one, path) for path in wanted.paths for one in _listed(path, robot, ignore_extra)]
@@ -53,7 +56,7 @@ def _listed(path: Path, robot: LoadedRobot, ignore_extra: bool) -> tuple[LoadCol
 
 
 def _with_doubles_told(loads: Sequence[tuple[LoadColumns, Path]]) -> Iterator[tuple[LoadColumns, Path]]:
-    """The loads, with a warning for each that has its force or moment from the columns of another."""
+    """Yield the loads, with a warning for each whose force or moment comes from the columns of another."""
     first: dict[tuple[Path, tuple[int, ...]], str] = {}
     for load, path in loads:
         told = []
@@ -113,7 +116,7 @@ def _read(
 
 
 def _far(load: LoadColumns, table: Array) -> tuple[str, ...]:
-    """A warning about points that are unlikely by their size."""
+    """Return a warning if the load's point is implausibly far away."""
     largest = float(np.abs(table[:, POINT]).max())
     if largest <= FAR:
         return ()

@@ -1,4 +1,4 @@
-"""Motion logs as blocks of numbers: text, Parquet, bags of ROS and files of arrays behind one face."""
+"""Motion logs as blocks of numbers: text, Parquet, ROS bags and files of arrays behind one interface."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -27,9 +27,9 @@ ARRAYS: dict[str, Callable[[Path], ArrayFile]] = {
     **dict.fromkeys((".h5", ".hdf5", ".hdf"), Hdf5Arrays),
 }
 BAGS = ".mcap", ".db3", ".bag"
-"""Of ROS 2, and the last of ROS 1."""
+"""Suffixes of bags of ROS 2; the last is of ROS 1."""
 MARKERS = ".trc", ".c3d"
-"""What cameras and force plates record."""
+"""Suffixes of recordings of cameras and force plates."""
 
 
 class Log(Protocol):
@@ -37,7 +37,7 @@ class Log(Protocol):
 
     @property
     def path(self) -> Path:
-        """The file, or a bag's folder."""
+        """Path of the file, or of a bag's folder."""
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -45,26 +45,26 @@ class Log(Protocol):
 
     @property
     def brought(self) -> frozenset[str]:
-        """Columns that the format has of itself: that a robot does not ask for them is no mistake."""
+        """Columns that the format itself adds; it is no error if the robot does not need them."""
 
     @property
     def degrees(self) -> bool | None:
-        """Whether angles are in degrees, where the file says so."""
+        """True if angles are in degrees, False if in rad; None where the file does not say."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What looks wrong in the file and need not be."""
+        """Warnings about what looks wrong in the file and may be right."""
 
     @property
     def size(self) -> int:
-        """What `read` counts up to: bytes of text, rows, or messages."""
+        """Total that `read` counts up to: bytes of text, rows, or messages."""
 
     @property
     def first_row(self) -> int:
         """Number of the first sample as an editor or a spreadsheet counts rows, from 1."""
 
     def read(self, columns: Sequence[int], rows: int = ...) -> Iterator[tuple[Array, int]]:
-        """Yield blocks (at most `rows`, len(columns)), NaN possible, and how much of `size` is done.
+        """Yield blocks (at most `rows`, len(columns)), which may have NaN, and how much of `size` is done.
 
         columns: positions in `columns`, in the order wanted. Raises LinkwiseError, naming file, row and
         column, for what is not a number.
@@ -78,14 +78,14 @@ def open_log(
     file_joints: Sequence[FileJoint] = (),
     qpos_of: QposOf | None = None,
 ) -> Log:
-    """Open a log by its suffix; a folder as a bag of ROS 2.
+    """Open a log by its suffix; open a folder as a bag of ROS 2.
 
-    reading: which topic or group has the joints, and which array the time, where the format has such
-    joints: what columns of arrays are, in this order, where the file names none
-    file_joints, qpos_of: those of the robot's file, and how a simulator's positions become these
+    reading: the topic or group of the joints, and the array of the time, for formats that have these
+    joints: names of the columns of arrays, in this order, where the file names none
+    file_joints: joints of the robot's file; qpos_of: conversion of a simulator's positions to the robot's
 
     Raises LinkwiseError for a missing file, an unknown suffix, a header that cannot be read, or one that
-    names two columns alike.
+    gives two columns the same name.
     """
     with within(str(path)):
         if not path.is_dir():
@@ -109,7 +109,7 @@ def _opener(
     file_joints: Sequence[FileJoint],
     qpos_of: QposOf | None,
 ) -> Callable[[], Log]:
-    """What opens a log; raises LinkwiseError for a kind of file that is none."""
+    """Return the function that opens a log; raise LinkwiseError for an unsupported kind of file or flag."""
     suffix = path.suffix.lower()
     order = reading.qpos
     if order is not None and suffix not in ARRAYS:

@@ -1,6 +1,6 @@
-"""Which columns a file of named arrays has: the time, and joints in arrays of their own or side by side.
+"""Columns of a file of named arrays: the time, and joints in arrays of their own or side by side.
 
-Names are paths, `arm/q`. What an array is called says which quantity it holds; another one than these is a
+Names are paths, `arm/q`. The name of an array says which quantity it holds; an array of any other name is a
 column by its own name.
 """
 
@@ -15,14 +15,14 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 
 NAMES = ("joint_names", "joints", "names", "name", "columns")
-"""What an array of texts is called, or an attribute, that names joints."""
+"""Names of an array of texts, or of an attribute, that names joints."""
 UNITS = dict.fromkeys(("deg", "degs", "degree", "degrees", "°"), True)
 UNITS |= dict.fromkeys(("rad", "rads", "radian", "radians"), False)
-"""What an attribute calls units of angles, and whether these are degrees."""
+"""Units of angles in attributes, True for degrees."""
 MOST_COLUMNS, MOST_NAMES = 10_000, 10_000
-"""Numbers that a sample has in an array, and texts in one that names joints."""
+"""Most numbers of a sample in an array, and most texts in an array that names joints."""
 NUMBERS = "fiub"
-"""NumPy's kinds of what is a number."""
+"""NumPy's kinds of numeric types."""
 WORDS = {
     "": "q qpos position positions pos angle angles joint_position joint_positions joint_pos joint_angle"
     " joint_angles joint_state joint_states joints",
@@ -30,7 +30,7 @@ WORDS = {
     "/acceleration": "qdd ddq qddot qacc acceleration accelerations joint_acceleration joint_accelerations",
     "/effort": "tau torque torques effort efforts joint_torque joint_torques joint_effort joint_efforts",
 }
-"""What arrays are called, the likeliest first, and how their columns then end behind the joint's name."""
+"""Names of arrays, the likeliest first, by the ending of their columns after the joint's name."""
 ENDING_OF = {word: ending for ending, words in WORDS.items() for word in words.split()}
 RANK = {word: rank for rank, word in enumerate(ENDING_OF)}
 
@@ -39,7 +39,7 @@ RANK = {word: rank for rank, word in enumerate(ENDING_OF)}
 class StoredArray:
     """An array in a file: its shape, whether it holds numbers, and the texts of one that names joints.
 
-    bytes: what memory it takes
+    bytes: its size in memory
     """
 
     shape: tuple[int, ...]
@@ -47,17 +47,17 @@ class StoredArray:
     is_numeric: bool = True
     texts: tuple[str, ...] = ()
     unit: str = ""
-    """As an attribute of the array says."""
+    """Unit given by an attribute of the array."""
 
     @property
     def told(self) -> str:
-        """What it is, in words."""
+        """Description of the array in words."""
         return f"{self.shape}" if self.is_numeric or self.texts else f"{self.shape} without numbers"
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a column stands: its array, and which number of each sample it is."""
+    """Place of a column: its array, and its index in each sample."""
 
     array: str
     at: int
@@ -65,9 +65,9 @@ class Place:
 
 @dataclass(frozen=True)
 class ArrayColumns:
-    """The columns of arrays that share a clock: the array `time`, and what lies in the folder `group`.
+    """The columns of arrays that share a clock: the array `time`, and the arrays in the folder `group`.
 
-    joints: the robot's, in whose order the columns of an array are if nothing names them
+    joints: joints of the robot, in whose order the columns of an array are if nothing names them
     """
 
     found: Mapping[str, StoredArray]
@@ -77,21 +77,21 @@ class ArrayColumns:
     others: frozenset[str]
     """Folders with clocks of their own."""
     file_joints: Sequence[FileJoint] = ()
-    """Those of the robot's file, by which positions of simulators have more numbers."""
+    """Joints of the robot's file; a simulator's positions have more numbers for some of them."""
 
     @cached_property
     def samples(self) -> int:
-        """How many there are."""
+        """Number of samples."""
         return max(self.found[self.time].shape)
 
     @cached_property
     def places(self) -> dict[str, Place]:
-        """Columns by name; raises LinkwiseError for positions of which nothing says whose they are."""
+        """Places of the columns by name; raises LinkwiseError for positions whose joints are not known."""
         places: dict[str, Place] = {}
         for array in sorted(self._beside(), key=lambda array: RANK.get(word_of(array), len(RANK))):
             width = width_of(self.found[array].shape, self.samples)
             if width > MOST_COLUMNS and word_of(array) not in ENDING_OF:
-                continue  # pictures, say
+                continue  # images, for example
             if width > MOST_COLUMNS:
                 raise LinkwiseError(
                     f"array {array!r} has {width:,} numbers a sample, which no robot has; leave it out"
@@ -113,7 +113,7 @@ class ArrayColumns:
 
     @cached_property
     def unnamed(self) -> tuple[str, ...]:
-        """Arrays of positions of several joints that nothing names."""
+        """Arrays of positions of several joints whose columns nothing names."""
         return tuple(
             array
             for array in self._beside()
@@ -122,7 +122,7 @@ class ArrayColumns:
         )
 
     def check(self) -> None:
-        """Raise LinkwiseError where all positions are in arrays that cannot have them."""
+        """Raise LinkwiseError if all positions are in arrays whose type or shape cannot hold them."""
         columns = {column for column in self.places if column in self.joints}
         for array, found in self.found.items():
             is_flat = found.is_numeric and len(found.shape) in (1, 2)
@@ -134,9 +134,9 @@ class ArrayColumns:
 
     @cached_property
     def degrees(self) -> bool | None:
-        """Whether positions are in degrees, as attributes say; None where they do not.
+        """True if attributes say that positions are in degrees, False for rad; None where they do not say.
 
-        Raises LinkwiseError where some are and others are not.
+        Raises LinkwiseError if some are in degrees and others in rad.
         """
         arrays = dict.fromkeys(place.array for column, place in self.places.items() if column in self.joints)
         told = {array: UNITS.get(self.found[array].unit.lower()) for array in arrays}
@@ -147,7 +147,10 @@ class ArrayColumns:
         return next(iter(known.values()), None)
 
     def _beside(self) -> Iterator[str]:
-        """Arrays of numbers on this clock, but the time; LinkwiseError for positions of other length."""
+        """Yield the arrays of numbers on this clock, without the time.
+
+        Raises LinkwiseError for positions of another number of samples.
+        """
         for array, found in self.found.items():
             folders = set(folders_of(array))
             if array == self.time or self.group not in folders or folders & self.others:
@@ -162,7 +165,7 @@ class ArrayColumns:
                 )
 
     def _columns(self, array: str, name: str, width: int) -> list[str] | None:
-        """Names of an array's columns by what it is called; None where that says nothing."""
+        """Return the names of an array's columns, by the name of the array; None if that says nothing."""
         if width == 1 and name in self.joints:
             return [name]
         ending = ENDING_OF.get(word_of(array))
@@ -196,7 +199,7 @@ class ArrayColumns:
 
 
 def names_beside(found: Mapping[str, StoredArray], array: str) -> tuple[str, ...]:
-    """The names of joints that stand nearest to an array, at it or above; none where there are none."""
+    """Return the joint names that stand nearest to an array, at it or above; empty if there are none."""
     for folder in (array, *folders_of(array)):
         for word in NAMES:
             has = found.get(f"{folder}/{word}".lstrip("/"))
@@ -212,9 +215,10 @@ def array_columns(
     joints: Sequence[str],
     file_joints: Sequence[FileJoint] = (),
 ) -> ArrayColumns:
-    """Find the clock: the only array called `time` or `t`, or as given, in the group or nearest above it.
+    """Find the clock, and return the columns that share it.
 
-    Raises LinkwiseError where there is none, or several.
+    It is the only array called `time` or `t`, or as given, in the group or nearest above it. Raises
+    LinkwiseError where there is none, or several.
     """
     clocks = _clocks(found, time)
     where = listed(f"/{folder}" for folder in sorted(clocks))
@@ -235,7 +239,7 @@ def array_columns(
 
 
 def _clocks(found: Mapping[str, StoredArray], time: str | None) -> dict[str, str]:
-    """Arrays of times by the folder whose arrays they are of."""
+    """Return the arrays of times, by the folder whose arrays they belong to."""
     clocks: dict[str, str] = {}
     depth = 0 if time is None else time.strip("/").count("/")
     for array, has in found.items():
@@ -249,24 +253,24 @@ def _clocks(found: Mapping[str, StoredArray], time: str | None) -> dict[str, str
 
 
 def folders_of(array: str) -> list[str]:
-    """Folders that an array or a folder lies in, the innermost first, at last the file's root, ""."""
+    """Return the folders that contain an array or a folder, innermost first, the file's root, "", last."""
     parts = array.split("/")[:-1]
     return ["/".join(parts[:count]) for count in range(len(parts), -1, -1)]
 
 
 def word_of(array: str) -> str:
-    """What an array is called, without its folders, in small letters."""
+    """Return the name of an array without its folders, in lower case."""
     return array.rpartition("/")[2].lower()
 
 
 def names_joints(array: str, shape: tuple[int, ...]) -> bool:
-    """Whether an array, if it holds texts, names joints."""
+    """Return whether an array of this name and shape, if it holds texts, names joints."""
     is_list = len(shape) > 0 and sum(size != 1 for size in shape) <= 1
     return word_of(array) in NAMES and is_list and math.prod(shape) <= MOST_NAMES
 
 
 def width_of(shape: tuple[int, ...], samples: int) -> int:
-    """Numbers a sample, the samples along either axis; 0 where neither has as many as there are samples."""
+    """Return how many numbers a sample has, the samples along either axis; 0 if neither has `samples`."""
     if len(shape) == 1:
         return int(shape[0] == samples)
     return shape[1] if shape[0] == samples else shape[0] if shape[1] == samples else 0

@@ -19,27 +19,27 @@ from linkwise.package.load import Array
 
 
 class ArrayFile(Protocol):
-    """A file of arrays by name; what cannot be read raises LinkwiseError that names the file."""
+    """A file of arrays by name; raises LinkwiseError that names the file for what cannot be read."""
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """Path of the file."""
 
     def found(self) -> Mapping[str, StoredArray]:
-        """What is in it."""
+        """Return the arrays in the file, by name."""
 
     def opened(self) -> AbstractContextManager[Callable[[str], Any]]:
-        """Open, and give arrays by name, or what is sliced like them."""
+        """Open the file, and give arrays by name, or objects that are sliced like arrays."""
 
 
 @dataclass(frozen=True)
 class ArrayLog:
-    """Columns of arrays that have the samples along one axis; `places` says where each stands."""
+    """Columns of arrays that have the samples along one axis; `places` has the place of each column."""
 
     source: ArrayFile
     places: Mapping[str, Place]
     size: int
-    """Samples."""
+    """Number of samples."""
     warnings: tuple[str, ...] = ()
     degrees: bool | None = None
     first_row: int = 1
@@ -52,7 +52,7 @@ class ArrayLog:
         joints: Sequence[str],
         file_joints: Sequence[FileJoint] = (),
     ) -> "ArrayLog":
-        """Find the time and the joints' arrays; raises LinkwiseError where that is not clear."""
+        """Find the time and the joints' arrays; raise LinkwiseError where they are ambiguous."""
         found = source.found()
         with within(str(source.path)):
             columns = array_columns(found, reading.time, reading.topic, joints, file_joints)
@@ -66,9 +66,10 @@ class ArrayLog:
 
     @classmethod
     def of(cls, source: ArrayFile, columns: ArrayColumns, time: str | None) -> "ArrayLog":
-        """Columns that were found, the time by the name that was asked for; raises LinkwiseError likewise.
+        """Return the log of the columns that were found; the time has the name that was asked for.
 
-        And for arrays that are far larger than the file, before any is read.
+        Raises LinkwiseError for two columns of one name, for positions in arrays that cannot hold them, and
+        for arrays that are far larger than the file, before any is read.
         """
         called = time or columns.time.rpartition("/")[2]
         named_once((called, *columns.places))
@@ -80,17 +81,17 @@ class ArrayLog:
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """Path of the file."""
         return self.source.path
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The time, then joints, and arrays of other names by these."""
+        """Names of the columns: the time, then joints, and other arrays by their own names."""
         return tuple(self.places)
 
     @property
     def brought(self) -> frozenset[str]:
-        """Velocities, accelerations and efforts of joints whose positions are there, too."""
+        """Columns of velocities, accelerations and efforts of joints whose positions are there, too."""
         there = [f"{column}{ending}" for column in self.places for ending in WORDS if ending]
         return frozenset(self.places).intersection(there)
 
@@ -106,7 +107,7 @@ class ArrayLog:
 
 
 def _rows(array: Any, samples: int, start: int, stop: int) -> Array:
-    """Samples of an array, (stop - start, numbers a sample), whichever axis they are along."""
+    """Return samples of an array, (stop - start, numbers per sample), whichever axis they are along."""
     if len(array.shape) == 1:
         part = np.asarray(array[start:stop])[:, None]
     elif array.shape[0] == samples:

@@ -1,4 +1,4 @@
-"""Bags of ROS with joint states: folders of rosbag2, their .mcap and .db3 files, and .bag files of ROS 1."""
+"""ROS bags with joint states: folders of rosbag2, their .mcap and .db3 files, and .bag files of ROS 1."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -17,9 +17,9 @@ from linkwise.input_file import require_file
 from linkwise.package.load import Array
 
 MCAP_MAGIC, MCAP_BEFORE, MCAP_OF_ROS = b"\x89MCAP0\r\n", 8 + 1 + 8, "ros2"
-"""The first bytes of an MCAP file, how many stand before the length of its profile, and that of ROS 2."""
+"""First bytes of an MCAP file, number of bytes before the length of its profile, and the profile of ROS 2."""
 ROS1_MAGIC = b"#ROSBAG V2.0\n"
-"""The first line of a bag of ROS 1, whose end the library looks for to that of any file."""
+"""First line of a ROS 1 bag; in any other file the library searches for its end up to the file's end."""
 MEND = "mend it with `mcap recover` or `ros2 bag reindex`, or record it again"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 NAMED = 10_000
@@ -30,22 +30,22 @@ NAMED = 10_000
 class BagLog:
     """The joint states of a topic.
 
-    Times are in s from the first message on: `time` by the stamps in messages, `recorded` by those of the
-    recorder. Rows are the messages that have the joints wanted, from 1. `cells` are the columns.
+    Times are in s from the first message: `time` by the stamps in messages, `recorded` by those of the
+    recorder. Rows are the messages that have the requested joints, from 1. `cells` are the columns.
     """
 
     path: Path
     topic: str
     cells: Mapping[str, Cell]
     size: int
-    """Messages of the topic."""
+    """Number of messages of the topic."""
     warnings: tuple[str, ...]
     degrees: bool | None = None
     first_row: int = 1
 
     @classmethod
     def open(cls, path: Path, topic: str | None) -> "BagLog":
-        """Find the topic, and the joints in its first messages; raises LinkwiseError where none is."""
+        """Find the topic, and the joints in its first messages; raise LinkwiseError where there are none."""
         with _opened(path) as bag:
             name = _chosen_topic(bag.topics, topic)
             states = list(islice(_states(bag, name), NAMED))
@@ -63,19 +63,19 @@ class BagLog:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The time, by the recorder too, and positions, velocities and efforts of joints."""
+        """Names of columns: times by stamp and by recorder; positions, velocities, efforts of joints."""
         return tuple(self.cells)
 
     @property
     def brought(self) -> frozenset[str]:
-        """Times, velocities and efforts."""
+        """Columns of times, velocities and efforts."""
         return frozenset(column for column, cell in self.cells.items() if cell.quantity != "position")
 
     def read(self, columns: Sequence[int], rows: int = 65536) -> Iterator[tuple[Array, int]]:
         """Yield blocks (at most `rows`, len(columns)) and the number of messages read so far.
 
-        Raises LinkwiseError, naming the message, for one that has some of the joints only, and for stamps
-        that run back.
+        Raises LinkwiseError, naming the message, for one that has only some of the joints, and for stamps
+        that run backwards.
         """
         cells = [self.cells[self.columns[at]] for at in columns]
         with _opened(self.path) as bag:
@@ -84,7 +84,7 @@ class BagLog:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    """The library's reader of a bag, open."""
+    """Open a bag and give the library's reader."""
     if path.is_dir() and not (path / "metadata.yaml").is_file():
         raise LinkwiseError(
             f"{path}: this is a directory, not that of a bag: it has no metadata.yaml; give a file"
@@ -108,14 +108,14 @@ def _opened(path: Path) -> Iterator[Any]:
 
 
 def _require_ros1(path: Path) -> None:
-    """Raise ValueError for a file that does not begin as a bag of ROS 1."""
+    """Raise ValueError for a file that does not begin like a bag of ROS 1."""
     with path.open("rb") as file:
         if file.read(len(ROS1_MAGIC)) != ROS1_MAGIC:
             raise ValueError(f"its first line is not {ROS1_MAGIC.decode().strip()!r}")
 
 
 def _profile(path: Path) -> str:
-    """What the header of an MCAP file says of its messages; that of ROS 2 for other files."""
+    """Return the profile in the header of an MCAP file; the profile of ROS 2 for other files."""
     if not path.is_file() or path.suffix.lower() != ".mcap":
         return MCAP_OF_ROS
     with path.open("rb") as file:
@@ -125,7 +125,7 @@ def _profile(path: Path) -> str:
 
 
 def _chosen_topic(topics: Mapping[str, Any], wanted: str | None) -> str:
-    """Name of the topic to read, of those with joint states."""
+    """Return the name of the topic to read, among those with joint states."""
     found = {
         name: topic.msgcount
         for name, topic in topics.items()
@@ -145,7 +145,7 @@ def _chosen_topic(topics: Mapping[str, Any], wanted: str | None) -> str:
 
 
 def _states(bag: Any, topic: str) -> Iterator[JointMessage]:
-    """Messages of a topic by their time of recording."""
+    """Yield the messages of a topic by their time of recording."""
     stores = extra("rosbags.typesys")
     is_ros1 = type(bag).__module__.startswith("rosbags.rosbag1")
     store = stores.get_typestore(stores.Stores.ROS1_NOETIC if is_ros1 else stores.Stores.ROS2_HUMBLE)
@@ -158,7 +158,7 @@ def _states(bag: Any, topic: str) -> Iterator[JointMessage]:
 
 
 def _columns(states: Sequence[JointMessage]) -> list[tuple[str, Cell]]:
-    """Columns of all joints that messages carry, in the order in which these name them."""
+    """Return the columns of all joints that messages carry, in the order in which messages name them."""
     found: dict[str, dict[str, Cell]] = {quantity: {} for quantity in ENDINGS}
     for state in states:
         for quantity, ending in ENDINGS.items():

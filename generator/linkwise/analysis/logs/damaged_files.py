@@ -1,4 +1,4 @@
-"""Whatever a library's parser of bytes comes upon in a damaged file, as one line that names the file."""
+"""Errors of a library that parses a damaged file, as one line that names the file."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,7 +8,7 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.escape import one_line
 
 LONGEST_REASON = 200
-"""Characters of what a library says."""
+"""Most characters shown of a library's message."""
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""What is no number in a block of a log."""
+"""Check of a block of a log for values that are not finite."""
 
 from collections.abc import Sequence
 

@@ -17,20 +17,22 @@ from linkwise.escape import short
 from linkwise.extras import extra
 
 DEEPEST, LONGEST_PATH = 32, 1_000
-"""Groups, one in the other, that a dataset lies in, and characters of its path: each is looked up from the
-root on, so that a file of megabytes may ask for hours, or for the memory of all its paths."""
+"""Most groups in which a dataset lies, one inside the other, and most characters of its path.
+
+Each is looked up from the root, so that a file of megabytes could take hours, or the memory of all its paths.
+"""
 
 
 @dataclass(frozen=True)
 class Hdf5Arrays:
-    """Datasets in groups; attributes that name joints count as arrays in what they are attributes of."""
+    """Datasets in groups; attributes that name joints count as arrays in the item that has them."""
 
     path: Path
 
     def found(self) -> Mapping[str, StoredArray]:
-        """Shapes of all datasets, and the texts of those that name joints.
+        """Return the shapes of all datasets, and the texts of those that name joints.
 
-        Raises LinkwiseError for numbers in other files, and for what lies deeper than any log is.
+        Raises LinkwiseError for numbers in other files, and for paths that are deeper than those of any log.
         """
         library = extra("h5py")
         found: dict[str, StoredArray] = {}
@@ -40,7 +42,7 @@ class Hdf5Arrays:
             found.update(_named_by_attributes(name, item))
             if not isinstance(item, library.Dataset):
                 return
-            # Asked before the shape, for which HDF5 opens other files.
+            # Checked before the shape, for which HDF5 opens other files.
             if item.is_virtual or item.external:
                 raise LinkwiseError(
                     f"dataset {name!r} has its numbers in other files; write them into this one"
@@ -58,7 +60,7 @@ class Hdf5Arrays:
         return found
 
     def _texts(self, item: Any) -> tuple[str, ...]:
-        """Texts of a dataset, one after the other: many may refer to one that is long."""
+        """Return the texts of a dataset, read one after the other: many may refer to one long text."""
         require_held(self.path, _size(item))
         texts, length, readable = list[str](), 0, item.asstr()
         for at in np.ndindex(item.shape):
@@ -69,7 +71,7 @@ class Hdf5Arrays:
 
     @contextmanager
     def opened(self) -> Iterator[Callable[[str], Any]]:
-        """Give datasets by path, whose numbers are read when they are sliced."""
+        """Open the file and give datasets by path, whose numbers are read when they are sliced."""
         with self._file() as file:
             yield file.__getitem__
 
@@ -95,19 +97,19 @@ def _require_shallow(path: str) -> None:
 
 
 def _size(item: Any) -> int:
-    """Bytes that a dataset takes in memory, or one of its chunks if that is more."""
+    """Return the bytes that a dataset takes in memory, or one of its chunks if that is more."""
     count: int = max(math.prod(item.shape), math.prod(item.chunks or ()))
     return count * int(item.dtype.itemsize)
 
 
 def _unit(item: Any) -> str:
-    """What attributes say an array is in; nothing where they do not."""
+    """Return the unit that attributes give for an array; empty if they give none."""
     told = (item.attrs.get(word, "") for word in ("units", "unit"))
     return next((text.strip() for text in told if isinstance(text, str) and text.strip()), "")
 
 
 def _named_by_attributes(name: str, item: Any) -> dict[str, StoredArray]:
-    """Attributes of an item that name joints, as if they were arrays in it."""
+    """Return the attributes of an item that name joints, as if they were arrays in it."""
     found = {}
     for word in NAMES:
         texts = np.asarray(item.attrs.get(word, ()))

@@ -1,4 +1,4 @@
-"""What stands above the numbers of a text log: CSV's one header line, OpenSim's lines up to `endheader`."""
+"""Headers of text logs: CSV's single header line, OpenSim's lines up to `endheader`."""
 
 import re
 from itertools import islice
@@ -9,17 +9,17 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.escape import short
 
 READ = {name.lower(): name for name in ("inDegrees", "nRows", "nColumns", "DataType")}
-"""What counts of a header."""
+"""Keys of a header that are read."""
 SIMM = {"datacolumns": "ncolumns", "datarows": "nrows"}
-"""How motions of SIMM, which OpenSim reads too, say the same."""
+"""Keys of the same meaning in motions of SIMM, which OpenSim reads too."""
 MOST_FACTS, MOST_DIGITS = 10_000, 15
-"""Lines above `endheader`, and digits of a count: no recording has as many."""
+"""Most lines above `endheader`, and most digits of a count: no recording has as many."""
 TAIL = 1 << 16
-"""Bytes at the end of a file that are searched for a last row cut off."""
+"""Bytes at the end of a file that are searched for a truncated last row."""
 
 
 def open_delimited(path: Path) -> TextLog:
-    """Open a CSV file: one header line; comma, semicolon or tab, whichever the header has.
+    """Open a CSV file with one header line, whose separator all rows have: comma, semicolon or tab.
 
     Raises LinkwiseError for a file without a header.
     """
@@ -36,11 +36,11 @@ def open_delimited(path: Path) -> TextLog:
 
 
 def open_storage(path: Path) -> TextLog:
-    """Open an OpenSim .mot or .sto file with what its header says: inDegrees, nRows and nColumns.
+    """Open an OpenSim .mot or .sto file with the facts of its header: inDegrees, nRows and nColumns.
 
-    The last two are datarows and datacolumns in motions of SIMM.
+    The last two are called datarows and datacolumns in motions of SIMM.
 
-    Raises LinkwiseError for a header that is cut off or contradicts itself.
+    Raises LinkwiseError for a header that is truncated or contradicts itself.
     """
     facts, names, row = _storage_header(path)
     columns = _columns(path, row, names.rstrip(), "\t" if "\t" in names else None)
@@ -67,7 +67,7 @@ def open_storage(path: Path) -> TextLog:
 
 
 def _storage_header(path: Path) -> tuple[dict[str, str], str, int]:
-    """Facts `key=value`, by key in lower case, the line of column names, and its number."""
+    """Return the facts `key=value`, by key in lower case, the line of column names, and its number."""
     facts: dict[str, str] = {}
     with path.open(encoding="utf-8-sig") as handle:
         lines = whole_lines(handle, path, 1)
@@ -82,7 +82,7 @@ def _storage_header(path: Path) -> tuple[dict[str, str], str, int]:
 
 
 def _fact(line: str) -> tuple[str, str]:
-    """Key, in lower case, and value of a line of a header; SIMM writes no equals sign."""
+    """Return the key, in lower case, and the value of a header line; SIMM writes no equals sign."""
     key, equals, value = line.partition("=")
     if equals:
         return key.strip().lower(), value.strip()
@@ -107,7 +107,7 @@ def _count(path: Path, facts: dict[str, str], key: str) -> int | None:
 
 
 def _warnings_of_the_end(path: Path, delimiter: str | None) -> tuple[str, ...]:
-    """A warning if the last row has no line end, and its last number fewer digits than all before it."""
+    """Return a warning if the last row has no line end, and a shorter last number than the rows before."""
     with path.open("rb") as handle:
         handle.seek(max(0, path.stat().st_size - TAIL))
         *rows, last = handle.read().decode("utf-8", "replace").split("\n")

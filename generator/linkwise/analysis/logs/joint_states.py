@@ -1,4 +1,4 @@
-"""From messages that carry joints, in any order and not each all of them, to rows."""
+"""Rows made from messages that carry joints in any order, and not each of them all joints."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,9 +10,9 @@ from linkwise.escape import listed
 from linkwise.package.load import Array
 
 STAMPED, RECORDED = "stamped", "recorded"
-"""What else than a quantity of a joint a column may be: the message's own time, and the recorder's."""
+"""Quantities of the columns of time: the message's own stamp, and the recorder's time."""
 ENDINGS = {"position": "", "velocity": "/velocity", "effort": "/effort"}
-"""The quantities of joints in a message, and how their columns' names end behind the joint's."""
+"""Quantities of joints in a message, and the endings of their columns' names after the joint's."""
 BY_RECORDER = f"take the recorder's times with --time {RECORDED}"
 
 
@@ -30,7 +30,10 @@ class JointMessage:
     arrays: Mapping[str, Sequence[float]]
 
     def has(self, quantity: str) -> bool:
-        """Whether there are numbers of it; raises LinkwiseError if they are not as many as names."""
+        """Return whether there are numbers of a quantity.
+
+        Raises LinkwiseError if there are not as many as names.
+        """
         count = len(self.arrays[quantity])
         if count not in (0, len(self.names)):
             raise LinkwiseError(
@@ -41,17 +44,17 @@ class JointMessage:
 
 @dataclass(frozen=True)
 class Cell:
-    """What a column is: a time, or a quantity of a joint."""
+    """Content of a column: a time, or a quantity of a joint."""
 
     quantity: str
     joint: str = ""
 
 
 def rows_of(states: Iterator[JointMessage], cells: Sequence[Cell], rows: int) -> Iterator[tuple[Array, int]]:
-    """Yield blocks (at most `rows`, len(cells)), times in s from the first message on, and messages read.
+    """Yield blocks (at most `rows`, len(cells)), times in s from the first message, and messages read.
 
-    A message without any of the joints is passed over, and so is one that repeats another, stamp and all.
-    Raises LinkwiseError for a message with some of the joints only, and for stamps that do not increase.
+    A message without any of the joints is skipped, and so is one that repeats another, including its stamp.
+    Raises LinkwiseError for a message with only some of the joints, and for stamps that do not increase.
     """
     block: list[list[float]] = []
     first = last = None
@@ -76,7 +79,7 @@ def rows_of(states: Iterator[JointMessage], cells: Sequence[Cell], rows: int) ->
 
 
 def _places(state: JointMessage, cells: Sequence[Cell]) -> list[int] | None:
-    """Where among the names of a message those of cells stand, -1 if nowhere; None if all do so."""
+    """Return the index of each cell's joint among a message's names, -1 if absent; None if all are absent."""
     place = {name: at for at, name in enumerate(state.names)}
     if len(place) < len(state.names):
         raise LinkwiseError(f"message {state.number} names a joint twice: {listed(state.names)}")
@@ -89,7 +92,7 @@ def _places(state: JointMessage, cells: Sequence[Cell]) -> list[int] | None:
 def _row(
     state: JointMessage, cells: Sequence[Cell], places: Sequence[int], first: JointMessage
 ) -> list[float]:
-    """The values of a message."""
+    """Return the values of a message, one for each cell."""
     row = []
     there = {quantity: state.has(quantity) for quantity in ENDINGS}
     for cell, place in zip(cells, places, strict=True):
@@ -117,7 +120,10 @@ def _repeats(
     found: Sequence[float],
     first: JointMessage,
 ) -> bool:
-    """Whether a row repeats the one before; raises LinkwiseError where only its stamp does, or runs back."""
+    """Return whether a row repeats the one before.
+
+    Raises LinkwiseError where only the stamp repeats, or where it runs backwards.
+    """
     if state.stamp > last.stamp or all(cell.quantity != STAMPED for cell in cells):
         return False
     if state.stamp == last.stamp and np.array_equal(row, found, equal_nan=True):

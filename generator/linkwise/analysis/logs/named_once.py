@@ -1,4 +1,4 @@
-"""Columns have names of their own: what two of them are called says which one is meant of neither."""
+"""Check that names are unique: of two columns of one name, none could be chosen."""
 
 from collections.abc import Sequence
 
@@ -6,11 +6,11 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import short
 
 SHOWN = 60
-"""Letters of a name that a message shows."""
+"""Most characters of a name that a message shows."""
 
 
 def named_once(names: Sequence[str], what: str = "columns") -> tuple[str, ...]:
-    """Return the names; raises LinkwiseError that says where two are the same, counted from 1."""
+    """Return the names; raise LinkwiseError that says where two are the same, counted from 1."""
     seen: dict[str, int] = {}
     for at, name in enumerate(names, 1):
         if (first := seen.setdefault(name, at)) != at:

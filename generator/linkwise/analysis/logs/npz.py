@@ -18,17 +18,17 @@ from linkwise.analysis.logs.promised_size import require_held
 from linkwise.errors import LinkwiseError, within
 
 LONGEST_HEADER = 10_000
-"""Bytes that say what an array is, of which NumPy takes no more from a stranger; numbers need a hundred."""
+"""Most bytes of an array's header, the limit of NumPy for untrusted files; numbers need a hundred."""
 
 
 @dataclass(frozen=True)
 class NpzArrays:
-    """What `numpy.savez` wrote, compressed or not."""
+    """Arrays in a file that `numpy.savez` wrote, compressed or not."""
 
     path: Path
 
     def found(self) -> Mapping[str, StoredArray]:
-        """Shapes of all arrays, from their headers.
+        """Return the shapes of all arrays, from their headers.
 
         Raises LinkwiseError for names of joints that are pickled, for two arrays of one name, and for an
         array whose header is far longer than numbers need.
@@ -58,18 +58,19 @@ class NpzArrays:
 
     @contextmanager
     def opened(self) -> Iterator[Callable[[str], Any]]:
-        """Give arrays by name, each read as a whole."""
+        """Open the file and give arrays by name, each read as a whole."""
         with read_as("an .npz file", self.path), self.path.open("rb") as file:
             yield np.load(file, allow_pickle=False).__getitem__
 
 
 def _header(array: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Shape of an array, and the type of its numbers.
+    """Return the shape of an array, and the type of its numbers.
 
-    Raises LinkwiseError for one that is longer than NumPy reads, which NumPy tells after it took it whole.
+    Raises LinkwiseError for a header longer than NumPy reads, which NumPy reports only after reading it
+    whole.
     """
     version = np.lib.format.read_magic(array)
-    if version > (2, 0):  # fields with names in Unicode: a table of its own, and not an array
+    if version > (2, 0):  # a table of fields with names in Unicode, not an array of numbers
         return (), np.dtype("V")
     is_first = version == (1, 0)
     reader = np.lib.format.read_array_header_1_0 if is_first else np.lib.format.read_array_header_2_0

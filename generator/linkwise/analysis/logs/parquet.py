@@ -14,7 +14,7 @@ from linkwise.extras import extra
 from linkwise.package.load import Array
 
 LONGEST_REASON = 200
-"""Characters of what pyarrow says."""
+"""Most characters shown of pyarrow's message."""
 FLOAT64 = 8
 """Bytes of a number."""
 
@@ -26,7 +26,7 @@ class ParquetLog:
     path: Path
     columns: tuple[str, ...]
     size: int
-    """Rows in the file."""
+    """Number of rows in the file."""
     degrees: bool | None = None
     first_row: int = 1
     warnings: tuple[str, ...] = ()
@@ -34,7 +34,7 @@ class ParquetLog:
 
     @classmethod
     def open(cls, path: Path) -> "ParquetLog":
-        """Read the file's schema; raises LinkwiseError for a file that is cut off, or is not Parquet."""
+        """Read the file's schema; raise LinkwiseError for a file that is truncated, or is not Parquet."""
         parquet, arrow = extra("pyarrow.parquet"), extra("pyarrow")
         try:
             metadata = parquet.read_metadata(path)
@@ -56,7 +56,7 @@ class ParquetLog:
         with extra("pyarrow.parquet").ParquetFile(self.path, pre_buffer=False) as file:
             for name in names:
                 kind = file.schema_arrow.field(name).type
-                # Before any is read: a row may refer to a text that is as long as the file.
+                # Checked before any row is read: a row may refer to a text as long as the file.
                 if not _is_numeric(arrow.types, kind):
                     raise LinkwiseError(f"{self.path}: column {name!r} holds {kind}, not numbers")
             batches = file.iter_batches(rows, columns=names)
@@ -73,7 +73,7 @@ class ParquetLog:
                 yield block, done
 
     def _next(self, batches: Iterator[Any], done: int) -> Any:
-        """The next batch, None after the last."""
+        """Return the next batch, None after the last; raise LinkwiseError for damaged data."""
         try:
             return next(batches, None)
         except _unreadable(extra("pyarrow")) as error:
@@ -84,12 +84,12 @@ class ParquetLog:
 
 
 def _is_numeric(types: Any, kind: Any) -> bool:
-    """Whether a type of pyarrow's is of numbers, or of nothing but empty cells."""
+    """Return whether a type of pyarrow is numeric, or of empty cells only."""
     kind = kind.value_type if types.is_dictionary(kind) else kind
     asked = types.is_integer, types.is_floating, types.is_boolean, types.is_decimal, types.is_null
     return any(is_kind(kind) for is_kind in asked)
 
 
 def _unreadable(arrow: Any) -> tuple[type[Exception], ...]:
-    """What pyarrow raises for a file that is not as Parquet has to be."""
+    """Return the exceptions that pyarrow raises for a file that is not valid Parquet."""
     return arrow.ArrowException, OSError, ValueError, MemoryError, OverflowError

@@ -1,4 +1,4 @@
-"""What a file promises to hold, against its own size: a kilobyte may promise more than any disk holds."""
+"""Check of the size that a file promises against its own: a kilobyte may promise more than any disk holds."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ from linkwise.errors import LinkwiseError
 LITTLE = 1 << 24
 """Bytes of numbers that every file may promise."""
 DENSEST = 200
-"""Bytes of numbers that a byte of a file may stand for; logs are packed some ten times."""
+"""Bytes of numbers that a byte of a file may stand for; logs are compressed about ten times."""
 
 
 def require_held(path: Path, promised: int) -> None:

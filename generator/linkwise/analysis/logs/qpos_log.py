@@ -1,4 +1,4 @@
-"""Logs of arrays that have a simulator's qpos: of it, and of its torques, the joints' columns are made."""
+"""Logs of arrays that have a simulator's qpos, from which the columns of joints and torques are computed."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,32 +24,32 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.package.load import Array
 
 QposOf = Callable[[Order, Sequence[str] | None], Qpos]
-"""How positions of an order become a robot's, with the names of its file's joints where they have another."""
+"""Conversion of positions of an order to a robot's, given the joint names in the file where it has them."""
 EFFORT = "/effort"
 RATES = "/velocity", "/acceleration"
 
 
 @dataclass(frozen=True)
 class QposLog:
-    """The columns of arrays, but joints and their torques in place of the arrays that these are made of."""
+    """Columns of arrays, with joints and their torques in place of the arrays that they are computed from."""
 
     arrays: ArrayLog
-    """With the columns of every array by its own name: qpos[0], qpos[1]."""
+    """Log with the columns of every array by its own name: qpos[0], qpos[1]."""
     qpos: Qpos
     joints: tuple[str, ...]
     positions: tuple[str, ...]
-    """Columns of the qpos."""
+    """Names of the columns of the qpos."""
     torques: tuple[str, ...]
-    """Those of torques along the simulator's axes; none where there are none."""
+    """Names of the columns of torques along the simulator's axes; empty if there are none."""
     rates: frozenset[str]
-    """Those of velocities and accelerations."""
+    """Names of the columns of velocities and accelerations."""
     degrees: bool | None = False
 
     @classmethod
     def open(
         cls, source: ArrayFile, reading: Reading, joints: Sequence[str], order: Order, qpos_of: QposOf
     ) -> "QposLog":
-        """Find the arrays; raises LinkwiseError where none can be a qpos of that order."""
+        """Find the arrays; raise LinkwiseError where none can be a qpos of that order."""
         found = source.found()
         with within(str(source.path)):
             numbers = {array: has for array, has in found.items() if not has.texts}
@@ -79,34 +79,34 @@ class QposLog:
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """Path of the file."""
         return self.arrays.path
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """None: whose the columns are was said."""
+        """No warnings, as the order of the columns was given."""
         return ()
 
     @property
     def size(self) -> int:
-        """Samples."""
+        """Number of samples."""
         return self.arrays.size
 
     @property
     def first_row(self) -> int:
-        """1."""
+        """Number of the first row, 1."""
         return self.arrays.first_row
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """The time, the joints, their torques, and what else there is."""
+        """Names of the columns: the time, the joints, their torques, and all others."""
         time, *others = self.arrays.columns
         taken = {*self.positions, *self.torques}
         return (time, *self.joints, *self._efforts, *(name for name in others if name not in taken))
 
     @property
     def brought(self) -> frozenset[str]:
-        """Torques, and the simulator's velocities and accelerations."""
+        """Columns of torques, and of the simulator's velocities and accelerations."""
         return self.rates.union(self._efforts)
 
     @property
@@ -116,7 +116,7 @@ class QposLog:
     def read(self, columns: Sequence[int], rows: int = 65536) -> Iterator[tuple[Array, int]]:
         """Yield blocks (at most `rows`, len(columns)) and the samples read so far.
 
-        Angles go on from block to block. Raises LinkwiseError, naming the row, for what is no qpos.
+        Angles continue from block to block. Raises LinkwiseError, naming the row, for what is no qpos.
         """
         names = [self.columns[at] for at in columns]
         has_torques = not set(self._efforts).isdisjoint(names)
@@ -124,7 +124,7 @@ class QposLog:
         rest = [name for name in names if name not in (*self.joints, *self._efforts)]
         sources = [*rest, *(self.positions if is_made else ()), *(self.torques if has_torques else ())]
         end = len(rest) + len(self.positions)
-        earlier = Earlier(self.first_row)  # so that samples are told by their rows
+        earlier = Earlier(self.first_row)  # so that errors name samples by their rows
         for block, done in self.arrays.read(list(map(self.arrays.columns.index, sources)), rows):
             values = dict(zip(rest, block.T, strict=False))
             if is_made:
@@ -145,7 +145,7 @@ class QposLog:
 
 
 def _arrays(log: ArrayLog) -> list[str]:
-    """Arrays that have columns, the likeliest names first."""
+    """Return the arrays that have columns, the likeliest names first."""
     return list(dict.fromkeys(place.array for place in log.places.values()))
 
 
@@ -154,7 +154,7 @@ def _columns(log: ArrayLog, array: str) -> tuple[str, ...]:
 
 
 def _positions(log: ArrayLog, found: Mapping[str, StoredArray]) -> str:
-    """The array of positions; raises LinkwiseError where there is none, or in degrees."""
+    """Return the array of positions; raise LinkwiseError where there is none, or in degrees."""
     named = [array for array in _arrays(log) if ENDING_OF.get(word_of(array)) == ""]
     if not named:
         raise LinkwiseError("there is no array of positions; call it 'qpos'")

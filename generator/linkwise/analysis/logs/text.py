@@ -1,4 +1,4 @@
-"""The numbers of a log in text, block by block; what is not a number is named by row and column.
+"""Numbers of a text log, block by block; what is not a number is reported by row and column.
 
 Rows are numbered as an editor numbers lines, from 1, header included.
 """
@@ -18,18 +18,18 @@ from linkwise.escape import short
 from linkwise.package.load import Array
 
 LONGEST = 1 << 24
-"""Characters of a line, more than a million columns have; and about how many are in memory at once."""
+"""Most characters of a line, enough for a million columns, and about as many as are in memory at once."""
 SHOWN = 60
-"""Characters of a cell that a message shows."""
+"""Most characters of a cell that a message shows."""
 BLANK = ": blank row; delete it, or fill the gap"
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 
 
 @dataclass(frozen=True)
 class TextLog:
-    """Delimited text.
+    """A log of delimited text.
 
-    delimiter: None is any run of blanks; promised: the number of samples that the header promises, if any
+    delimiter: None for any run of blanks; promised: the number of samples that the header promises, if any
     """
 
     path: Path
@@ -43,13 +43,13 @@ class TextLog:
 
     @property
     def size(self) -> int:
-        """Bytes in the file."""
+        """Number of bytes in the file."""
         return self.path.stat().st_size
 
     def read(self, columns: Sequence[int], rows: int = 65536) -> Iterator[tuple[Array, int]]:
         """Yield blocks (at most `rows`, len(columns)) and the bytes read so far.
 
-        Raises LinkwiseError that names row and column for what is not a number, and for a file cut off.
+        Raises LinkwiseError that names row and column for what is not a number, and for a truncated file.
         """
         row, done, blank = self.first_row, 0, 0
         with self.path.open(encoding="utf-8-sig") as handle:
@@ -105,7 +105,7 @@ class TextLog:
         return line.count(self.delimiter) >= len(self.columns)
 
     def _first_fault(self, lines: list[str], columns: Sequence[int], row: int) -> LinkwiseError | None:
-        """Find the first cell that is not a number, slowly: only ever run on a faulty block."""
+        """Find the first faulty line, slowly, and return its error; only ever run on a faulty block."""
         for number, line in enumerate(lines, row):
             with within(f"{self.path}: row {number}"):
                 fault = self._fault(line, columns)
@@ -114,7 +114,7 @@ class TextLog:
         return None
 
     def _fault(self, line: str, columns: Sequence[int]) -> str | None:
-        """Say what is wrong with a line, to stand behind its number; None where nothing is."""
+        """Return the fault of a line, to stand after its number in a message; None if there is none."""
         if not line.strip():
             return BLANK
         cells = split_cells(line, self.delimiter)
@@ -135,17 +135,17 @@ class TextLog:
 
 
 def split_cells(line: str, delimiter: str | None) -> list[str]:
-    """Cells of a line, quotes taken off."""
+    """Return the cells of a line, without quotes."""
     if delimiter is None:
         return line.split()
     try:
         return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True), [])
-    except csv.Error as error:  # above all a cell longer than the module takes
+    except csv.Error as error:  # above all a cell longer than the module accepts
         raise LinkwiseError(f"cannot be read as separated values: {error}") from error
 
 
 def whole_lines(handle: TextIO, path: Path, row: int) -> Iterator[str]:
-    """Lines of a text, the first of which is number `row`; LinkwiseError for one far too long."""
+    """Yield the lines of a text, the first with number `row`; raise LinkwiseError for one far too long."""
     while line := handle.readline(LONGEST):
         if len(line) == LONGEST and not line.endswith("\n"):
             raise LinkwiseError(f"{path}: row {row} has more than {LONGEST:,} characters; is it a log?")
@@ -154,7 +154,7 @@ def whole_lines(handle: TextIO, path: Path, row: int) -> Iterator[str]:
 
 
 def _blocks(lines: Iterator[str], rows: int) -> Iterator[list[str]]:
-    """Lines in lists of at most `rows`, or fewer where they are long."""
+    """Yield lists of at most `rows` lines, or fewer where lines are long."""
     block: list[str] = []
     held = 0
     for line in lines:
@@ -168,7 +168,10 @@ def _blocks(lines: Iterator[str], rows: int) -> Iterator[list[str]]:
 
 
 def is_number(cell: str) -> bool:
-    """Whether NumPy reads it; Python's own float also takes 1_000 and digits of other scripts."""
+    """Return whether NumPy reads a cell as a number.
+
+    Python's own float also accepts 1_000 and digits of other scripts.
+    """
     try:
         float(cell)
     except ValueError:

@@ -1,4 +1,4 @@
-"""An analysis made visible: figures by name, drawn with matplotlib, and the page."""
+"""Views of an analysis: figures by name, drawn with matplotlib, and the page."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -31,8 +31,9 @@ FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {
 
 
 def draw(result: AnalysisResult, name: str) -> "Figure":
-    """Draw one of FIGURES by its name; "paper:JOINT", "causes:JOINT" or "induced:POINT" for another
-    joint or point.
+    """Draw one of FIGURES by its name.
+
+    The names "paper:JOINT", "causes:JOINT" and "induced:POINT" choose another joint or point than the first.
 
     Raises LinkwiseError for another name.
     """
@@ -45,7 +46,7 @@ def draw(result: AnalysisResult, name: str) -> "Figure":
 
 
 def figure_png(result: AnalysisResult, name: str) -> bytes:
-    """Bytes of a figure's PNG, the same on each run; raises as `draw` does."""
+    """Return the bytes of a figure's PNG, the same on each run; raise as `draw` does."""
     with styled():
         return saved(draw(result, name), "png", dpi=160)
 

@@ -1,4 +1,4 @@
-"""Numbers of what loads one joint in each phase of the movement, cause by cause, the largest first."""
+"""Mean and r.m.s. torque of one joint in each phase of the movement, by cause, the largest cause first."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from linkwise.package.load import Array
 from linkwise.plotstyle import drawn
 
 MOST = 10
-"""Joints whose motion has bars of its own; of others the sum has one."""
+"""Joints whose motions have bars of their own; all other motions are summed in one."""
 NOTHING = 1e-9
-"""Of the largest cause, below which one is but rounding."""
+"""Part of the largest cause below which a cause is only rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,16 +29,16 @@ class PhaseNumbers:
 
 @dataclass(frozen=True, eq=False)
 class CauseNumbers:
-    """What loads the joint: all causes together, the first row, and then each."""
+    """Causes of the joint's torque: all causes together in the first row, and then each."""
 
     labels: tuple[str, ...]
     phases: tuple[PhaseNumbers, ...]
     apart: bool
-    """Whether no two phases share a sample."""
+    """True if no two phases share a sample."""
 
 
 class _Tally:
-    """Sums of curves and of their products in turn over the samples of a phase."""
+    """Running sums of curves and of their products, over the samples of a phase."""
 
     def __init__(self, curves: int) -> None:
         self.count, self.sums, self.products = 0, np.zeros(curves), np.zeros((curves, curves))
@@ -49,19 +49,19 @@ class _Tally:
         self.products += values @ values.T
 
     def mean(self, rows: Array) -> Array:
-        """Of sums of curves; rows (rows, curves) say of which, by ones."""
+        """Return the mean of sums of curves; rows (rows, curves) has ones for the curves of each sum."""
         mean: Array = rows @ self.sums / self.count
         return mean
 
     def rms(self, rows: Array) -> Array:
-        """Root mean square of the same."""
+        """Return the root mean square of sums of curves, with rows as for `mean`."""
         squares = np.einsum("ra,ab,rb->r", rows, self.products, rows)
         root: Array = np.sqrt(np.maximum(squares, 0.0) / self.count)
         return root
 
 
 def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
-    """Of joint i, over every sample of the movement. Raises LinkwiseError for a phase that has none."""
+    """Return the numbers of joint i over all samples; raise LinkwiseError for a phase without any."""
     causes = causes_of(result, result.robot.plot_joints, drawn)
     asked = shown_phases(result, i)
     every, tallies = _Tally(1 + len(causes)), [_Tally(1 + len(causes)) for _ in asked]
@@ -82,13 +82,13 @@ def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
 
 
 def torque_curve(result: AnalysisResult, i: int) -> Array:
-    """The joint's torque, (1, S) in its unit."""
+    """Return the joint's torque, (1, S) in its unit."""
     found: Array = result.torque[:, [i]].T
     return found
 
 
 def _rows(causes: Sequence[Cause], every: _Tally, there: Array) -> tuple[tuple[str, ...], Array]:
-    """The largest over the movement first; of many motions the small ones are one, the last."""
+    """Return labels and rows, the largest cause over the movement first, small motions summed last."""
     alone = np.eye(1 + len(causes))
     sizes = every.rms(alone)[1:]
     order = sorted(np.flatnonzero(there).tolist(), key=lambda at: -float(sizes[at]))

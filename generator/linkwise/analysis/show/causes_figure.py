@@ -1,4 +1,4 @@
-"""What loads one joint, by cause, in each phase of the movement: stance against swing."""
+"""Figure of the causes of one joint's torque, in each phase of the movement: stance against swing."""
 
 import math
 import textwrap
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 GAP = 9.0
-"""Between a bar, its label and the panel's edge together, in points of the figure's own resolution."""
+"""Total gap between a bar, its label and the panel's edge, in pixels of the figure."""
 
 
 def causes(result: AnalysisResult, i: int) -> "Figure":
-    """The joint's torque over time, and bars of each cause's mean and r.m.s. in each phase."""
+    """Draw the joint's torque over time, and bars of each cause's mean and r.m.s. in each phase."""
     numbers = cause_numbers(result, i)
     phases = numbers.phases
     height = (0.17 * len(phases) + 0.13) * len(numbers.labels)
@@ -51,7 +51,7 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
     told = [phase.told for phase in asked_phases(result, i)]
     below = " · ".join(["motion: acceleration and velocity together", *told, foot(result)])
     figure.supxlabel(textwrap.fill(below, 140), x=0.01, ha="left", fontsize=7, color="#5A6270")
-    figure.draw_without_rendering()  # places the panels, so that labels have a width in their numbers
+    figure.draw_without_rendering()  # places the panels, so that labels have their final width
     for panel in (means, sizes):
         _make_room(panel)
     return figure
@@ -94,7 +94,7 @@ def _both_bars(means: Any, sizes: Any, numbers: CauseNumbers, unit: str) -> None
 
 
 def _bars(panel: Any, phases: list[str], numbers: list[list[float]]) -> None:
-    """A group of bars for each cause, one bar for each phase, with its number at its end."""
+    """Draw a group of bars for each cause, one bar for each phase, with its number at its end."""
     thick = 0.8 / len(phases)
     most = max(abs(value) for values in numbers for value in values)
     decimals = max(0, 2 - math.floor(math.log10(most))) if most > 0.0 else 0
@@ -111,7 +111,7 @@ def _bars(panel: Any, phases: list[str], numbers: list[list[float]]) -> None:
 
 
 def _make_room(panel: Any) -> None:
-    """Widen the panel's range until the labels beside its bars stand within it."""
+    """Widen the panel's range until the labels beside its bars fit in it."""
     ends = [float(label.xy[0]) for label in panel.texts]
     low, high = min(0.0, *ends), max(0.0, *ends)
     whole = panel.get_window_extent().width

@@ -1,4 +1,4 @@
-"""What the ground bears at each contact, link by link, and the torques of the joints that stand on it."""
+"""Figure of the ground's forces at each contact, by link, and the torques of the joints above it."""
 
 import textwrap
 from typing import TYPE_CHECKING, Any
@@ -17,18 +17,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST = 5
-"""Links with areas of their own; of others the sum has one."""
+"""Links with areas of their own; all other links are summed in one."""
 JOINTS = 3
-"""Joints drawn, those nearest to the contact."""
+"""Most joints drawn, those nearest to the contact."""
 LITTLE = 0.03
-"""Of the largest force, below which a component is not drawn."""
+"""Part of the largest force below which a component is not drawn."""
 SHADE, SHARED = "#F1F3F6", "#DADFE6"
 WIDTH, HEIGHT = 4.4, 1.75
 PARTS = ("x", "y", "z")
 
 
 def contacts(result: AnalysisResult, _: int) -> "Figure":
-    """A column of panels for each contact: forces, what links ask of it as areas, then joints' torques."""
+    """Draw a column of panels for each contact: forces, with areas by link, then joints' torques."""
     ground = result.robot.contacts
     assert ground is not None
     peaks, asked = _sizes(result)
@@ -79,7 +79,7 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
 
 
 def _forces(result: AnalysisResult) -> Array:
-    """Of each contact what each link asks of the ground, and last what else does, (contacts, 3, N + 1, S)."""
+    """Return the contact forces due to each link, and last due to all else, (contacts, 3, N + 1, S)."""
     robot, ground = result.robot, result.robot.contacts
     assert ground is not None
     first = len(robot.constraint_rows) - len(ground.rows)
@@ -100,7 +100,7 @@ def _forces(result: AnalysisResult) -> Array:
 
 
 def _sizes(result: AnalysisResult) -> tuple[Array, Array]:
-    """Largest magnitudes (contacts, 3) of forces, and magnitudes by link added up, (contacts, 3, N + 1)."""
+    """Return the largest forces (contacts, 3), and magnitudes by link summed up, (contacts, 3, N + 1)."""
     ground = result.robot.contacts
     assert ground is not None
     shape = len(ground.names), len(PARTS)
@@ -113,7 +113,7 @@ def _sizes(result: AnalysisResult) -> tuple[Array, Array]:
 
 
 def _components(result: AnalysisResult, peaks: Array) -> list[int]:
-    """Axes along which the ground bears anything, the upright one first."""
+    """Return the axes along which the ground carries any force, the upright one first."""
     sizes = peaks.max(axis=0)
     up = int(np.abs(result.robot.up).argmax())
     order = [up, *(axis for axis in range(3) if axis != up)]
@@ -121,13 +121,13 @@ def _components(result: AnalysisResult, peaks: Array) -> list[int]:
 
 
 def _joints(result: AnalysisResult, contact: int) -> list[int]:
-    """Driven joints between the base and a contact, the nearest first."""
+    """Return the driven joints between the base and a contact, the nearest to the contact first."""
     robot, ground = result.robot, result.robot.contacts
     assert ground is not None
     tree = robot.package.manifest.tree
     assert tree is not None
     frame = str(ground.contacts[contact].frame)
-    body = next(one.body for one in tree.frames if one.name == frame)
+    body = next(one.joint for one in tree.frames if one.name == frame)
     found: list[int] = []
     while body is not None:
         own = tree.bodies[body].coordinate
@@ -140,7 +140,10 @@ def _joints(result: AnalysisResult, contact: int) -> list[int]:
 def _draw_force(
     panel: Any, result: AnalysisResult, place: tuple[int, int], alone: list[int], there: list[int]
 ) -> None:
-    """place: contact and axis; alone: links with areas of their own; there: what asks anything at all."""
+    """Draw a component of a contact's force.
+
+    place: contact and axis; alone: links with areas of their own; there: links, and all else, with any force
+    """
     contact, axis = place
     _shade(panel, result, contact)
     rest = [j for j in range(len(result.robot.links) + 1) if j not in alone]
@@ -194,7 +197,7 @@ def _draw_column(panel: Any, result: AnalysisResult, at: int, **look: Any) -> No
 
 
 def _shade(panel: Any, result: AnalysisResult, contact: int) -> None:
-    """Shade when a contact is on, darker where another is too, so that who bears what is a choice."""
+    """Shade when a contact is on, darker when another is too: how they share forces is then a choice."""
     rows = [row for row, column in enumerate(result.columns) if column.quantity == "contact"]
 
     def stands(part: AnalysisResult) -> Array:

@@ -1,4 +1,4 @@
-"""Curves as they are drawn: of long movements the least and the greatest value of each piece."""
+"""Curves as they are drawn: for long movements, the least and the greatest value of each piece."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,40 +9,40 @@ from linkwise.analysis.result import AnalysisResult
 from linkwise.package.load import Array
 
 PIECES = 1500
-"""Of a figure's curve at most, about a pixel each."""
+"""Most pieces of a figure's curve, about a pixel each."""
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnCurves:
-    """Points of curves, two of each piece where it is least and greatest; all samples of short movements."""
+    """Points of curves: the least and the greatest of each piece, or all samples of short movements."""
 
     time: Array
-    """(curves, points) in s, ascending."""
+    """Times (curves, points) in s, ascending."""
     values: Array
-    """(curves, points)."""
+    """Values (curves, points)."""
     middle: Array
     """Middle of each piece, (pieces,) in s."""
     least: Array
-    """(curves, pieces)."""
+    """Least value of each piece, (curves, pieces)."""
     greatest: Array
-    """(curves, pieces)."""
+    """Greatest value of each piece, (curves, pieces)."""
 
     def only(self, rows: slice) -> "DrawnCurves":
-        """Some of the curves."""
+        """Return some of the curves."""
         return DrawnCurves(
             self.time[rows], self.values[rows], self.middle, self.least[rows], self.greatest[rows]
         )
 
 
 def piece_size(total: int, pieces: int) -> int:
-    """Samples of a piece, 1 where every sample is drawn."""
+    """Return the number of samples in a piece, 1 where every sample is drawn."""
     return 1 if total <= 2 * pieces else -(-total // pieces)
 
 
 def drawn_curves(
     result: AnalysisResult, curves: Callable[[AnalysisResult], Array], pieces: int = PIECES
 ) -> DrawnCurves:
-    """Curves (curves, S) of every part of the result, thinned to so many pieces where they are long."""
+    """Return curves (curves, S) of every part of the result, thinned to `pieces` pieces if long."""
     size = piece_size(result.total, pieces)
     made = []
     time, values = np.empty(0), np.empty((0, 0))
@@ -61,12 +61,12 @@ def drawn_curves(
 
 
 def _whole(time: Array, values: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """The fields of `DrawnCurves`, of every sample."""
+    """Return the fields of `DrawnCurves` with every sample."""
     return np.broadcast_to(time, values.shape), values, time, values, values
 
 
 def _thinned(time: Array, values: Array, size: int) -> tuple[Array, Array, Array, Array, Array]:
-    """The same of pieces."""
+    """Return the fields of `DrawnCurves` with the least and greatest value in pieces of `size` samples."""
     pieces = values.reshape(len(values), -1, size)
     at = np.sort(np.stack([pieces.argmin(axis=-1), pieces.argmax(axis=-1)], axis=-1), axis=-1)
     points = np.take_along_axis(pieces, at, axis=-1).reshape(len(values), -1)
@@ -76,7 +76,7 @@ def _thinned(time: Array, values: Array, size: int) -> tuple[Array, Array, Array
 
 
 def foot(result: AnalysisResult) -> str:
-    """How the motion was derived, and how curves are drawn where they are not drawn whole."""
+    """Return a note on how the motion was derived, and on how curves are drawn if they are thinned."""
     size = piece_size(result.total, PIECES)
     if size == 1:
         return result.provenance

@@ -1,4 +1,4 @@
-"""Accelerations of a point, or of the joints, and the shares of what causes them, over time."""
+"""Figure of the accelerations of a point, or of the joints, and the shares of their causes, over time."""
 
 import textwrap
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ TITLES = {JOINTS: "the joints", CENTRE: "the centre of mass"}
 
 
 def induced(result: AnalysisResult, point: int) -> "Figure":
-    """A panel for each component, of a frame those of its point: shares by source, and their sum."""
+    """Draw a panel for each component, for a frame those of its point: shares by source, and their sum."""
     name = result.induced[point]
     shown = components(result, point, angular=False)
     figure: Figure = extra("matplotlib.figure").Figure(

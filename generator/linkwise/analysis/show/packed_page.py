@@ -1,4 +1,4 @@
-"""What pages hold that no reader sees: numbers, texts and plotly's script, packed."""
+"""Packed contents of pages that no reader sees: numbers, texts and plotly's script."""
 
 import base64
 import gzip
@@ -10,17 +10,17 @@ from linkwise.package.load import Array
 
 
 def plotly_parts() -> dict[str, str]:
-    """Plotly's script with its notice; packed, for it is most of a page: 4.8 MB, and then 2.0."""
+    """Return plotly's script, packed, and its notice; it is most of a page: 4.8 MB, and packed 2.0 MB."""
     script = extra("plotly.offline").get_plotlyjs()
     notice = script[: script.find("*/")].replace("*", " ").strip("/ \n")
     return {"notice": " ".join(notice.split()), "plotly": packed(script)}
 
 
 def packed(text: str) -> str:
-    """A text as gzip in base64."""
+    """Return a text as gzip in base64."""
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
 
 
 def encoded(values: Array, kind: str = "<f8") -> str:
-    """Numbers as base64, float64 to the last bit unless another type is given."""
+    """Return numbers as base64, float64 to the last bit unless another type is given."""
     return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode("ascii")

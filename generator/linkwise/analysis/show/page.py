@@ -23,26 +23,26 @@ from linkwise.analysis.show.page_curves import (
 )
 from linkwise.analysis.show.poses import poses
 from linkwise.analysis.show.source_curves import components, numbers_of_curves, source_curves
-from linkwise.emit.render import render
 from linkwise.escape import printable, script_data
 from linkwise.package.load import Array
 from linkwise.plotstyle import COLOURS, GRAVITY, ON_DARK
+from linkwise.render import render
 
 NUMBERS, SAMPLES = 500_000, 1500
-"""What a page holds at most; longer logs are thinned out, and the page says so."""
+"""Most numbers and samples on a page; longer logs are thinned, and the page says so."""
 
 FIRM = 0.05
-"""Of the largest upright force, below which a centre of pressure means nothing."""
+"""Part of the largest upright force below which a centre of pressure means nothing."""
 TEMPLATE = "analysis/report.html.j2"
 
 
 def report(result: AnalysisResult) -> str:
-    """HTML of the page."""
+    """Return the page as HTML."""
     return render(TEMPLATE, view(result))
 
 
 def view(result: AnalysisResult) -> dict[str, str]:
-    """What the template needs: a title (escaped there), the data, and plotly's script with its notice."""
+    """Return the template's values: a title (escaped there), the data, and plotly's script and notice."""
     return {
         "title": f"{result.robot.name} · {result.source}",
         "data": packed(page_data(result)),
@@ -51,27 +51,26 @@ def view(result: AnalysisResult) -> dict[str, str]:
 
 
 def on_page(column: Column) -> bool:
-    """Whether a page holds a column: not power, which is the product of two that it holds.
+    """Return whether a page holds a column; it omits power, the product of two columns that it holds.
 
-    Nor does it hold forces of constraints and what else is known of contacts; of induced accelerations it
-    holds sums.
+    It also omits constraint forces and other quantities of contacts; of induced accelerations it holds sums.
     """
     return column.quantity not in (*TORQUE_OF, *FORCES, *GROUND, *INDUCED)
 
 
 def numbers_on_page(columns: Sequence[Column]) -> int:
-    """Of each sample, at most."""
+    """Return the largest count of numbers per sample on a page."""
     return sum(map(on_page, columns)) + numbers_of_curves(columns)
 
 
 def page_data(result: AnalysisResult) -> str:
-    """JSON with numbers as base64 of little-endian float64: the table's, to the last bit.
+    """Return JSON with numbers as base64 of little-endian float64: the table's, to the last bit.
 
-    Of long movements the page has evenly spaced instants, and beside them the curves' least and greatest
-    values; numbers that it states are of all samples.
+    For long movements the page has evenly spaced instants, and beside them the curves' least and greatest
+    values; the numbers that it states cover all samples.
 
-    Names are as people read them, but for those of columns, which are the table's. Joints that follow others
-    are left out.
+    Names are made printable, except those of columns, which are the table's. Joints that follow others are
+    left out.
     """
     robot = result.robot
     stride = stride_for(result.total, numbers_on_page(result.columns), NUMBERS, SAMPLES)
@@ -124,7 +123,7 @@ def page_data(result: AnalysisResult) -> str:
 
 
 def _joints(result: AnalysisResult) -> list[dict[str, str]]:
-    """Joints with torques: their names, these as plots show them, and units."""
+    """Return the joints with torques: names, names as plots show them, and units."""
     robot = result.robot
     every = list(zip(robot.joints, robot.plot_joints, robot.units, strict=True))
     return [
@@ -134,7 +133,10 @@ def _joints(result: AnalysisResult) -> list[dict[str, str]]:
 
 
 def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
-    """Poses at every sample shown: origins and centres of mass, (samples, bodies, 3) each, in m."""
+    """Return the poses at every sample shown: origins and centres of mass, (samples, bodies, 3) each, in m.
+
+    It is None for a robot without bodies.
+    """
     bodies = result.robot.bodies
     if not bodies:
         return None
@@ -155,7 +157,7 @@ def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
 
 
 def _loads(result: AnalysisResult) -> list[dict[str, str]]:
-    """At every sample shown, where each load acts and its force, (samples, 3) each, in m and N."""
+    """Return the place and the force of each load at every sample shown, (samples, 3) each, in m and N."""
     pose = model_pose(result.robot.model)
     wrenches = [borne.wrench(result.time, result.q, pose) for borne in result.loads]
     return [
@@ -166,7 +168,7 @@ def _loads(result: AnalysisResult) -> list[dict[str, str]]:
 
 @dataclass(frozen=True, eq=False)
 class _LargestForces:
-    """Over all samples, in N: any load's or contact's force, and of each contact what presses upright."""
+    """Largest forces over all samples, in N: of any load or contact, and upright of each contact."""
 
     force: float
     pressed: Array
@@ -187,7 +189,10 @@ def _largest_forces(result: AnalysisResult) -> _LargestForces:
 
 
 def _largest_power(result: AnalysisResult) -> float:
-    """Of any joint or contact into any link, or against any load, over all samples, in W."""
+    """Return the largest power of any joint or contact into any link, or against any load, in W.
+
+    It is the largest over all samples.
+    """
     kinds = ("power_link", "power_load", "power_contact")
     peaks = zip(result.columns, result.totals.peak, strict=True)
     return max((float(peak) for column, peak in peaks if column.quantity in kinds), default=0.0)
@@ -199,10 +204,10 @@ def _upright(result: AnalysisResult) -> Array:
 
 
 def _reactions(result: AnalysisResult, largest: Array) -> list[dict[str, str]]:
-    """The same of contacts, and what they feed into links, (N, samples) in W.
+    """Return place and force of each contact, (samples, 3) each, and its power into links, (N, samples) in W.
 
-    A frame that is held bears where the moment has no share along the ground. largest: what presses upright
-    at each contact, in N
+    The force on a held frame acts where the moment has no component along the ground. largest: the largest
+    upright force of each contact, in N
     """
     ground = result.robot.contacts
     if ground is None:
@@ -227,7 +232,7 @@ def _feeds(column: Column, contact: int) -> bool:
 
 
 def _induced(result: AnalysisResult, point: int, is_thinned: bool) -> dict[str, Any]:
-    """Components of what accelerates, and the curves of its sources, (rows, samples) each or thinned."""
+    """Return the components of an acceleration, and its sources' curves, (rows, samples) each or thinned."""
     name, rows = result.induced[point], components(result, point)
     pieces = page_pieces(result, CurveSums(result)) if is_thinned else result.total
     return {
@@ -248,7 +253,10 @@ def _induced(result: AnalysisResult, point: int, is_thinned: bool) -> dict[str, 
 
 
 def _work(result: AnalysisResult) -> list[dict[str, float]]:
-    """What each joint i gave to each link j and took back, in J, over all samples; loads behind links."""
+    """Return the work, in J over all samples, that each joint i gave to each link j and took back.
+
+    The loads come after the links.
+    """
     out, place = [], {i: at for at, i in enumerate(result.robot.driven)}
     for c in result.columns:
         if c.quantity == "power_link":

@@ -1,4 +1,4 @@
-"""Curves that a page can draw: their numbers over all samples, and where they are long the points drawn."""
+"""Curves that a page can draw: their numbers over all samples, and for long curves the points drawn."""
 
 from typing import Any
 
@@ -12,14 +12,14 @@ from linkwise.analysis.show.source_curves import numbers_of_curves
 from linkwise.package.load import Array
 
 PIECES, POINTS = 750, 1_000_000
-"""Of a long curve, and of all together, at most; a point takes five bytes."""
+"""Most pieces of a long curve, and most points of all curves together; a point takes five bytes."""
 MOTION = ("tau_qdd", "tau_qd")
 Key = tuple[str, int, int | None, int | None]
-"""Kind of cause ("motion" and "whole" are sums), joint and cause by their places, and link or all of them."""
+"""Kind of cause ("motion" and "whole" are sums), indices of joint and cause, and link, None for all links."""
 
 
 class CurveSums:
-    """Which columns are added up to each curve."""
+    """Sums of columns, one for each curve."""
 
     def __init__(self, result: AnalysisResult) -> None:
         place = {i: at for at, i in enumerate(result.robot.driven)}
@@ -39,7 +39,7 @@ class CurveSums:
         self._starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.intp)
 
     def __call__(self, part: AnalysisResult) -> Array:
-        """The curves (curves, S) of a part of the result."""
+        """Return the curves (curves, S) of a part of the result."""
         sums: Array = np.add.reduceat(part.values[self._rows], self._starts, axis=0)
         return sums
 
@@ -53,16 +53,16 @@ def _kinds(quantity: str) -> tuple[str, ...]:
 
 
 def page_pieces(result: AnalysisResult, sums: CurveSums) -> int:
-    """Into how many pieces long curves of a page are cut."""
+    """Return the number of pieces into which long curves of a page are cut."""
     curves = len(sums.keys) + numbers_of_curves(result.columns)
     return max(2, min(PIECES, POINTS // (2 * curves)))
 
 
 def curve_data(result: AnalysisResult, is_thinned: bool) -> dict[str, Any]:
-    """Of each curve, by its key, mean and largest magnitude over all samples, and its points if thinned.
+    """Return the mean and largest magnitude of each curve, by its key, and if thinned its points.
 
-    Those of a curve that is drawn whole are the samples on the page. The instant of the largest torque by
-    motion is told, too.
+    The mean and the largest magnitude are over all samples. The points of a curve that is drawn whole are the
+    samples on the page. The instant of the largest torque by motion is included, too.
     """
     sums = CurveSums(result)
     mean, peak = np.zeros((2, len(sums.keys)))
@@ -87,7 +87,7 @@ def curve_data(result: AnalysisResult, is_thinned: bool) -> dict[str, Any]:
 
 
 def point_data(result: AnalysisResult, found: DrawnCurves, pieces: int) -> dict[str, str]:
-    """Points of thinned curves, float32, and where each is in its piece, in 255ths of the piece."""
+    """Return the points of thinned curves, float32, and each one's place in its piece, in 255ths of that."""
     size = piece_size(result.total, pieces)
     per = found.values.shape[1] // max(1, len(found.middle))
     starts = size * (np.arange(found.values.shape[1]) // per)
@@ -97,12 +97,12 @@ def point_data(result: AnalysisResult, found: DrawnCurves, pieces: int) -> dict[
 
 
 def stride_for(samples: int, columns: int, numbers: int, most: int) -> int:
-    """Smallest stride that keeps at most `most` samples and `numbers` numbers in all."""
+    """Return the smallest stride that keeps at most `most` samples and `numbers` numbers in all."""
     return max(1, -(-samples // max(2, min(most, numbers // columns))))
 
 
 def at_instants(result: AnalysisResult, stride: int) -> Array:
-    """Every so many-th sample, the first included, (columns, kept)."""
+    """Return every `stride`-th sample, the first included, (columns, kept)."""
     seen, kept = 0, list[Array]()
     for part in result.parts():
         kept.append(part.values[:, -seen % stride :: stride].copy())

@@ -29,7 +29,7 @@ class _Panel:
 
 
 def paper(result: AnalysisResult, i: int) -> "Figure":
-    """Coordinates, τ_i, and for joint i: τ_ij, τp_ij(q̇_j), τp_ij(q̈_j), j's own coordinate."""
+    """Draw coordinates, τ_i, and for joint i τ_ij, τp_ij(q̇_j) and τp_ij(q̈_j), by j's own coordinate."""
     robot, panels = result.robot, _panels(result, i)
     carried = (*robot.plot_links, *result.load_labels)
     named = (("Joints", robot.plot_joints), ("Links and loads" if result.loads else "Links", carried))
@@ -89,9 +89,9 @@ def _panels(result: AnalysisResult, i: int) -> tuple[_Panel, ...]:
 
 
 def own_joints(result: AnalysisResult) -> tuple[int, ...]:
-    """Coordinate of each link's own joint: the manifest's, else the last that carries the link.
+    """Return the coordinate of each link's own joint: the manifest's, else the last that carries the link.
 
-    Of a joint that follows others, the last of these counts.
+    If that joint follows others, the last of these counts.
     """
     robot = result.robot
     known = {body.link: robot.borne_by([body.coordinate])[-1:] for body in robot.bodies or ()}
@@ -121,7 +121,7 @@ def _style(at: int) -> dict[str, Any]:
 
 
 def _legend_columns(names: Sequence[str]) -> int:
-    """As many as fit beside one another."""
+    """Return how many names fit side by side."""
     return max(1, min(6, 100 // (max(len(drawn(name)) for name in names) + 6)))
 
 
@@ -130,7 +130,7 @@ def _legend_rows(names: Sequence[str]) -> int:
 
 
 def _legend(axis: Any, title: str, names: Sequence[str]) -> None:
-    """One legend for all panels that show these names, on an axis of its own."""
+    """Draw one legend for all panels that show these names, on an axis of its own."""
     line = extra("matplotlib.lines").Line2D
     axis.set_axis_off()
     legend = axis.legend(
@@ -149,7 +149,7 @@ def _legend(axis: Any, title: str, names: Sequence[str]) -> None:
 
 
 def _left_out(result: AnalysisResult) -> str:
-    """What the last two panels do not show."""
+    """Return a note on what the last two panels do not show."""
     own, robot = own_joints(result), result.robot
     others = [robot.plot_joints[at] for at in robot.driven if at not in own]
     text = "The last two panels show each link's own joint only; the table and the page have every joint."

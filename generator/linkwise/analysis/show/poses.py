@@ -1,16 +1,19 @@
-"""Where a robot's bodies stand at each instant, for the stick figure."""
+"""Poses of a robot's bodies at each instant, for the stick figure."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from linkwise.check.curve_reference import displacement
+from linkwise.oracle.newton_euler import displacement
 from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry
 
 
 def poses(bodies: Sequence[BodyEntry], q: Array) -> tuple[Array, Array]:
-    """Origins and centres of mass in the base frame, each (S, bodies, 3) in m, from q (S, n) in rad or m."""
+    """Return origins and centres of mass in the base frame, each (S, bodies, 3) in m.
+
+    q: coordinates (S, n) in rad or m
+    """
     turns: list[Array] = []
     origins: list[Array] = []
     centres: list[Array] = []

@@ -1,4 +1,4 @@
-"""Power of each joint over time, and below it the work that joints gave to each link and took back."""
+"""Figure of each joint's power over time, and below it the work given to each link and taken back."""
 
 import textwrap
 from typing import TYPE_CHECKING, Any
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST, LINKS = 7, 10
-"""Joints with a curve in colour, links and loads with a part of their own; what others have is grey."""
+"""Joints with a curve in colour, and links and loads with a part of their own; all others are grey."""
 REST = "#B4BAC4"
 NOTHING = 1e-9
-"""Of the largest joint's work, below which one is but rounding."""
+"""Part of the largest joint's work below which work is only rounding."""
 MANY = 12
-"""Joints above which rows stand closer."""
+"""Number of joints above which rows stand closer."""
 
 
 def power(result: AnalysisResult, _: int) -> "Figure":
-    """Curves of P_i = τ_i q̇_i in W; bars of work in J of each joint and contact, into links and loads."""
+    """Draw curves of P_i = τ_i q̇_i in W, and bars of joints' and contacts' work on links and loads in J."""
     robot = result.robot
     joints = [drawn(robot.plot_joints[i]) for i in robot.driven]
     ground = () if robot.contacts is None else robot.contacts.names
@@ -51,7 +51,7 @@ def power(result: AnalysisResult, _: int) -> "Figure":
 
 
 def _curves(panel: Any, result: AnalysisResult, joints: list[str]) -> None:
-    """Joints that give and take most in colour, the others thin and grey behind them."""
+    """Draw the joints that give and take most in colour, and the others thin and grey behind them."""
     driven, work = list(result.robot.driven), result.joint_work
     named, rest = largest_few((work.given + work.taken)[driven], MOST)
     found = drawn_curves(result, lambda part: part.joint_power.T[driven])
@@ -69,7 +69,7 @@ def _curves(panel: Any, result: AnalysisResult, joints: list[str]) -> None:
 
 
 def _every_work(result: AnalysisResult, driven: list[int]) -> Work:
-    """What each joint, then each contact that slips, gave to each link, each load, and took back."""
+    """Return the work of each joint, then of each contact as it slips, into each link and load, and back."""
     found = []
     for side in ("given", "taken"):
         links, loads, fed = (
@@ -81,7 +81,7 @@ def _every_work(result: AnalysisResult, driven: list[int]) -> Work:
 
 
 def _bars(axis: Any, work: Work, targets: list[str]) -> None:
-    """Stacked from zero outwards, by link and load; a mark stands at the net of each joint."""
+    """Draw work stacked from zero outwards, by link and load, with a mark at the net work of each joint."""
     at = range(len(work.given))
     named, rest = largest_few(_prominence(work.given + work.taken), LINKS)
     parts = [(targets[j], tone(place), [j]) for place, j in enumerate(named)]
@@ -101,7 +101,10 @@ def _bars(axis: Any, work: Work, targets: list[str]) -> None:
 
 
 def _prominence(sizes: Array) -> Array:
-    """Shares in the work of every joint added up, for each link and load: few names tell something of all."""
+    """Return the sum, over all joints, of each link's and load's share in the joint's work.
+
+    Ranked by it, a few names say something about every joint.
+    """
     wholes = sizes.sum(axis=1, keepdims=True)
     least = NOTHING * wholes.max(initial=0.0)
     found: Array = np.divide(sizes, wholes, out=np.zeros_like(sizes), where=wholes > least).sum(axis=0)

@@ -1,4 +1,4 @@
-"""What the bars of the shares consist of: gravity, loads, what joints have of their own, motions."""
+"""Parts of the bars of the shares: gravity, loads, joints' own torques, motions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,25 +11,28 @@ from linkwise.package.load import Array
 from linkwise.plotstyle import BLUE, GRAVITY, SKY, VERMILION, drawn, tone
 
 MANY = 12
-"""Joints above which a bar has the joint's own motion, the largest other one, and the rest."""
+"""Number of joints above which a bar has the joint's own motion, the largest other one, and the rest."""
 HATCHES = {"motion": "", "acceleration": "", "velocity": "////", "own": "....", "load": "xx"}
 LARGEST, REST = "largest motion of another joint", "motions of all other joints, shares added"
 
 
 @dataclass(frozen=True, eq=False)
 class SharePart:
-    """A part of every joint's bar, of mean sizes of net torques (joints,), and how it looks."""
+    """A part of every joint's bar: mean sizes of net torques (joints,), and how it looks."""
 
     label: str
     sizes: Array
     fill: str
     hatch: str = ""
     names: tuple[str, ...] = ()
-    """Of what the part is, where that differs from joint to joint."""
+    """Name of the cause at each joint, where it differs from joint to joint."""
 
 
 def share_parts(result: AnalysisResult) -> tuple[list[SharePart], list[SharePart]]:
-    """Gravity, loads and what joints have of their own; then motions, of many joints as `MANY` tells."""
+    """Return parts for gravity, loads and joints' own torques, and parts for motions.
+
+    Motions are grouped if there are more joints than `MANY`.
+    """
     robot = result.robot
     causes = causes_of(result, robot.plot_joints, drawn, together=are_motions_whole(result))
     found = list(zip(causes, sizes(result, causes), strict=True))
@@ -39,9 +42,9 @@ def share_parts(result: AnalysisResult) -> tuple[list[SharePart], list[SharePart
 
 
 def _fixed(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
-    """Gravity, loads, and what joints have of their own."""
+    """Return parts for gravity, loads, and joints' own torques."""
     own = [cause for cause, _ in found if cause.kind == "own"]
-    tones = [*own, *(cause for cause, _ in found if cause.kind == "load")]  # as the page has them
+    tones = [*own, *(cause for cause, _ in found if cause.kind == "load")]  # in the page's order
     out = []
     for cause, values in found:
         if cause.kind == "gravity":
@@ -53,7 +56,7 @@ def _fixed(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list
 
 
 def _each(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
-    """Every motion, or its acceleration and its velocity."""
+    """Return a part for every motion, or for its acceleration and its velocity."""
     place = {k: at for at, k in enumerate(result.robot.driven)}
     return [
         SharePart(cause.label, values, tone(place[cause.number or 0]), HATCHES[cause.kind])
@@ -62,7 +65,7 @@ def _each(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[
 
 
 def _few(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
-    """Of many joints: each one's own motion, the largest other motion, and the shares of the rest."""
+    """Return parts for many joints: each one's own motion, the largest other one, and the sum of the rest."""
     driven, names = result.robot.driven, result.robot.plot_joints
     by = np.array([size for _, size in found]).T
     own = by.diagonal()

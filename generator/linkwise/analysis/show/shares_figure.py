@@ -1,4 +1,4 @@
-"""What loads each joint over the whole movement, as stacked bars."""
+"""Figure of what loads each joint over the whole movement, as stacked bars."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def shares(result: AnalysisResult, _: int) -> "Figure":
-    """Two bars for each joint: every cause, and those of the movement alone, in % of their mean sizes."""
+    """Draw two bars for each joint, in % of mean sizes: every cause, and the movement's causes alone."""
     robot = result.robot
     fixed, movement = share_parts(result)
     every = [*fixed, *movement]
@@ -55,7 +55,7 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
 
 
 def _name_beside(axis: Any, part: SharePart) -> None:
-    """Of which joint the part is, in every row, on the right."""
+    """Name the joint that causes the part, in every row, on the right."""
     beside = axis.twinx()
     beside.set_ylim(axis.get_ylim())
     beside.set_yticks(range(len(part.names)), part.names, color=part.fill)

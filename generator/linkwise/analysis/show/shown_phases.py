@@ -16,14 +16,14 @@ from linkwise.plotstyle import drawn
 
 @dataclass(frozen=True, eq=False)
 class ShownPhase:
-    """A phase or the rest of the movement beside it; without one, the whole."""
+    """A phase, or the rest of the movement beside it; without a phase, the whole movement."""
 
     label: str
     placed: PlacedPhase | None = None
     is_rest: bool = False
 
     def on(self, result: AnalysisResult) -> NDArray[np.bool_]:
-        """Which samples (S,) of a result, or a part of one, are in it."""
+        """Return which samples (S,) of a result, or a part of one, are in it."""
         if self.placed is None:
             return np.ones(len(result.time), dtype=np.bool_)
         contacts = np.array(
@@ -33,7 +33,7 @@ class ShownPhase:
 
 
 def shown_phases(result: AnalysisResult, i: int) -> list[ShownPhase]:
-    """Phases asked for; else while the one load or contact that joint i bears acts, and while it does not."""
+    """Return the phases of `asked_phases`, each followed by the rest of the movement if that is named."""
     found = []
     for phase in asked_phases(result, i):
         found.append(ShownPhase(drawn(phase.name, 34), phase))
@@ -45,7 +45,9 @@ def shown_phases(result: AnalysisResult, i: int) -> list[ShownPhase]:
 def require_samples(
     result: AnalysisResult, phases: list[ShownPhase], counts: Sequence[int]
 ) -> list[ShownPhase]:
-    """The phases, by how many samples each has; the whole movement where they tell nothing apart.
+    """Return the phases, or the whole movement where they distinguish nothing.
+
+    counts: number of samples of each phase
 
     Raises LinkwiseError for a phase that was asked for and has no sample.
     """
@@ -60,14 +62,17 @@ def _span(result: AnalysisResult) -> str:
 
 
 def asked_phases(result: AnalysisResult, i: int) -> tuple[PlacedPhase, ...]:
-    """Phases that were given; else while the one load or contact that the joint bears acts."""
+    """Return the phases that were given, else one while the only load or contact on joint i acts.
+
+    There is no phase if several act on it, or none.
+    """
     if result.phases:
         return result.phases
     ground, tree = result.robot.contacts, result.robot.package.manifest.tree
     loads = [one for one in result.loads if i in one.seat.joints]
     held: list[int] = []
     if ground is not None and tree is not None:
-        body = {frame.name: frame.body for frame in tree.frames}
+        body = {frame.name: frame.joint for frame in tree.frames}
         moved = [moving_joints(tree, body[str(one.frame)]) for one in ground.contacts]
         held = [number for number, joints in enumerate(moved) if i in joints]
     if len(loads) + len(held) != 1:

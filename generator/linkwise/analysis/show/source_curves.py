@@ -1,4 +1,4 @@
-"""Curves of an acceleration and of its shares: each joint's torque and each load alone, the rest by kind."""
+"""Curves of an acceleration and its shares: by each joint's torque and each load alone, the rest by kind."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ from linkwise.analysis.show.largest_few import largest_few
 from linkwise.package.load import Array
 
 MOST = 8
-"""Joints whose torques have curves of their own; of others the sum has one."""
+"""Joints whose torques have curves of their own; all other torques are summed in one."""
 NOTHING = 1e-9
-"""Of the largest component, below which one is but rounding."""
+"""Part of the largest component below which a component is only rounding."""
 MOTION: tuple[Quantity, ...] = ("acc_qd", "acc_constraint", "acc_kinematic")
 LOSSES: tuple[Quantity, ...] = ("acc_spring", "acc_damping", "acc_friction")
 Kind = Literal["sum", "torque", "torques", "gravity", "velocity", "passive", "load", "contact"]
@@ -24,20 +24,21 @@ Kind = Literal["sum", "torque", "torques", "gravity", "velocity", "passive", "lo
 
 @dataclass(frozen=True)
 class SourceCurve:
-    """What sources of one kind make of the components of an acceleration."""
+    """Share of the sources of one kind in the components of an acceleration."""
 
     kind: Kind
     label: str
     number: int
-    """Of a joint among those that have torques, of a load among loads; else 0."""
+    """Index of a joint among those that have torques, or of a load among loads; else 0."""
     drawn: DrawnCurves
-    """A curve for each row."""
+    """Curves, one for each row."""
 
 
 def components(result: AnalysisResult, point: int, angular: bool = True) -> dict[int, tuple[str, str]]:
-    """Name and unit of a point's components that any source accelerates, by row.
+    """Return the name and unit of a point's components that any source accelerates, by row.
 
-    In a planar robot nothing does across its plane. angular: those of a frame's turning, too
+    In a planar robot nothing accelerates across its plane. angular: include the components of a frame's
+    rotation
     """
     names = {c.row: (c.name.split("/")[2], c.unit) for c in result.columns if c.point == point}
     shares: dict[int, float] = {
@@ -55,7 +56,7 @@ def components(result: AnalysisResult, point: int, angular: bool = True) -> dict
 
 @dataclass(frozen=True)
 class _Source:
-    """What `SourceCurve` is drawn of: columns of some kinds, and of these causes, where any are named."""
+    """Source of a `SourceCurve`: columns of some quantities, and of these causes, if any are named."""
 
     kind: Kind
     label: str
@@ -67,7 +68,7 @@ class _Source:
 def source_curves(
     result: AnalysisResult, point: int, rows: Sequence[int], pieces: int = PIECES
 ) -> list[SourceCurve]:
-    """The acceleration, and what sums to it, over all samples."""
+    """Return the acceleration, and the shares that sum to it, over all samples."""
     sources = _sources(result, point, rows)
 
     def curves(part: AnalysisResult) -> Array:
@@ -89,7 +90,7 @@ def _sources(result: AnalysisResult, point: int, rows: Sequence[int]) -> list[_S
     sizes = np.zeros(len(every))
     for part in result.parts():
         sizes += [float(np.abs(_sum(part, point, rows, one)).sum()) for one in torques]
-    there = np.flatnonzero(sizes)  # contacts may leave none to a base
+    there = np.flatnonzero(sizes)  # contacts may leave no torque to a base
     alone, rest = ([int(there[at]) for at in some] for some in largest_few(sizes[there], MOST))
     found = [_Source("sum", "all together", 0, ("acc",)), *(torques[at] for at in alone)]
     if rest:
@@ -107,13 +108,13 @@ def _sources(result: AnalysisResult, point: int, rows: Sequence[int]) -> list[_S
 
 
 def numbers_of_curves(columns: Sequence[Column]) -> int:
-    """How many numbers of a sample the curves of all points hold, at most."""
+    """Return how many numbers per sample the curves of all points hold, at most."""
     kinds = {"acc": 5, "acc_tau": 1, "acc_load": 1}
     return sum(kinds.get(column.quantity, 0) for column in columns)
 
 
 def _sum(result: AnalysisResult, point: int, rows: Sequence[int], source: _Source) -> Array:
-    """A source's share (rows, S)."""
+    """Return a source's share (rows, S)."""
     out = np.zeros((len(rows), len(result.time)))
     for column, values in zip(result.columns, result.values, strict=True):
         asked = column.quantity in source.quantities and (not source.causes or column.cause in source.causes)

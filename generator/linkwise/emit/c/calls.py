@@ -1,4 +1,4 @@
-"""Calls of kernels, and where each writes: the decisions behind a robot's C file."""
+"""Calls of kernels, and the place that each writes to: the decisions behind a robot's C file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ class LinkKernels:
 
 @dataclass(frozen=True)
 class Motions:
-    """The struct of what kernels read: its fields, and its values.
+    """Struct that kernels read: its fields, and its values.
 
     These are of one sample, of block t of a tile whose rows were gathered, of block t of a tile in blocks.
     """
@@ -32,7 +32,7 @@ class Motions:
 
 @dataclass(frozen=True)
 class Moves:
-    """How values of some links in one array leave block t of a tile: calls, and their place in block `at`."""
+    """Calls that take values of some links in one array from block t of a tile; their place in block `at`."""
 
     scatter: str
     stream_rows: str
@@ -42,7 +42,7 @@ class Moves:
 
 @dataclass(frozen=True)
 class LinkCalls:
-    """How one link's kernels are called for one sample, and for the position gradient of a block.
+    """Calls of one link's kernels for one sample, and for the position gradient of a block.
 
     `links` is this one as functions of dense.h take it: first, counted from 0, and the one after the last.
     """
@@ -60,7 +60,7 @@ class LinkCalls:
 
 @dataclass(frozen=True)
 class GroupCalls:
-    """The functions of a group of links for a tile of blocks: name and statements, and how results leave.
+    """Functions of a group of links for a tile of blocks: name and statements, and how results leave.
 
     `unread` stands before those that read no motion; `places` puts results into every array of the robot, for
     block `at`.
@@ -91,7 +91,7 @@ def motions(inputs: Sequence[str]) -> Motions:
 
 
 def link_calls(link: Span, kernels: LinkKernels) -> LinkCalls:
-    """Calls of one link's kernels."""
+    """Return the calls of one link's kernels."""
     arrays = {array: array for array in link.size.arrays}
     return LinkCalls(
         link.first,
@@ -107,7 +107,7 @@ def link_calls(link: Span, kernels: LinkKernels) -> LinkCalls:
 
 
 def group_calls(links: Sequence[Span], kernels: Sequence[LinkKernels], arrays: Sequence[str]) -> GroupCalls:
-    """Calls of the kernels of `links`; `arrays` are those of the robot."""
+    """Return the calls of the kernels of `links`; `arrays` are those of the robot."""
     group = whole(links)
     into = {array: f"r[t].{array}" for array in arrays}
     mine = [(kernels[link.first - 1], link.start - group.start) for link in links]
@@ -135,7 +135,10 @@ def call(
     into: Mapping[str, str],
     start: EntryCounts | None = None,
 ) -> str:
-    """Call of a kernel for one sample, a block, or, without width, as SIZED says; outputs may begin later."""
+    """Return a call of a kernel for one sample, a block, or, without width, as SIZED says.
+
+    Outputs may begin at a later entry, `start`.
+    """
     reads = [f"{motion}{array}" for array in function.reads]
     writes = [_at(into[array], start.of(array) if start else 0) for array in function.writes]
     name = f"{function.name}_{width}" if width else f"SIZED({function.name})"
@@ -143,12 +146,12 @@ def call(
 
 
 def unread(calls: Sequence[str]) -> tuple[str, ...]:
-    """What tells a compiler that no call reads the motion: that of a constant force, say."""
+    """Return statements that mark the motion as unread where no call reads it, as for a constant force."""
     return () if any("m[t]." in text for text in calls) else ("(void)m",)
 
 
 def total(array: str) -> str:
-    """Name in C of the number of entries of an array."""
+    """Return the name in C of the number of entries of an array."""
     return NUMBERS[array]
 
 

@@ -1,4 +1,4 @@
-"""Bytes of flash that a package's C takes on a microcontroller, reckoned from its text: no compiler runs.
+"""Bytes of flash that a package's C takes on a microcontroller, estimated from its text: no compiler runs.
 
 They are of Thumb-2 as gcc makes it with -Os and LINKWISE_SMALL, for a processor whose floating-point unit has
 the number type: code and constants of all functions, those of math.h apart. The weights fit what gcc 12 made
@@ -16,19 +16,20 @@ OPERATOR = re.compile(r" [-+*/] ")
 WORD = re.compile(r" [-+*/] |x\.\w|p\[at")
 NUMBER = re.compile(r"\bR\(")
 SHORTS = re.compile(r"static const short \w+\[\] = \{([^}]*)\}")
-"""Tables of the joints above each link, which grow with its square: of 80 joints in a row 13 kB."""
+"""Pattern of tables of the joints above each link, which grow with their number squared: 13 kB for 80 in a
+row."""
 LINK = re.compile(r"^void \w+_link_\d+\(", re.MULTILINE)
 
 STRAIGHT, LOOPS, ENERGIES = (9_000, 8_300), (12_450, 10_900), (3_700, 3_700)
-"""Bytes, in double and in float, of what every robot of rigid links has, with closed forms or in loops; of
-one of energies."""
+"""Bytes, in double and in float, that every robot has: of rigid links with closed forms, of those in loops,
+and of energies."""
 
 FREE_STRAIGHT, FREE_LOOPS = (8_400, 7_900), (7_250, 7_100)
-"""Of forward dynamics and controllers, which rigid links have whose joints nothing ties."""
+"""Bytes of forward dynamics and controllers, for robots of rigid links whose joints nothing ties."""
 
 OPERATION, SETTING, OWN = (6.6, 5.35), (18, 15), (140, 135)
-"""Of an operation of closed forms, with what it loads and keeps; of a word of what sets numbers by
-its parameters; of a link, its tables and its function."""
+"""Bytes per operation of closed forms, with what it loads and keeps; per word of the code that sets numbers
+by its parameters; per link, with its tables and its function."""
 
 
 def code_size(name: str, files: Mapping[str, str]) -> CodeSize | None:

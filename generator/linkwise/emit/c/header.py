@@ -1,14 +1,14 @@
-"""What a robot's header says: which joint, link and entry is which, how to compile, and the functions."""
+"""Contents of a robot's header: its joints, links and entries, how to compile, and the functions."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from linkwise_runtime.native.native_compiler import FLAGS, TUNING
 
+from linkwise.constraints.constrained_system import constraints_of
 from linkwise.emit.c.sizes import Span
-from linkwise.emit.constrained_system import constraints_of
-from linkwise.emit.definition import joint_entries
 from linkwise.escape import c_comment, identifiers
+from linkwise.symbolic.definition import joint_entries
 from linkwise.symbolic.system import RigidSystem, System
 
 BLOCK = {"double": 8, "float": 16}
@@ -30,7 +30,7 @@ class IndexTable:
 
 @dataclass(frozen=True)
 class LimitTable:
-    """One limit of each joint: the array's name behind the robot's, what it is of, and its numbers in C."""
+    """One limit of each joint: the array's name after the robot's, its meaning, and its numbers in C."""
 
     array: str
     about: str
@@ -46,12 +46,12 @@ LIMITS = {
 
 
 def commands(name: str) -> list[str]:
-    """Command lines that compile a robot's double and float, on x86."""
+    """Return command lines that compile a robot's double and float, on x86."""
     return [" ".join(("cc", *FLAGS, TUNED, "-c", source)) for source in (f"{name}.c", f"{name}f.c")]
 
 
 def cpp_command(name: str) -> str:
-    """Command line that compiles a robot's double as C++, on x86."""
+    """Return the command line that compiles a robot's double as C++, on x86."""
     flags = (flag.replace("-std=c99", "-std=c++17") for flag in FLAGS)
     return " ".join(("c++", "-x", "c++", *flags, TUNED, "-c", f"{name}.c"))
 
@@ -82,14 +82,14 @@ def joint_lines(system: System) -> Iterator[str]:
 
 
 def tie_lines(system: System) -> list[str]:
-    """Return a table: what ties joints, by name, and what it holds; empty for an open tree."""
+    """Return a table: what ties joints, by name, and what each holds; empty for an open tree."""
     found = constraints_of(system.robot) if isinstance(system, RigidSystem) else ()
     rows = [[c_comment(word) for word in row] for row in found]
     return list(aligned(rows)) if rows else []
 
 
 def limit_tables(system: System) -> Iterator[LimitTable]:
-    """Return the limits of the joints as arrays of C, and what they are of."""
+    """Yield the limits of the joints as arrays of C, and their meaning."""
     entries = joint_entries(system)
     for what, about in LIMITS.items():
         none = "-HUGE_VAL" if what == "lower" else "HUGE_VAL"
@@ -98,7 +98,7 @@ def limit_tables(system: System) -> Iterator[LimitTable]:
 
 
 def frame_lines(system: RigidSystem) -> Iterator[tuple[str, str]]:
-    """Return each frame's constant, behind the robot's own name, and its name and what carries it."""
+    """Yield each frame's constant, without the robot's own name, with its name and what carries it."""
     frames = system.robot.named_frames
     constants = identifiers([frame.name for frame in frames], "FRAME_")
     for constant, frame in zip(constants, frames, strict=True):
@@ -114,7 +114,7 @@ def parameter_lines(system: System) -> list[str]:
 
 
 def index_tables(system: System, links: Sequence[Span]) -> Iterator[IndexTable]:
-    """Which (i, j, k) or (i, j) each entry is, one line for each i of each link."""
+    """Yield tables of the (i, j, k) or (i, j) of each entry, one line for each i of each link."""
     paths = [(link, [k + 1 for k in system.path(link.first - 1)]) for link in links]
     for array in ("c2", "c1", "g", "h1"):
         lines = [
@@ -129,14 +129,14 @@ def index_tables(system: System, links: Sequence[Span]) -> Iterator[IndexTable]:
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Return lines with their columns below each other."""
+    """Yield lines with their columns below each other."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         yield "   ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
 
 
 def _partners(array: str, path: Sequence[int], place: int) -> Sequence[int | None]:
-    """Joints k that joint i, at `place` of the path, has entries with."""
+    """Return the joints k that joint i, at `place` of the path, has entries with."""
     return [None] if array == "g" else path[place:] if array == "c2" else path
 
 
@@ -145,7 +145,7 @@ def _entry(i: int, j: int, k: int | None) -> str:
 
 
 def _run(path: Sequence[int]) -> str:
-    """Return a path: 1 to 7, or its joints one by one."""
+    """Return a path in words: as a range, 1 to 7, or joint by joint."""
     if len(path) > 2 and path[-1] - path[0] == len(path) - 1:
         return f"{path[0]} to {path[-1]}"
     return " ".join(map(str, path))

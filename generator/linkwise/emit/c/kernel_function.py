@@ -1,4 +1,4 @@
-"""One C function over W samples, from the nodes that it computes."""
+"""A C function over W samples, from the nodes that it computes."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ READS = ("q", "qd", "qdd", "sine", "cosine", "p")
 
 @dataclass(frozen=True)
 class Output:
-    """A value to be stored: in which array, as which entry, and what it is called there."""
+    """A value to be stored: its array, its entry there, and its label."""
 
     array: str
     entry: int
@@ -44,20 +44,20 @@ class KernelFunction:
 
     @property
     def parameters(self) -> str:
-        """Declarations of its parameters; outputs are told apart from cosines, which are c1, c2, … too."""
+        """Declarations of its parameters."""
         reads = [f"const real *RESTRICT {array}" for array in self.reads]
-        writes = [f"real *RESTRICT {array}_out" for array in self.writes]
+        writes = [f"real *RESTRICT {array}" for array in self.writes]
         return ",\n    ".join(filter(None, (", ".join(reads), ", ".join(writes))))
 
 
 def turned(kernel: Kernel) -> dict[Node, str]:
-    """Names of the sines and cosines of the coordinates, which kernels are given."""
+    """Return the names of the sines and cosines of the coordinates, which kernels are given."""
     g = kernel.graph
-    return {g.call(f, q): f"{f[0]}{k + 1}" for k, q in enumerate(kernel.inputs.q) for f in ("sin", "cos")}
+    return {g.call(f, q): f"{f}{k + 1}" for k, q in enumerate(kernel.inputs.q) for f in ("sin", "cos")}
 
 
 def decomposition_outputs(kernel: Kernel, forms: LinkForms, number: int) -> list[Output]:
-    """Outputs of the full decomposition of link `number`."""
+    """Return the outputs of the full decomposition of link `number`."""
     return [
         *outputs("c2", forms.acceleration, number),
         *outputs("c1", forms.velocity, number),
@@ -70,7 +70,10 @@ def decomposition_outputs(kernel: Kernel, forms: LinkForms, number: int) -> list
 def outputs(
     array: str, values: Mapping[int, Node] | Mapping[tuple[int, int], Node], number: int
 ) -> Iterator[Output]:
-    """One quantity of link `number`; keys are i, or i and k, counted from 0, and labels count from 1."""
+    """Yield the outputs of one quantity of link `number`.
+
+    Keys are i, or i and k, counted from 0, and labels count from 1.
+    """
     for entry, (key, node) in enumerate(values.items()):
         i, *k = key if isinstance(key, tuple) else (key,)
         indices = (i + 1, number, *(x + 1 for x in k))
@@ -84,7 +87,7 @@ def kernel_function(
     what: str,
     results: Sequence[Output],
 ) -> KernelFunction:
-    """C function that stores `results`; sines and cosines are inputs."""
+    """Return the C function that stores `results`; sines and cosines are inputs."""
     given = turned(kernel)
     nodes = [output.node for output in results]
     code = straight_line(kernel.graph, nodes, CPrinter(), given)
@@ -112,22 +115,22 @@ def kernel_function(
 
 
 def symbols(system: System) -> dict[str, str]:
-    """Return where each symbol that a kernel may use comes from."""
-    arrays = {"q": "q", "qd": "qd", "qdd": "qdd", "s": "sine", "c": "cosine"}
+    """Return the source in C of each symbol that a kernel may use."""
+    arrays = {"q": "q", "qd": "qd", "qdd": "qdd", "sin": "sine", "cos": "cosine"}
     sources = {
         f"{prefix}{k + 1}": f"{array}[{k} * W + b]"
         for prefix, array in arrays.items()
         for k in range(len(system.coordinates))
     }
-    # By name: where a parameter stands depends on the robot, and a link's file must not.
+    # By name: a parameter's position depends on the robot, and a link's file must not.
     return sources | {name: f"p[at_{name}]" for name in parameter_names(system).values()}
 
 
 def _statements(code: Code, results: Sequence[Output]) -> Iterator[str]:
-    """Assignments, and each output stored as soon as it is known: fewer values are then alive at a time."""
+    """Yield assignments, each output stored as soon as it is known: fewer values are then alive at a time."""
     waiting: dict[int, list[str]] = {}
     for output, text, ready in zip(results, code.outputs, code.ready, strict=True):
-        place = f"{output.array}_out[{output.entry} * W + b]"
+        place = f"{output.array}[{output.entry} * W + b]"
         waiting.setdefault(ready, []).append(f"{place} = {text}; /* {output.label} */")
     yield from waiting.get(0, ())
     for number, (variable, text) in enumerate(code.assignments, 1):

@@ -10,31 +10,33 @@ from linkwise.robot.robot import Joint
 from linkwise.symbolic.system import RigidSystem
 
 FRAME, TURN, PLACE, SLIDE = 141, 1, 18, 6
-"""A joint's frame and axis; its angle; its place and what a slide adds to it, where places matter."""
+"""Operations of a joint's frame and axis; of its angle; of its place, and of a slide there, where places
+matter."""
 SUM = 12
-"""A column that is the sum of two."""
+"""Operations of a column that is the sum of two."""
 LINK = 216
-"""A link's inertia and motion."""
+"""Operations of a link's inertia and motion."""
 COLUMN = 87
-"""How a coordinate moves a link, and the wrenches of its c2 and c1."""
+"""Operations of a coordinate's motion of a link, and of the wrenches of its c2 and c1."""
 ALONG = 11
-"""A wrench along a motion: c2, c1 and tau."""
+"""Operations of a wrench along a motion: c2, c1 and tau."""
 WEIGHT = 5
-"""A force along a motion: g."""
+"""Operations of a force along a motion: g."""
 MOVES = 15
-"""How a joint moves a link."""
+"""Operations of a joint's motion of a link."""
 SECOND_CHANGE = 69
-"""The second change of a joint's axis."""
+"""Operations of the second change of a joint's axis."""
 GRADIENT = 111
-"""The wrenches of a joint's c0."""
+"""Operations of the wrenches of a joint's c0."""
 BEND = 78
-"""How a joint's axis changes by its own coordinate, of each where one follows a curve."""
+"""Operations of the change of a joint's axis by its own coordinate, for each where one follows a curve."""
 SHIFT, POWER = 1, 8
-"""A curve at a coordinate: what that is behind the piece's start, and each power with its derivatives."""
+"""Operations of a curve at a coordinate: of its offset in the piece, and of each power with its
+derivatives."""
 
 
 def link_costs(system: RigidSystem) -> list[int]:
-    """Operations of each link's decomposition by itself."""
+    """Return the operations of each link's decomposition by itself."""
     frames, sums = _frames(system), columns(system).sums
     costs = []
     for j, link in enumerate(system.links):
@@ -45,19 +47,19 @@ def link_costs(system: RigidSystem) -> list[int]:
 
 
 def decomposition_cost(system: RigidSystem) -> int:
-    """Operations of the decomposition of all links."""
+    """Return the operations of the decomposition of all links."""
     links = range(len(system.links))
     return _motion(system) + sum(_link(system, j) for j in links)
 
 
 def torque_cost(system: RigidSystem) -> int:
-    """Operations of the torques alone."""
+    """Return the operations of the torques alone."""
     lengths = [len(system.path(j)) for j in range(len(system.links))]
     return _motion(system) + sum(LINK + d * (MOVES + ALONG) for d in lengths)
 
 
 def gradient_cost(system: RigidSystem) -> int:
-    """Operations of the position gradient."""
+    """Return the operations of the position gradient."""
     chains = [len(link.chain) for link in system.links]
     second = (SECOND_CHANGE + 6 * system.curved) * len(system.robot.links)
     step = MOVES + ALONG + 1
@@ -70,7 +72,7 @@ def _motion(system: RigidSystem) -> int:
 
 
 def _frames(system: RigidSystem) -> list[int]:
-    """Operations of each frame."""
+    """Return the operations of each frame."""
     joints, curves = [link.joint for link in system.robot.links], curve_tables(system)
     costs = [FRAME + _by_kind(joint, matters) for joint, matters in zip(joints, placed(system), strict=True)]
     if curves:

@@ -1,4 +1,4 @@
-"""A kernel in loops in C: the robot in tables, and fixed files that go by them."""
+"""A kernel in loops in C: the robot in tables, and fixed files that work on them."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -14,12 +14,12 @@ from linkwise.emit.c.robot_tables import path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
 from linkwise.emit.c.stack import loops_stack, small_stack
 from linkwise.emit.derivation import Derivation
-from linkwise.emit.render import render
+from linkwise.render import render
 from linkwise.symbolic.system import RigidSystem
 
 
 def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
-    """Paths inside the package and texts.
+    """Yield paths inside the package and texts.
 
     Raises TypeError for what is not rigid bodies.
     """
@@ -45,7 +45,7 @@ def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
 
 
 def _robot_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
-    """Fields of NAME.c but for its name."""
+    """Return the fields of NAME.c but for its name."""
     robot, motion = whole(links), given(system)
     return path_fields(system) | {
         "n": len(system.coordinates),

@@ -1,4 +1,4 @@
-"""The functions of a robot's header: their parameters, the shapes of these, and what a sample costs."""
+"""Functions of a robot's header: their parameters, the shapes of these, and the cost of a sample."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ NUMBERS = {"c2": "C2", "c1": "C1", "g": "G", "tau": "G", "h1": "H1", "c0": "C1"}
 
 @dataclass(frozen=True)
 class Shapes:
-    """Shapes of what functions read and of what they write: in rows of samples, in blocks, for one sample.
+    """Shapes of what functions read and write: in rows of samples, in blocks, for one sample.
 
     Coefficients are those of a motion without qdd, here called at rest.
     """
@@ -61,17 +61,17 @@ def pointers(kind: str, arrays: Iterable[str]) -> str:
 
 
 def at_position(inputs: Iterable[str]) -> list[str]:
-    """Arrays of what takes no velocity nor acceleration."""
+    """Return the arrays of functions that take no velocity nor acceleration."""
     return [array for array in inputs if array not in ("qd", "qdd")]
 
 
 def under_torque(inputs: Iterable[str]) -> list[str]:
-    """Arrays of what takes torques in place of accelerations."""
+    """Return the arrays of functions that take torques in place of accelerations."""
     return ["tau" if array == "qdd" else array for array in inputs]
 
 
 def functions(inputs: Sequence[str], robot: Span, links: Sequence[Span]) -> Iterator[Functions]:
-    """Functions of double, then of float; `inputs` are the arrays that every function takes."""
+    """Yield the functions of double, then of float; `inputs` are the arrays that every function takes."""
     for kind, suffix, block in (("double", "", "BLOCK"), ("float", "f", "BLOCKF")):
         yield Functions(
             f"All links, many samples, in {kind}",
@@ -105,7 +105,7 @@ def functions(inputs: Sequence[str], robot: Span, links: Sequence[Span]) -> Iter
 
 
 def cost(kernels: Iterable[KernelFunction]) -> int:
-    """Additions, multiplications and divisions for each sample of all these functions."""
+    """Return the additions, multiplications and divisions per sample of all these functions."""
     return sum(kernel.arithmetic for kernel in kernels)
 
 
@@ -114,7 +114,7 @@ def _motion(parameters: bool, shape: str, arrays: str = "q, qd, qdd") -> str:
 
 
 def _shapes(shapes: Iterable[tuple[str, str]]) -> str:
-    """Arrays and their shapes, those of one shape together."""
+    """Return arrays and their shapes, those of one shape together."""
     return ", ".join(
         f"{', '.join(array for array, _ in same)} ({shape})" for shape, same in groupby(shapes, itemgetter(1))
     )

@@ -1,4 +1,4 @@
-"""What a robot's header says of each quantity: what it is, and its unit."""
+"""Table of the quantities in a robot's header: the meaning of each, and its unit."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -8,7 +8,7 @@ from linkwise.package.potential_word import potential_word
 from linkwise.symbolic.system import EnergySystem, System
 
 FORCES = {"rad": "N m", "m": "N"}
-"""Units of what acts at a joint, by the unit of its coordinate."""
+"""Units of the force or torque at a joint, by the unit of its coordinate."""
 INERTIAS = {
     ("rad", "rad"): "kg m^2",
     ("rad", "m"): "kg m",
@@ -26,7 +26,7 @@ STIFFNESSES = {
 
 
 def quantity_lines(system: System, linear: bool) -> Iterator[str]:
-    """Return a table: each quantity, its unit for every two units of joints i and k, and what it is.
+    """Return a table: each quantity, its unit for every two units of joints i and k, and its meaning.
 
     `linear` says whether an energy has terms linear in the velocities.
     """
@@ -51,7 +51,7 @@ def quantity_lines(system: System, linear: bool) -> Iterator[str]:
 
 
 def causes(system: System) -> str:
-    """Say what a link's torques come from."""
+    """Return the causes of a link's torques, in words."""
     return (
         f"by its inertia and {'its potential energy' if isinstance(system, EnergySystem) else 'its weight'}"
     )
@@ -63,5 +63,5 @@ def _velocity(linear: bool) -> str:
 
 
 def potential(system: System) -> str:
-    """What g is called."""
+    """Return the word for g."""
     return potential_word(not isinstance(system, EnergySystem))

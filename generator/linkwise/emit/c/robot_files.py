@@ -1,4 +1,4 @@
-"""What a robot's own C file and its header are rendered from."""
+"""Fields from which a robot's own C file and its header are rendered."""
 
 from collections.abc import Sequence
 from itertools import accumulate
@@ -15,7 +15,7 @@ from linkwise.symbolic.system import RigidSystem, System
 
 
 def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKernels]) -> dict[str, Any]:
-    """Fields of NAME.c but for its name."""
+    """Return the fields of NAME.c but for its name."""
     robot = whole(links)
     arrays = robot.size.arrays
     n = len(system.coordinates)
@@ -62,7 +62,7 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
 
 
 def path_fields(system: System) -> dict[str, Any]:
-    """Fields of NAME.c that say which joints move each link."""
+    """Return the fields of NAME.c that say which joints move each link."""
     paths = [system.path(j) for j in range(len(system.links))]
     return {
         "paths": [", ".join(map(str, path)) for path in paths if path],
@@ -72,7 +72,7 @@ def path_fields(system: System) -> dict[str, Any]:
 
 
 def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, Any]:
-    """Fields of NAME.h but for its name, its costs and its stack."""
+    """Return the fields of NAME.h but for its name, its costs and its stack."""
     robot = whole(links)
     linear = bool(robot.size.h1)
     return {
@@ -102,7 +102,7 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
 
 
 def costs(kernels: Sequence[LinkKernels]) -> dict[str, int]:
-    """Arithmetic operations of a sample in NAME.h."""
+    """Return the arithmetic operations of a sample in NAME.h."""
     return {
         "decomposition_cost": cost(k.decomposition for k in kernels),
         "torque_cost": cost(k.torque for k in kernels),
@@ -111,26 +111,26 @@ def costs(kernels: Sequence[LinkKernels]) -> dict[str, int]:
 
 
 def most_kept(kernels: Sequence[LinkKernels]) -> int:
-    """Return how many values a kernel keeps at a time, at most: a fourth of those that it computes."""
+    """Return how many values a kernel keeps at a time, at most: inputs, and a fourth of its statements."""
     functions = (f for k in kernels for f in (k.decomposition, k.torque, k.position_gradient))
     return max(len(f.inputs) + len(f.statements) // 4 for f in functions)
 
 
 def given(system: System) -> tuple[str, ...]:
-    """Arrays that every function takes."""
+    """Return the arrays that every function takes."""
     return ("q", "qd", "qdd", "p") if system.parameters else ("q", "qd", "qdd")
 
 
 def rows_from_s(inputs: Sequence[str]) -> str:
-    """Return those arrays from row s on; run-time parameters are the same for all rows."""
+    """Return the arrays from row s on; run-time parameters are the same for all rows."""
     return ", ".join(array if array == "p" else f"{array} + s * N" for array in inputs)
 
 
 def free(system: System) -> bool:
-    """Whether each joint may have an impedance of its own: nothing ties one to others."""
+    """Return whether each joint may have an impedance of its own: nothing ties one to others."""
     return not (isinstance(system, RigidSystem) and (system.robot.ties or system.robot.couplings))
 
 
 def totals(size: EntryCounts) -> list[tuple[str, int]]:
-    """Names in C and values of the robot's numbers of entries."""
+    """Return names in C and values of the robot's numbers of entries."""
     return [(total(array), size.of(array)) for array in size.arrays if array != "tau"]

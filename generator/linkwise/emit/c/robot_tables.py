@@ -1,4 +1,4 @@
-"""A tree of rigid bodies as tables in C: what a kernel in loops goes by."""
+"""Tables in C of a tree of rigid bodies, which a kernel in loops reads."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
@@ -22,7 +22,7 @@ PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 @dataclass(frozen=True)
 class Columns:
-    """What moves each link, one column for each coordinate of its path, ascending: see tree.h.
+    """Columns that move each link, one for each coordinate of its path, ascending: see tree.h.
 
     sums: columns beyond those of joints, as (column, joint's column), for joints that follow one coordinate
     """
@@ -33,14 +33,14 @@ class Columns:
 
 @dataclass(frozen=True)
 class NamedFrame:
-    """A frame that has a name: in which frame it stands, turned how, and where, as rows of two tables."""
+    """A named frame as rows of two tables: the frame that it stands in with its rotation, and its place."""
 
     standing: str
     place: str
 
 
 def columns(system: RigidSystem) -> Columns:
-    """Columns of a robot."""
+    """Return the columns of a robot."""
     frames = len(system.robot.links)
     found: dict[tuple[int, int], int] = {}
     of_links = []
@@ -54,7 +54,7 @@ def columns(system: RigidSystem) -> Columns:
 
 
 def path_spans(system: RigidSystem) -> tuple[Span, ...]:
-    """Return each link by itself, in order, all its values being there whether or not they are zero."""
+    """Return each link by itself, in order; all its values are there, whether or not they are zero."""
     sizes = []
     for j in range(len(system.links)):
         d = len(system.path(j))
@@ -67,7 +67,7 @@ def path_spans(system: RigidSystem) -> tuple[Span, ...]:
 
 
 def table_view(system: RigidSystem) -> dict[str, Any]:
-    """Fields of NAME_tree.h but for its name."""
+    """Return the fields of NAME_tree.h but for its name."""
     found, robot, links = columns(system), system.robot, path_spans(system)
     return {
         "frames": len(robot.links),
@@ -93,7 +93,7 @@ def table_view(system: RigidSystem) -> dict[str, Any]:
 
 
 def formulas(system: RigidSystem, numbers: Iterable[tuple[str, Scalar]]) -> list[str]:
-    """Statements that set those of the numbers in `x` that hang on run-time parameters, which `p` holds."""
+    """Return statements that set the numbers in `x` that depend on run-time parameters, which `p` holds."""
     lower, _ = lowering(system)
     places = [(place, value) for place, value in numbers if isinstance(value, sp.Expr) and value.free_symbols]
     code = straight_line(lower.graph, [lower(value) for _, value in places], CPrinter())
@@ -106,7 +106,10 @@ def formulas(system: RigidSystem, numbers: Iterable[tuple[str, Scalar]]) -> list
 
 
 def placed(system: RigidSystem) -> list[bool]:
-    """Whether the place of each frame matters: what nothing before it turns may as well be at the origin."""
+    """Return whether the place of each frame matters.
+
+    A frame that nothing before it turns may as well be at the origin.
+    """
     turned: list[bool] = []
     matters = []
     for link in system.robot.links:
@@ -144,7 +147,7 @@ class CurveRows:
 
 
 def curve_tables(system: RigidSystem) -> CurveRows | None:
-    """Tables of a robot; None where no joint follows a curve."""
+    """Return the tables of a robot's curves; None where no joint follows a curve."""
     joints = [link.joint for link in system.robot.links]
     curves = [joint.curve for joint in joints if joint.curve]
     if not curves:
@@ -168,7 +171,7 @@ def _bodies(system: RigidSystem) -> Iterator[str]:
 
 
 def _passive(system: RigidSystem) -> Iterator[str]:
-    """What the joints of each coordinate have of their own; nothing where no joint has any."""
+    """Yield the passive properties of each coordinate's joints; nothing where no joint has any."""
     joints = [PassiveJoint(a.joint, a.coordinate, a.ratio, **asdict(a.own)) for a in system.robot.passive]
     if joints:
         sums = passive_sums(joints, len(system.coordinates))
@@ -187,13 +190,13 @@ def _named_frames(system: RigidSystem) -> Iterator[NamedFrame]:
 
 
 def _offsets(system: RigidSystem) -> Iterator[tuple[str, Scalar]]:
-    """The same of `struct offsets`."""
+    """Yield every number that may depend on parameters, by its place in `struct offsets`."""
     for number, frame in enumerate(system.robot.named_frames):
         yield from _entries(f"place[{number}]", frame.translation)
 
 
 def _places(system: RigidSystem) -> Iterator[tuple[str, Scalar]]:
-    """Every number that may hang on parameters, by its place in `struct numbers`."""
+    """Yield every number that may depend on parameters, by its place in `struct numbers`."""
     for f, frame in enumerate(system.robot.links):
         yield from _entries(f"placings[{f}].place", frame.joint.translation)
     for j, link in enumerate(system.links):

@@ -1,18 +1,21 @@
-"""Headers that are the same for every robot, in a folder of their own: those that its files include."""
+"""Headers that are the same for every robot, in a folder of their own, as its files include them."""
 
 import re
 from collections.abc import Iterable, Iterator
 from importlib import resources
 
 FOLDER = "linkwise"
-"""Of a package's C."""
+"""Folder of these headers in a package's C."""
 INCLUDED = re.compile(rf'^#include "{FOLDER}/(\w+\.h)"', re.MULTILINE)
 INNER = re.compile(r'^#include "(\w+\.h)"', re.MULTILINE)
-"""Of headers beside the file that includes them: of each other, and of a robot's own."""
+"""Pattern of headers beside the file that includes them: shared ones, and a robot's own."""
 
 
 def with_headers(files: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
-    """A robot's C, paths inside the package and texts, and the headers that it includes, or that these do."""
+    """Yield a robot's C, paths inside the package and texts, and all headers that it includes.
+
+    Headers that these include are among them.
+    """
     left, found = [], dict[str, str]()
     for path, text in files:
         yield path, text

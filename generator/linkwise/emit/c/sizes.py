@@ -1,4 +1,4 @@
-"""How many values a link's results take, and where they lie among those of the robot."""
+"""Numbers of values in a link's results, and their place among those of the robot."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,13 +9,13 @@ ARRAYS = ("c2", "c1", "g", "tau", "h1")
 """Arrays of the decomposition in the order of the API; c0 has as many values as c1."""
 
 GROUP = 384
-"""Values of a sample that wait in blocks at a time."""
+"""Most values of a sample that wait in blocks at a time."""
 
 TILE = 8
 """Blocks that one kernel works on before the next does.
 
 The kernels of a robot of seven joints are some 40 kB of code, more than a first-level cache holds: so they
-come from the second-level cache once a tile, in which its results, 192 KiB at most, wait too.
+come from the second-level cache once per tile, in which its results, 192 KiB at most, wait too.
 """
 
 
@@ -35,7 +35,7 @@ class EntryCounts:
         return EntryCounts(self.c2 - other.c2, self.c1 - other.c1, self.g - other.g, self.h1 - other.h1)
 
     def of(self, array: str) -> int:
-        """Number of values in an array, or where it begins."""
+        """Return the number of values in an array, or where it begins."""
         return {
             "c2": self.c2,
             "c1": self.c1,
@@ -90,7 +90,7 @@ def tile(waiting: EntryCounts) -> int:
 
 
 def groups(links: Sequence[Span]) -> Iterator[tuple[Span, ...]]:
-    """Links whose results stay in the cache, block by block, until they turn into rows together.
+    """Yield groups of links whose results stay in the cache, by block, until they turn into rows together.
 
     A group has at most GROUP values; a link that is larger is one by itself.
     """
@@ -104,10 +104,10 @@ def groups(links: Sequence[Span]) -> Iterator[tuple[Span, ...]]:
 
 
 def most_counts(sizes: Sequence[EntryCounts]) -> EntryCounts:
-    """Return room for any of these."""
+    """Return counts that are large enough for any of these."""
     return EntryCounts(*(max(size.of(array) for size in sizes) for array in ("c2", "c1", "g", "h1")))
 
 
 def waiting_counts(links: Sequence[Span]) -> EntryCounts:
-    """Return room for any group of links: what waits of a block."""
+    """Return counts that are large enough for any group of links: what waits of a block."""
     return most_counts([whole(part).size for part in groups(links)])

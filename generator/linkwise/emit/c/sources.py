@@ -22,13 +22,13 @@ from linkwise.emit.c.robot_tables import table_view
 from linkwise.emit.c.sizes import link_spans
 from linkwise.emit.c.stack import small_stack, straight_stack
 from linkwise.emit.derivation import Derivation
-from linkwise.emit.render import render
 from linkwise.escape import c_comment
+from linkwise.render import render
 from linkwise.symbolic.system import RigidSystem, System
 
 
 def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
-    """Paths inside the package and texts."""
+    """Yield paths inside the package and texts."""
     system, name = derivation.system, derivation.package
     kernels = []
     for number, kernel in enumerate(derivation.kernels, 1):

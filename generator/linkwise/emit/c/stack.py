@@ -19,16 +19,16 @@ OWN = 8_000
 """Bytes for what functions keep beside their arrays."""
 
 OWN_SMALL = 1_500
-"""Bytes of that where samples are computed one by one."""
+"""Bytes for what functions keep beside their arrays where samples are computed one by one."""
 
 MOST_STACK = 5_000_000
-"""Bytes of stack that a function may take: a thread has 8 MiB as a rule, and its callers need some."""
+"""Most bytes of stack of a function: a thread has 8 MiB as a rule, and its callers need some."""
 
 MOST_RESULTS = 2_000_000
-"""Results of a sample, of which NAME_index.h has a line of some 13 bytes each."""
+"""Most results of a sample, for each of which NAME_index.h has a line of some 13 bytes."""
 
 MOST_INT = 2**31 - 1
-"""Entries that C counts in an int."""
+"""Most entries that C counts in an int."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class SmallStack:
     """Bytes that functions take at most with LINKWISE_SMALL, calls among them included, as text.
 
     motion: those of torques, coefficients, gradients and regressors, in double and in float
-    control: all of them
+    control: those of all functions
     """
 
     motion: tuple[str, str]
@@ -44,7 +44,7 @@ class SmallStack:
 
 
 def small_stack(system: System, links: tuple[Span, ...], kept: int) -> SmallStack:
-    """Bytes that functions take where samples are computed one by one.
+    """Return the bytes that functions take where samples are computed one by one.
 
     `links` are results, and `kept` numbers that a kernel of closed forms may have to keep.
     """
@@ -58,7 +58,7 @@ def _small(values: int) -> tuple[str, str]:
 
 
 def _motion_values(system: System, links: tuple[Span, ...], kept: int) -> int:
-    """Numbers that torques, coefficients, gradients and regressors of one sample keep."""
+    """Return how many numbers torques, coefficients, gradients and regressors of one sample keep."""
     n, one = len(system.coordinates), most_counts([link.size for link in links])
     values = 7 * n + one.total + kept
     if not isinstance(system, RigidSystem):
@@ -69,7 +69,7 @@ def _motion_values(system: System, links: tuple[Span, ...], kept: int) -> int:
 
 
 def _moved(system: RigidSystem) -> int:
-    """Numbers of the motion of all frames, and of what it is made from."""
+    """Return how many numbers the motion of all frames has, and what it is made from."""
     frames = len(system.robot.links)
     columned = frames + len(columns(system).sums)
     curved = 16 * frames if any(link.joint.curve for link in system.robot.links) else 0
@@ -77,7 +77,7 @@ def _moved(system: RigidSystem) -> int:
 
 
 def loops_stack(system: RigidSystem) -> int:
-    """Bytes that the functions of a kernel in loops take at most."""
+    """Return the bytes that the functions of a kernel in loops take at most."""
     n, frames, longest = len(system.coordinates), len(system.robot.links), _longest(system)
     # motion: frames with 24 numbers each, and columns; wrenches; q, qd, qdd and angles, sines, cosines.
     moved = _moved(system)
@@ -94,25 +94,28 @@ def loops_stack(system: RigidSystem) -> int:
 
 
 def control_stack(system: System, links: tuple[Span, ...]) -> int:
-    """Bytes that what control needs of one sample takes at most."""
+    """Return the bytes that functions for control of one sample take at most."""
     return 8 * _control_values(system, links) + OWN
 
 
 def _control_values(system: System, links: tuple[Span, ...]) -> int:
-    """Numbers that it keeps: motion, bodies, matrices of n rows; of energies, the results of all `links`."""
+    """Return how many numbers functions for control keep: motion, bodies, matrices of n rows.
+
+    For energies they keep the results of all `links`.
+    """
     n = len(system.coordinates)
     matrices = 2 * n * n + 3 * max(n, 6) ** 2 + 60 * n + 250
     if not isinstance(system, RigidSystem):
         return whole(links).size.total + matrices
     composites, offsets = 31 * (len(system.robot.links) + 1), 3 * len(system.robot.named_frames)
     frames = _moved(system) + composites + _numbers(system) + offsets
-    if not free(system):  # frames and the mass matrix alone, which stands in the caller's memory
+    if not free(system):  # only frames and the mass matrix, which is in the caller's memory
         return frames + 20 * n + 60
     return frames + 34 * len(system.links) + 18 * _longest(system) + matrices
 
 
 def straight_stack(system: System, links: tuple[Span, ...]) -> int:
-    """Bytes that the functions of closed forms take at most, `links` being their results."""
+    """Return the bytes that the functions of closed forms take at most, `links` being their results."""
     n, waiting = len(system.coordinates), waiting_counts(links)
     blocks, whole_robot = tile(waiting), whole(links).size
     cubes = _cubes(n, len(links), _longest(system))
@@ -123,14 +126,14 @@ def straight_stack(system: System, links: tuple[Span, ...]) -> int:
 
 
 def too_large_for_loops(system: System) -> str:
-    """Why C in loops cannot be had, or nothing."""
+    """Return why C in loops cannot be had; empty if it can."""
     if not isinstance(system, RigidSystem):
         return ""
     return _fault(system, "in loops", lambda _: loops_stack(system))
 
 
 def too_large_for_straight(system: System) -> str:
-    """Why C of closed forms cannot be had, or nothing; if none of its results is zero."""
+    """Return why C of closed forms cannot be had, if none of its results is zero; empty if it can."""
     if not isinstance(system, RigidSystem):
         return ""
     return _fault(system, "of closed forms", lambda links: straight_stack(system, links))
@@ -150,7 +153,7 @@ def _fault(system: RigidSystem, kind: str, stack_of: Callable[[tuple[Span, ...]]
 
 
 def _numbers(system: RigidSystem) -> int:
-    """Numbers of `struct numbers` in tree.h that functions keep, where parameters change them."""
+    """Return how many numbers of `struct numbers` in tree.h functions keep, where parameters change them."""
     return 13 * len(system.robot.links) + 10 * len(system.links) + 3 if system.parameters else 0
 
 
@@ -159,7 +162,7 @@ def _longest(system: System) -> int:
 
 
 def _cubes(n: int, links: int, longest: int) -> int:
-    """Values of `struct waiting_cubes` in dense_rows.h."""
+    """Return how many values `struct waiting_cubes` in dense_rows.h has."""
     most = max(1024 // (n * n), 1)
     if most >= links:
         return 2 * links * n * n + n

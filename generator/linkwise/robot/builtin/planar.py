@@ -9,9 +9,10 @@ GRAVITY = 9.80665  # m/s², in the plane
 
 
 def planar(n: int) -> Description:
-    """n revolute joints about z with relative angles; the arm lies along x at zero, gravity along −y.
+    """Return an arm of n revolute joints about z with relative angles.
 
-    Link j has length l_j, centre of mass r_j along it, mass m_j and moment I_j about its centre of mass.
+    The arm lies along x at zero, gravity along −y. Link j has length l_j, centre of mass r_j along it, mass
+    m_j and moment I_j about its centre of mass.
     """
     bodies, connections = [Body("base")], list[Connection]()
     parameters: list[tuple[str, float]] = []

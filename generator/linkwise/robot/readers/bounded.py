@@ -1,4 +1,4 @@
-"""Bounds on a robot's file, held before it is parsed: parsers take memory and time far beyond its length."""
+"""Bounds on a robot's file, checked before it is parsed: parsers take time and memory far beyond its size."""
 
 import re
 from pathlib import Path
@@ -7,10 +7,10 @@ from linkwise.errors import LinkwiseError
 
 MIB = 2**20
 MAX_DEPTH = 16
-"""Most brackets, or parts of a key, inside each other; schema 1 has three."""
+"""Deepest nesting of brackets, and most parts of a key; schema 1 has three."""
 
-# What does not end is a string all the same, to its line's or the text's end: tried again from each of its
-# quotes it would take quadratic time. Two more quotes may close a string of several lines than open it.
+# A string without an end counts to the end of its line or of the text: trying again from each of its quotes
+# would take quadratic time. A string of several lines may be closed by two quotes more than open it.
 STRINGS_AND_COMMENTS = re.compile(
     r'"""(?:\\.|[^\\])*?(?:"{3,5}|\Z)'
     r"|'''.*?(?:'{3,5}|\Z)"
@@ -25,7 +25,7 @@ NOT_OF_A_KEY = re.compile(r"[^\w.\- \t]+")
 
 
 def content(path: Path, most: int) -> bytes:
-    """Bytes of a file; raises LinkwiseError for one of more than `most`."""
+    """Return the bytes of a file; raises LinkwiseError for one of more than `most` bytes."""
     with path.open("rb") as file:
         data = file.read(most + 1)
     if len(data) > most:
@@ -34,7 +34,7 @@ def content(path: Path, most: int) -> bytes:
 
 
 def too_large(most: int) -> LinkwiseError:
-    """What is raised of a robot's file of more than `most` bytes."""
+    """Return the error for a robot's file of more than `most` bytes."""
     return LinkwiseError(
         f"the file is larger than {most // MIB} MiB, which no robot's description is; "
         "give one without meshes and data in it"
@@ -42,7 +42,7 @@ def too_large(most: int) -> LinkwiseError:
 
 
 def check_toml_bounds(text: str) -> None:
-    """Raise LinkwiseError for numbers longer, brackets or dotted keys deeper than any robot's file has them.
+    """Raise LinkwiseError for numbers longer, or brackets or keys deeper, than any robot's file has them.
 
     tomllib takes quadratic time for a key's dots: 15 s for 32,000. The check is linear. It works on the text
     without its strings and comments: brackets are then those of tables and arrays, and dots with nothing but

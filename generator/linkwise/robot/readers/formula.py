@@ -23,7 +23,10 @@ MAX_POWER = 8
 
 
 def parse_formula(text: str, parameters: Mapping[str, float]) -> Scalar:
-    """Number or expression that `text` says: numbers, parameters, pi, + - * / **, sin, cos, sqrt."""
+    """Return the number or expression that `text` says: numbers, parameters, pi, + - * / **, sin, cos, sqrt.
+
+    Raises LinkwiseError for a text that is too long, is not such a formula, or has no finite value.
+    """
     if len(text) > MAX_LENGTH:
         raise LinkwiseError(
             f"the formula {text[:20]!r}… is longer than {MAX_LENGTH} characters; name a parameter"
@@ -43,7 +46,10 @@ def parse_formula(text: str, parameters: Mapping[str, float]) -> Scalar:
 
 
 def _check_finite(value: Scalar, parameters: Mapping[str, float]) -> None:
-    """Raise ValueError for a formula that the parameters' values make infinite or undefined."""
+    """Raise an error for a formula that the parameters' values make infinite or undefined.
+
+    The errors are ZeroDivisionError and OverflowError, which the caller turns into a LinkwiseError.
+    """
     if isinstance(value, sp.Expr):
         value = value.xreplace({symbol: sp.Float(parameters[symbol.name]) for symbol in value.free_symbols})
         if value.has(sp.zoo, sp.nan):

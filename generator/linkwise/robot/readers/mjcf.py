@@ -1,7 +1,7 @@
-"""The dynamics of an MJCF file, through MuJoCo's own compiler; what is not rigid bodies is noted as ignored.
+"""Reader of MJCF files, through MuJoCo's own compiler; what is not rigid bodies is noted as ignored.
 
 A hinge's or slide's coordinate is its qpos. Where MuJoCo has a quaternion, a ball turns by yaw, pitch, roll,
-and a free joint by those after x, y, z of the world.
+and a free joint moves by x, y, z of the world and then turns like a ball.
 """
 
 from dataclasses import dataclass, replace
@@ -28,13 +28,13 @@ TYPES = ("floating", "ball", "prismatic", "revolute")
 
 
 LIMITS = ProcessLimits(seconds=15, memory=750 << 20)
-"""What MuJoCo may take for a file; the largest robots known take 1 s."""
+"""Time and memory that MuJoCo may take for a file; the largest robots known take 1 s."""
 
 
 def read_mjcf(path: Path, text: bytes | None = None) -> Description:
-    """Read a robot, as if the file had another text if one is given.
+    """Return the description of a robot; `text`, if given, replaces the file's own text.
 
-    Raises LinkwiseError with MuJoCo's own words, for a file that takes it too much time or memory, or when
+    Raises LinkwiseError with MuJoCo's own words, for a file that takes it too much time or memory, and where
     MuJoCo is missing.
     """
     mujoco, files = extra("mujoco"), mjcf_files(path)
@@ -93,7 +93,7 @@ def _driven(mujoco: Any, model: Any, joints: list[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _Joint:
-    """One joint of a body: where its anchor is in the body's frame, and at which q the body rests."""
+    """One joint of a body: its anchor in the body's frame, and `rest`, the q at which the body rests."""
 
     name: str
     type: str
@@ -105,9 +105,9 @@ class _Joint:
 
 
 def _body(mujoco: Any, model: Any, number: int) -> tuple[list[Connection], Body]:
-    """Return a body behind the chain of its joints, and massless bodies between them.
+    """Return the chain of a body's joints, which massless bodies connect, and the body behind it.
 
-    Its frame is the file's, whose origin need not be the last joint's anchor.
+    The body's frame is the file's, whose origin need not be the last joint's anchor.
     """
     name, parent = _name(model, number), int(model.body_parentid[number])
     turn, snapped = transforms.snapped(transforms.from_quaternion(*map(float, model.body_quat[number])))
@@ -172,12 +172,12 @@ def _joints(mujoco: Any, model: Any, number: int, body: str) -> list[_Joint]:
 
 
 def joint_name(name: str, body: str, at: int, count: int) -> str:
-    """What the joint `at` of a body's `count` is called: its name in the file, if it has one."""
+    """Return the name of joint `at` of a body's `count`: its name in the file, or one made of the body's."""
     return name or f"{body}_joint{at + 1 if count > 1 else ''}"
 
 
 def body_name(name: str, number: int) -> str:
-    """What a body is called that MuJoCo counts as `number`: its name in the file, if it has one."""
+    """Return the name of the body that MuJoCo counts as `number`: its name in the file, or one made of it."""
     return name or f"body{number}"
 
 

@@ -1,4 +1,4 @@
-"""An MJCF file as a model of MuJoCo's, without what has no part in the dynamics of rigid bodies."""
+"""Compiling an MJCF file by MuJoCo, without what has no part in the dynamics of rigid bodies."""
 
 import os
 from pathlib import PurePath
@@ -10,13 +10,13 @@ from linkwise.robot.readers.mjcf_files import MjcfFiles
 
 CORNERS = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
 FACES = [0, 2, 1, 0, 3, 2, 0, 1, 3, 1, 2, 3]
-"""A tetrahedron."""
+"""Faces of a tetrahedron with these corners."""
 
 
 def compiled(mujoco: Any, files: MjcfFiles, text: bytes | None = None) -> tuple[Any, list[str]]:
     """Return the model, and MuJoCo's warnings, which it would write into a file in the working directory.
 
-    text: what stands in the place of the first of the documents
+    text: replaces the content of the first document
 
     Raises LinkwiseError with MuJoCo's own words, and MemoryError.
     """
@@ -39,7 +39,7 @@ def compiled(mujoco: Any, files: MjcfFiles, text: bytes | None = None) -> tuple[
 
 
 def _parsed(mujoco: Any, files: MjcfFiles, text: bytes | None) -> Any:
-    """The file's elements as MuJoCo has them; nothing but documents has been opened."""
+    """Return the file's elements as MuJoCo has them; nothing but documents has been opened."""
     path, *included = files.documents
     if text is None and path.suffix == ".xml":  # it decodes no other
         return mujoco.MjSpec.from_file(str(path))
@@ -50,9 +50,9 @@ def _parsed(mujoco: Any, files: MjcfFiles, text: bytes | None) -> Any:
 
 
 def _lighten(mujoco: Any, spec: Any, files: MjcfFiles, text: bytes | None) -> None:
-    """Put the smallest that MuJoCo takes in the place of textures, height fields, and meshes without mass.
+    """Replace textures, height fields, and meshes without mass by the smallest that MuJoCo accepts.
 
-    Under their names, so that whatever refers to them can.
+    They keep their names, so that references to them stay valid.
     """
     for texture in spec.textures:
         _let_go_of(texture)
@@ -75,7 +75,7 @@ def _lighten(mujoco: Any, spec: Any, files: MjcfFiles, text: bytes | None) -> No
 
 
 def _let_go_of(asset: Any) -> None:
-    """Leave an asset without its file, whose name is its own if it has no other."""
+    """Detach an asset from its file; without a name of its own it gets the file's."""
     if asset.file:
         asset.name = asset.name or PurePath(asset.file).stem
         asset.file = ""

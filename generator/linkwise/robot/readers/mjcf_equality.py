@@ -1,12 +1,12 @@
 """The active equality constraints of a compiled MJCF model: ties of bodies, couplings of joints, others.
 
-What MuJoCo asks for is in its engine_core_constraint.c, mj_instantiateEquality; eq_data of a compiled model:
+MuJoCo's conditions are in its engine_core_constraint.c, mj_instantiateEquality; eq_data of a compiled model:
 
     connect  anchor on the first body, anchor on the second; of sites: none, their origins meet
     weld     anchor on the second body, place and quaternion of the first one's, scale of the torque; of
              sites: the scale, their origins and axes meet
     joint    y − y0 = Σ a_p (x − x0)^p, y the first joint and x the second, a_0 … a_4; no second: y − y0 = a_0
-    tendon   the same of the tendons' lengths
+    tendon   as for joints, with the tendons' lengths for x and y
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,9 +22,9 @@ from linkwise.robot.readers.mjcf_tendons import joints_of, lengths_of, ties
 from linkwise.robot.robot import Rotation, TieKind
 
 POWERS = 5
-"""Coefficients of a polynomial."""
+"""Number of coefficients of a polynomial."""
 TORQUE_SCALE = 10
-"""Where eq_data has it."""
+"""Index of the torque's scale in eq_data."""
 
 CUT = (
     "remove it from the file, hold the joints between them with --lock, or cut off what it ties with --root "
@@ -35,7 +35,7 @@ REMOVE = "remove it from the file"
 
 @dataclass(frozen=True)
 class Equalities:
-    """What the equalities are: ties, couplings, and what is not modelled; `notes` are on inactive ones."""
+    """Equalities of a model: ties, couplings, and `loops`, not modelled; `notes` are on inactive ones."""
 
     ties: tuple[AnchoredTie, ...]
     couplings: tuple[JointCoupling, ...]
@@ -73,7 +73,7 @@ def equalities(mujoco: Any, model: Any, joints: list[str], bodies: list[str]) ->
 
 
 def _active(mujoco: Any, model: Any) -> Iterator[_Equality]:
-    """Those that act from the start."""
+    """Yield the equalities that act from the start."""
     if "equality" in switched_off(mujoco, model):
         return
     named = [model.equality(number).name for number in range(int(model.neq))]
@@ -116,7 +116,7 @@ def _site(model: Any, site: int, bodies: list[str]) -> Anchor:
 
 
 def _coupling(mujoco: Any, model: Any, equality: _Equality, joints: list[str]) -> JointCoupling | None:
-    """Return a joint equality, or one of fixed tendons that is a sum over joints; None for any other."""
+    """Return the coupling of a joint equality, or of fixed tendons that are sums over joints; else None."""
     numbers = [number for number in (equality.one, equality.other) if number >= 0]
     if equality.kind == "joint":
         sides = [(_itself(number), float(model.qpos0[model.jnt_qposadr[number]])) for number in numbers]

@@ -1,4 +1,4 @@
-"""The files that an MJCF file is made of: what it includes or attaches, its meshes and its pictures."""
+"""Files that an MJCF file is made of: those that it includes or attaches, its meshes and its pictures."""
 
 import os
 import re
@@ -16,24 +16,24 @@ from linkwise.robot.readers.bounded import content
 from linkwise.robot.readers.xml_file import LARGEST
 
 NAMED = re.compile(rb"""\b(file|assetdir|meshdir|texturedir)\w*+\s*+=\s*+(?:"([^"]*)"|'([^']*)')""")
-"""Files, and folders that they are in: MuJoCo reads what is not quite XML, so that no parser finds them."""
+"""Names of files and their folders: MuJoCo reads what is not quite XML, so that no parser finds them."""
 BEFORE_XML = b"\xef\xbb\xbf \t\r\n"
 MOST = 100_000
-"""Places that are looked into; for a robot these are some hundred."""
+"""Most places that are looked into; for a robot these are some hundred."""
 
 
 @dataclass(frozen=True)
 class MjcfFiles:
-    """Files that are there: `documents` of XML, the robot's own the first; `others`, which these name."""
+    """Files that are there: `documents` of XML, the robot's own first, and `others`, which these name."""
 
     documents: tuple[Path, ...]
     others: tuple[Path, ...]
 
 
 def mjcf_files(path: Path) -> MjcfFiles:
-    """Return all files that MuJoCo may open for one.
+    """Return all files that MuJoCo may open for a robot's file.
 
-    It looks for a name in some of the folders of the documents, and of those that their <compiler> gives;
+    MuJoCo looks for a name in some of the folders of the documents, and of those that their <compiler> gives;
     this looks in all of them. Raises LinkwiseError for far too large a document, and for a device or a pipe,
     for whose end MuJoCo would wait.
     """
@@ -51,15 +51,18 @@ def mjcf_files(path: Path) -> MjcfFiles:
 
 @dataclass
 class _NamedFiles:
-    """What documents name, and the folders that it may be in; dictionaries keep the order."""
+    """Files that documents name, and the folders that they may be in; dictionaries keep the order."""
 
     folders: dict[Path, None] = field(default_factory=dict)
     below: dict[str, None] = field(default_factory=lambda: {"": None})
-    """Paths from these, as <compiler> gives them."""
+    """Paths below `folders`, as <compiler> gives them."""
     files: dict[str, None] = field(default_factory=dict)
 
     def read(self, path: Path) -> None:
-        """Add what a document names; raises LinkwiseError for far too large a one, or for too many places."""
+        """Add the files that a document names.
+
+        Raises LinkwiseError for far too large a document, and for too many places.
+        """
         self.folders[path.parent] = None
         for kind, *quoted in NAMED.findall(content(path, LARGEST)):
             name = unescape(b"".join(quoted).decode("utf-8", "surrogateescape"))
@@ -71,7 +74,7 @@ class _NamedFiles:
             raise LinkwiseError(f"its files may be in more than {MOST:,} places; name fewer files or folders")
 
     def there(self) -> Iterator[Path]:
-        """Files that are where they may be; raises LinkwiseError for one without an end."""
+        """Yield the named files that exist; raises LinkwiseError for one without an end."""
         for folder, part, name in product(self.folders, self.below, self.files):
             path = folder / part / name
             try:
@@ -85,6 +88,6 @@ class _NamedFiles:
 
 
 def _is_xml(path: Path) -> bool:
-    """Whether a file begins as XML does; what else may be attached names no files."""
+    """Return whether a file begins as XML does; other files that may be attached name no files."""
     with path.open("rb") as file:
         return file.read(1 << 10).lstrip(BEFORE_XML).startswith(b"<")

@@ -1,6 +1,6 @@
-"""What the flags of MJCF's <option> mean for the torques: every flag that MuJoCo has, in one table.
+"""Effect of the flags of MJCF's <option> on the torques: every flag that MuJoCo has, in one table.
 
-What a name stands for is in MuJoCo's XML reference, section option/flag.
+MuJoCo's XML reference, section option/flag, says what each flag stands for.
 """
 
 from collections.abc import Collection
@@ -33,10 +33,10 @@ SWITCHED_OFF: dict[str, tuple[str, ...]] = {
     "AUTORESET": (),
     "ISLAND": (),
 }
-"""For each flag of mjtDisableBit the forces that it switches off, in the words of `mjcf_unmodelled`."""
+"""Forces that each flag of mjtDisableBit switches off, in the words of `mjcf_unmodelled`."""
 
 PASSIVE = ("gravity compensation", "fluid", "plugin")
-"""What is switched off beside springs and dampers where both of these are."""
+"""Forces that are switched off too where both springs and dampers are."""
 
 SWITCHED_ON: dict[str, str] = {
     "INVDISCRETE": "differences in place of accelerations",
@@ -51,7 +51,7 @@ SWITCHED_ON: dict[str, str] = {
     "MULTICCD": "",  # a flag to enable in MuJoCo 3, one to disable since
     "ISLAND": "",
 }
-"""For each flag of mjtEnableBit what it adds that no torque holds; empty: nothing."""
+"""Effect that each flag of mjtEnableBit adds and that the torques leave out; empty: none."""
 
 
 def switched_off(mujoco: Any, model: Any) -> frozenset[str]:
@@ -62,13 +62,13 @@ def switched_off(mujoco: Any, model: Any) -> frozenset[str]:
 
 
 def switched_on(mujoco: Any, model: Any) -> tuple[str, ...]:
-    """Return what the file's flags switch on; raises LinkwiseError for an unknown flag."""
+    """Return the effects that the file's flags switch on; raises LinkwiseError for an unknown flag."""
     flags = _changed(mujoco.mjtEnableBit, model.opt.enableflags, SWITCHED_ON)
     return tuple(SWITCHED_ON[flag] for flag in flags if SWITCHED_ON[flag])
 
 
 def _changed(bits: Any, value: int, known: Collection[str]) -> list[str]:
-    """Return the names of the bits that are set in `value`."""
+    """Return the names of the bits set in `value`; raises LinkwiseError for one that is not `known`."""
     flags = [
         name.partition("_")[2]
         for name, bit in bits.__members__.items()

@@ -15,17 +15,17 @@ ARMATURE = ("dof_armature",)
 """Fields of mjModel: the first is proportional to the motion, or constant; the next are of higher order."""
 
 YIELDS = "jnt_springyield"
-"""Where a spring gives way; the law is then no longer that of a spring."""
+"""Field for where a spring gives way; the law is then no longer that of a spring."""
 
 
 def numbers_of(model: Any, fields: Collection[str], index: int) -> list[float]:
-    """Numbers of one joint, body or tendon; a field that this MuJoCo lacks has none."""
+    """Return the numbers of one joint, body or tendon; a field that this MuJoCo lacks has none."""
     arrays = (getattr(model, name, None) for name in fields)
     return [float(value) for array in arrays if array is not None for value in np.ravel(array[index])]
 
 
 def is_passive(mujoco: Any, model: Any, joint: int, fields: tuple[str, ...]) -> bool:
-    """Whether `Passive` can say what these fields say of a joint: of one axis, nothing of higher order."""
+    """Return whether `Passive` can hold these fields of a joint: of one axis, and nothing of higher order."""
     kinds = mujoco.mjtJoint
     if kinds(int(model.jnt_type[joint])) not in (kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE):
         return False
@@ -34,7 +34,10 @@ def is_passive(mujoco: Any, model: Any, joint: int, fields: tuple[str, ...]) -> 
 
 
 def passive_of(mujoco: Any, model: Any, joint: int, off: Collection[str]) -> Passive:
-    """Return what a joint has, but for forces that flags switch `off`, in the words of `mjcf_options`."""
+    """Return the passive properties of a joint, without the forces that flags switch `off`.
+
+    `off` has the words of `mjcf_options`.
+    """
 
     def number(fields: tuple[str, ...], switch: str = "") -> float:
         if switch in off or not is_passive(mujoco, model, joint, fields):
@@ -49,7 +52,7 @@ def passive_of(mujoco: Any, model: Any, joint: int, off: Collection[str]) -> Pas
 
 
 def limits_of(model: Any, joint: int) -> Limits:
-    """Range of a joint of one axis, and of the force that actuators may put on it; MJCF limits no speed."""
+    """Return the range of a joint of one axis, and the limit of the force on it; MJCF limits no speed."""
     lower, upper = map(float, model.jnt_range[joint]) if model.jnt_limited[joint] else (-math.inf, math.inf)
     forces = model.jnt_actfrcrange[joint] if model.jnt_actfrclimited[joint] else (math.inf,)
     # A range may be wider on one side; the nearer end is what either way allows.
@@ -57,5 +60,5 @@ def limits_of(model: Any, joint: int) -> Limits:
 
 
 def _index(model: Any, joint: int, fields: tuple[str, ...]) -> int:
-    """Of a joint, or of its first degree of freedom, in the arrays of these fields."""
+    """Return the index of a joint, or of its first degree of freedom, in the arrays of these fields."""
     return joint if fields[0].startswith("jnt_") else int(model.jnt_dofadr[joint])

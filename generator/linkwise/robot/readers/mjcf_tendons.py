@@ -1,4 +1,4 @@
-"""What the tendons of a compiled MJCF model run along."""
+"""Joints and bodies that the tendons of a compiled MJCF model run along."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -6,21 +6,21 @@ from typing import Any
 
 
 def joints_of(mujoco: Any, model: Any, tendon: int) -> tuple[int, ...]:
-    """Joints of a fixed tendon; none of a spatial one."""
+    """Return the joints of a fixed tendon; none for a spatial one."""
     return tuple(
         joint for kind, joint in _wraps(mujoco, model, tendon) if kind == mujoco.mjtWrap.mjWRAP_JOINT
     )
 
 
 def lengths_of(mujoco: Any, model: Any, tendon: int) -> tuple[tuple[int, float], ...]:
-    """Joints of a fixed tendon, whose length is the sum of their positions times these factors."""
+    """Return the joints of a fixed tendon with factors: its length is the sum of positions times these."""
     first, count = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
     joints = joints_of(mujoco, model, tendon)
     return tuple(zip(joints, map(float, model.wrap_prm[first : first + count]), strict=False))
 
 
 def bodies_along(mujoco: Any, model: Any, tendon: int) -> tuple[int, ...]:
-    """Bodies that a spatial tendon passes; none of a fixed one."""
+    """Return the bodies that a spatial tendon passes; none for a fixed one."""
     wrap = mujoco.mjtWrap
     passed = []
     for kind, thing in _wraps(mujoco, model, tendon):
@@ -32,7 +32,7 @@ def bodies_along(mujoco: Any, model: Any, tendon: int) -> tuple[int, ...]:
 
 
 def ties(mujoco: Any, model: Any, tendon: int, of_joints: bool) -> tuple[tuple[int, int], ...]:
-    """Pairs of bodies that a tendon ties: parent and child of its joints, or neighbours that it passes."""
+    """Return the pairs of bodies that a tendon ties: parent and child of its joints, or neighbours on it."""
     if not of_joints:
         return tuple(pairwise(bodies_along(mujoco, model, tendon)))
     children = (int(model.jnt_bodyid[joint]) for joint in joints_of(mujoco, model, tendon))
@@ -40,7 +40,7 @@ def ties(mujoco: Any, model: Any, tendon: int, of_joints: bool) -> tuple[tuple[i
 
 
 def _wraps(mujoco: Any, model: Any, tendon: int) -> Iterator[tuple[Any, int]]:
-    """Kind and object of each thing that a tendon is made of."""
+    """Yield the kind and the index of each object that a tendon is made of."""
     first, count = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
     for at in range(first, first + count):
         yield mujoco.mjtWrap(int(model.wrap_type[at])), int(model.wrap_objid[at])

@@ -1,7 +1,7 @@
-"""What a compiled MJCF model says beyond the dynamics of rigid bodies and what `mjcf_passive` reads.
+"""Content of a compiled MJCF model beyond the dynamics of rigid bodies and what `mjcf_passive` reads.
 
-Of everything in MuJoCo's mjModel that exerts a force or adds inertia there is one row in `ACTING`. A robot's
-torques are those that its actuators must give while it touches nothing and stays within its limits.
+`ACTING` has one row for everything in MuJoCo's mjModel that exerts a force or adds inertia. A robot's torques
+are those that its actuators must give while it touches nothing and stays within its limits.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,19 +32,20 @@ COUNTS = {
     "sensor": "nsensor",
     "tendon": "ntendon",
 }
-"""What is counted though it loads no joint by itself."""
+"""Things that are counted though they load no joint by themselves."""
 
 ARRAYS = {"limit": "jnt_limited"}
-"""What is counted where it is not zero."""
+"""Things that are counted where the array is not zero."""
 
 Owner = Literal["dof", "joint", "body", "tendon", "actuator", "model"]
 
 
 @dataclass(frozen=True)
 class _Acting:
-    """A force or an inertia: what it is, whose, and the arrays that are not zero where it acts.
+    """A force or an inertia: `what` it is, its owner, and the arrays that are not zero where it acts.
 
-    `switch` is the word of `mjcf_options` that turns it off; `units` those about a hinge and along a slide.
+    `switch` is the word of `mjcf_options` that turns it off; `units` are those about a hinge and along a
+    slide.
     """
 
     what: str
@@ -85,18 +86,18 @@ class _CompiledModel:
     bodies: Sequence[str]
 
     def along(self, tendon: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Joints of a fixed tendon, bodies that a spatial one passes."""
+        """Return the joints of a fixed tendon, and the bodies that a spatial one passes."""
         joints = joints_of(self.mujoco, self.model, tendon)
         bodies = bodies_along(self.mujoco, self.model, tendon)
         return tuple(self.joints[j] for j in joints), tuple(self.bodies[b] for b in bodies)
 
     def values(self, acting: _Acting, index: int) -> list[float]:
-        """Numbers of one joint, body or tendon."""
+        """Return the numbers of one joint, body or tendon."""
         return numbers_of(self.model, acting.fields, index)
 
 
 def omissions(mujoco: Any, model: Any, joints: Sequence[str], bodies: Sequence[str]) -> tuple[Omission, ...]:
-    """Return each force and inertia that no torque holds, by the names of MuJoCo's joints and bodies."""
+    """Return the forces and inertias that the torques leave out, by names of MuJoCo's joints and bodies."""
     names, off = _CompiledModel(mujoco, model, joints, bodies), switched_off(mujoco, model)
     acting = [row for row in ACTING if row.switch not in off]
     found = [omission for row in acting for omission in _OWNERS[row.owner](names, row)]
@@ -104,14 +105,14 @@ def omissions(mujoco: Any, model: Any, joints: Sequence[str], bodies: Sequence[s
 
 
 def unused(model: Any) -> tuple[Note, ...]:
-    """Return a note for each kind of thing that is there and loads no joint by itself, with how often."""
+    """Return a note, with a count, for each kind of thing that is there and loads no joint by itself."""
     counts = {what: int(np.count_nonzero(getattr(model, field))) for what, field in ARRAYS.items()}
     counts |= {what: int(getattr(model, field)) for what, field in COUNTS.items()}
     return tuple(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items()) if count)
 
 
 def _of_joints(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
-    """What `Passive` cannot say, of balls and free joints, or of a higher order."""
+    """Yield what `Passive` cannot hold: on balls and free joints, or of a higher order."""
     for number, name in enumerate(names.joints):
         if is_passive(names.mujoco, names.model, number, acting.fields):
             continue
@@ -122,7 +123,7 @@ def _of_joints(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
 
 
 def _of_bodies(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
-    """Gravity compensation, but on joints whose actuators give it: the torques hold what these must give."""
+    """Yield gravity compensation, except on joints whose actuators give it: their torques contain it."""
     model = names.model
     for number, name in enumerate(names.bodies):
         at, joints = number, list[str]()
@@ -143,7 +144,7 @@ def _of_tendons(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
 
 
 def _of_actuators(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
-    """Inertia and damping of motors, which act whether or not these are on."""
+    """Yield inertia and damping of motors, which act whether or not these are on."""
     model, kinds = names.model, names.mujoco.mjtTrn
     for number in range(len(model.actuator_trntype)):
         if any(values := names.values(acting, number)):
@@ -165,7 +166,7 @@ def _of_model(names: _CompiledModel, acting: _Acting) -> Iterator[Omission]:
 
 
 def _detail(values: list[float], unit: str) -> str:
-    """Return the value with its unit, or that there are coefficients of a higher order too."""
+    """Return the value with its unit, or with the remark that there are coefficients of higher order too."""
     return f"{values[0]:g} and of higher order" if any(values[1:]) else f"{values[0]:g} {unit}".strip()
 
 

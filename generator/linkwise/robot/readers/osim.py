@@ -1,4 +1,4 @@
-"""An OpenSim model (.osim): bodies, joints and couplings of coordinates; what else it has is noted.
+"""Reader of OpenSim models (.osim): bodies, joints and couplings of coordinates; other content is noted.
 
 OpenSim 4 writes a JointSet, and frames for the ends of joints; before it each body held its joint.
 """
@@ -48,11 +48,11 @@ BODY = Known(
     attributes=names("name"),
     idle=names("components FrameGeometry attached_geometry WrapObjectSet VisibleObject"),
 )
-"""What is read of a body, and what is known beside it."""
+"""Names that are read of a body, and those that are known beside them."""
 
 
 def read_osim(path: Path) -> Description:
-    """Read a model; raises LinkwiseError naming the element and the remedy."""
+    """Return the description of a model; raises LinkwiseError naming the element and the remedy."""
     model, old = read_document(path)
     refuse_misspelt_names(model)
     elements = [body for body in members(model, "BodySet") if name_of(body) != GROUND]
@@ -89,7 +89,7 @@ def _joints(model: Element, frames: Frames) -> Iterator[OsimJoint]:
 
 
 def _joints_in_bodies(bodies: list[Element]) -> Iterator[OsimJoint]:
-    """Joints as before OpenSim 4: a body's own one leads to it from its <parent_body>."""
+    """Yield the joints as before OpenSim 4: a body's own one leads to it from its <parent_body>."""
     for body in bodies:
         holder = body.find("Joint")
         for joint in holder if holder is not None else ():
@@ -119,7 +119,7 @@ def _bodies(elements: Iterable[Element], joints: Iterable[OsimJoint]) -> Iterato
 
 
 def _inertia(element: Element, place: str) -> Mat3:
-    """About the centre of mass: six numbers in one element, or each in one of its own."""
+    """Return the inertia about the centre of mass: six numbers in one element, or each in one of its own."""
     if element.find("inertia") is not None:
         xx, yy, zz, xy, xz, yz = numbers_of(element, "inertia", "0 0 0 0 0 0", place, 6)
     else:
@@ -134,7 +134,7 @@ def _vector(values: tuple[float, ...]) -> Vec3:
 
 
 def _forces(model: Element) -> Iterator[Omission]:
-    """Forces that act by themselves."""
+    """Yield the forces that act by themselves, which the torques leave out."""
     for force in members(model, "ForceSet"):
         acts = yes(force, "appliesForce", True) and not yes(force, "isDisabled")
         if acts and not _gives(force):
@@ -145,7 +145,7 @@ def _forces(model: Element) -> Iterator[Omission]:
 
 
 def _gives(force: Element) -> bool:
-    """Whether it is what gives the joints' torques."""
+    """Return whether a force is a muscle or an actuator, which give the joints' torques."""
     return "Muscle" in force.tag or force.tag.endswith("Actuator")
 
 
@@ -154,7 +154,7 @@ def _known(element: Element) -> Known | None:
 
 
 def _ignored(model: Element) -> tuple[Note, ...]:
-    """What of the model has no part in its dynamics, or is what gives the torques."""
+    """Return notes on parts of the model that do not enter its dynamics, or that give the torques."""
     counts = Counter(force.tag for force in members(model, "ForceSet") if _gives(force))
     counts.update(part.tag for part in members(model, "ContactGeometrySet"))
     counts.update(part.tag for part in members(model, "MarkerSet"))

@@ -1,7 +1,7 @@
-"""Axes of an OpenSim joint, in its frame on the parent: which coordinate moves each, and by which function.
+"""Axes of an OpenSim joint, in its frame on the parent: the coordinate and the function that move each.
 
-First comes what slides, along axes of that frame, then what turns, each axis turned by those before it; a
-UniversalJoint, say, turns about x and y.
+Translations come first, along axes of that frame, then rotations, each axis turned by those before it; a
+UniversalJoint, for example, turns about x and y.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +20,7 @@ from linkwise.robot.readers.osim_functions import IDENTITY, LINEAR, function_of,
 
 Kind = Literal["revolute", "prismatic"]
 Part = tuple[Kind, tuple[float, float, float], int]
-"""An axis, and which of the joint's coordinates moves it."""
+"""An axis: its kind, direction, and the index of the joint's coordinate that moves it."""
 
 TURNING: tuple[Part, ...] = (("revolute", X, 0), ("revolute", Y, 1), ("revolute", Z, 2))
 TYPES: dict[str, tuple[Part, ...]] = {
@@ -35,7 +35,7 @@ TYPES: dict[str, tuple[Part, ...]] = {
 }
 CUSTOM = "CustomJoint"
 KINDS: tuple[tuple[Kind, str], ...] = (("prismatic", "translation"), ("revolute", "rotation"))
-"""Of a SpatialTransform; what slides comes first, for in the file it stands last."""
+"""Kinds of axes of a SpatialTransform; translations come first, though in the file they stand last."""
 
 
 @dataclass(frozen=True)
@@ -47,30 +47,31 @@ class MovedAxis:
     coordinate: str = ""
     curve: Curve = IDENTITY
     written: str = LINEAR
-    """What the file calls the function."""
+    """Name of the function in the file."""
 
     @property
     def one_to_one(self) -> bool:
-        """Whether OpenSim takes it to move as far as its coordinate: there or back, by a LinearFunction."""
+        """True if OpenSim takes it to move as far as its coordinate: there or back, by a LinearFunction."""
         line = self.curve.line if self.written == LINEAR else None
         return line is not None and abs(line[1]) == 1.0
 
     @property
     def in_radians(self) -> bool:
-        """Whether OpenSim's files have its coordinate in radians, also where others are in degrees."""
+        """True if OpenSim's files have its coordinate in radians even where others are in degrees."""
         return self.kind == "revolute" and not self.one_to_one
 
     def rule(self, rules: Mapping[str, Rule]) -> Rule:
-        """How it moves by what is free."""
+        """Return the rule by which the axis moves with a free coordinate."""
         if not self.coordinate:
             return Rule("", self.curve)
         return rules[self.coordinate].of(self.curve)
 
 
 def carrier(axes: Sequence[MovedAxis], coordinate: str) -> int | None:
-    """Index of the axis that stands for a coordinate: what it moves one to one, or by a line, if any.
+    """Return the index of the axis that stands for a coordinate: moved one to one, or by a line, if any.
 
-    Of what turns and what slides one to one, OpenSim takes what slides; of others, here, what turns.
+    Among axes moved one to one, OpenSim takes one that slides; among others, one that turns is taken here.
+    None if the coordinate moves no axis.
     """
 
     def remoteness(at: int) -> tuple[bool, bool, bool, bool]:
@@ -83,7 +84,7 @@ def carrier(axes: Sequence[MovedAxis], coordinate: str) -> int | None:
 
 
 def axes_of(joint: Element, coordinates: Sequence[str]) -> Iterator[MovedAxis]:
-    """Axes of a joint with coordinates of these names; raises LinkwiseError for what is not modelled."""
+    """Yield the axes of a joint with coordinates of these names; raises LinkwiseError for unmodelled ones."""
     place = f"joint {name_of(joint)!r}"
     if joint.tag == CUSTOM:
         yield from _custom(joint, coordinates, place)
@@ -115,7 +116,7 @@ def _custom(joint: Element, coordinates: Sequence[str], place: str) -> Iterator[
 def _axis(
     axis: Element, kind: Kind, usual: tuple[float, float, float], coordinates: Sequence[str], place: str
 ) -> Iterator[MovedAxis]:
-    """The axis, or none where it stands still at 0."""
+    """Yield the axis, or nothing where it stands still at 0."""
     coordinate, curve = _displacement(axis, coordinates, place)
     if not coordinate and curve(0.0) == 0.0:
         return
@@ -127,7 +128,7 @@ def _axis(
 
 
 def _displacement(axis: Element, coordinates: Sequence[str], place: str) -> tuple[str, Curve]:
-    """The coordinate of an axis, empty where it stands still, and its function of that."""
+    """Return the coordinate of an axis, empty where it stands still, and the axis's function of it."""
     names = text_of(axis, "coordinates").split()
     if len(names) > 1:
         raise LinkwiseError(

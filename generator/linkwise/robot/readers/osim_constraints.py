@@ -1,4 +1,4 @@
-"""Constraints of an OpenSim model that tie bodies together; those that couple coordinates are elsewhere."""
+"""Constraints of an OpenSim model that tie bodies together; `osim_coordinates` has those of coordinates."""
 
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
@@ -18,7 +18,7 @@ KINDS: dict[str, TieKind] = {
 
 
 def ties(model: Element, frames: Frames) -> Iterator[AnchoredTie]:
-    """Constraints between two bodies."""
+    """Yield the constraints between two bodies."""
     for constraint in members(model, "ConstraintSet"):
         if constraint.tag in KINDS and enforced(constraint):
             first, second = (_end(constraint, number, frames) for number in (1, 2))
@@ -28,7 +28,7 @@ def ties(model: Element, frames: Frames) -> Iterator[AnchoredTie]:
 
 
 def unmodelled(model: Element) -> Iterator[Loop]:
-    """Constraints of other kinds."""
+    """Yield the constraints of other kinds, which are not modelled."""
     for constraint in members(model, "ConstraintSet"):
         if constraint.tag not in (COUPLER, *KINDS) and enforced(constraint):
             yield Loop(
@@ -38,7 +38,7 @@ def unmodelled(model: Element) -> Iterator[Loop]:
 
 
 def _end(constraint: Element, number: int, frames: Frames) -> Anchor:
-    """An end: a frame, or a body and a place on it."""
+    """Return an end of a constraint: a frame, or a place on a body."""
     frame = text_of(constraint, f"socket_frame{number}")
     body = text_of(constraint, f"socket_body_{number}") or text_of(constraint, f"body_{number}")
     found: Placed = frames.found(frame or body, constraint)

@@ -17,22 +17,22 @@ COUPLER = "CoordinateCouplerConstraint"
 
 @dataclass(frozen=True)
 class Rule:
-    """What a coordinate is: a curve of one that is free, or, where its name is empty, a number."""
+    """Rule of a coordinate: a curve of one that is free or, where `free` is empty, a number."""
 
     free: str
     curve: Curve
 
     def of(self, outer: Curve) -> "Rule":
-        """A function of the coordinate."""
+        """Return the rule of a function of the coordinate."""
         return Rule(self.free, outer.after(self.curve))
 
 
 def coordinate_rules(
     coordinates: Iterable[Element], model: Element
 ) -> tuple[dict[str, Rule], tuple[Note, ...]]:
-    """What each coordinate is, by name, and notes on those that are not free.
+    """Return the rule of each coordinate, by name, and notes on those that are not free.
 
-    Raises LinkwiseError for two of one name, and for couplings that are not modelled.
+    Raises LinkwiseError for two coordinates of one name, and for couplings that are not modelled.
     """
     own: dict[str, Rule] = {}
     notes: list[Note] = []
@@ -57,7 +57,7 @@ def coordinate_rules(
 
 
 def enforced(constraint: Element) -> bool:
-    """Whether a constraint holds."""
+    """Return whether a constraint holds, that is, is switched on."""
     return yes(constraint, "isEnforced", True) and not yes(constraint, "isDisabled")
 
 
@@ -79,7 +79,7 @@ def _coupled(coupler: Element, known: Mapping[str, Rule]) -> tuple[str, Rule]:
 
 
 def _resolved(name: str, rules: Mapping[str, Rule]) -> Rule:
-    """The rule by a coordinate that is free itself."""
+    """Return the rule in terms of a coordinate that is free itself; raises LinkwiseError for a circle."""
     rule, passed = rules[name], {name}
     while rule.free and rules[rule.free] != Rule(rule.free, IDENTITY):
         if rule.free in passed:
@@ -90,7 +90,7 @@ def _resolved(name: str, rules: Mapping[str, Rule]) -> Rule:
 
 
 def limits_of(coordinate: Element) -> Limits:
-    """Range of a coordinate, where it is clamped."""
+    """Return the range of a coordinate; unlimited where it is not clamped."""
     if not yes(coordinate, "clamped"):
         return UNLIMITED
     lower, upper = numbers_of(coordinate, "range", "-inf inf", f"coordinate {name_of(coordinate)!r}", 2)

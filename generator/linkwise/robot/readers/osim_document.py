@@ -1,4 +1,4 @@
-"""An OpenSim document: what XML it needs to be, which version it has, and where components stand in it."""
+"""OpenSim documents: the repair of their XML, their version, and the places of components."""
 
 import re
 from collections.abc import Iterator
@@ -12,17 +12,17 @@ from linkwise.robot.readers.osim_elements import text_of
 from linkwise.robot.readers.xml_file import parse
 
 LARGEST = 64 * MIB
-"""Models of a whole spine have hundreds of muscles."""
+"""Largest size of a file, in bytes: models of a whole spine have hundreds of muscles."""
 COMMENT = re.compile(rb"<!--.*?(?:-->|\Z)", re.DOTALL)
-"""One that does not end is one to the file's end: tried again from each that begins, it takes for ever."""
+"""A comment; one without an end runs to the file's end, as a new try from each start would take for ever."""
 BLACK = re.compile(rb"[^\n]")
 CLASS_OF_CLASS = re.compile(rb"(</?\w+)::")
-"""As in <HuntCrossleyForce::ContactParametersSet>, which OpenSim writes and XML forbids."""
+"""A tag such as <HuntCrossleyForce::ContactParametersSet>, which OpenSim writes and XML forbids."""
 
 OLDEST, JOINTS_BY_THEMSELVES, SOCKETS = 20000, 30500, 30517
-"""Versions: the first one read, with joints in bodies; of those in a JointSet, and of those with sockets.
+"""Versions: the first one read, with joints in bodies; the first with a JointSet; the first with sockets.
 
-Those between the last two were written by previews of OpenSim 4, which changed the layout many times.
+Versions between the last two were written by previews of OpenSim 4, which changed the layout many times.
 """
 ENDS = {
     "BodySet": ("Body",),
@@ -32,11 +32,11 @@ ENDS = {
     "ContactGeometrySet": (),
     "MarkerSet": ("Marker",),
 }
-"""How the tags of a set's components end, for some stand among the components of others."""
+"""Ends of the tags of a set's components, for some stand among the components of others."""
 
 
 def read_document(path: Path) -> tuple[Element, bool]:
-    """The model, and whether its joints are in its bodies; raises LinkwiseError naming the remedy."""
+    """Return the model, and whether its joints are in its bodies; raises LinkwiseError naming the remedy."""
     root = parse(path, LARGEST, as_xml)
     model = root.find("Model") if root.tag == "OpenSimDocument" else None
     if model is None:
@@ -57,9 +57,9 @@ def read_document(path: Path) -> tuple[Element, bool]:
 
 
 def as_xml(data: bytes) -> bytes:
-    """What OpenSim reads although it is no XML: hyphens in comments, colons in tags, another encoding.
+    """Return as XML what OpenSim reads although it is none: hyphens in comments, colons in tags, encodings.
 
-    What is mended stays as long as it was, so that every element keeps its place, but in another encoding.
+    A repair does not change the length, so that every element keeps its place, except for another encoding.
     """
     mended = CLASS_OF_CLASS.sub(rb"\1..", COMMENT.sub(lambda found: BLACK.sub(b" ", found[0]), data))
     try:
@@ -71,7 +71,7 @@ def as_xml(data: bytes) -> bytes:
 
 
 def members(model: Element, tag: str) -> Iterator[Element]:
-    """Components of a set, such as BodySet, and those of its kind among the components of others."""
+    """Yield the components of a set, such as BodySet, and those of its kind among components of others."""
     found = model.find(f"{tag}/objects")
     yield from found if found is not None else ()
     for holder in model.iter("components"):

@@ -8,12 +8,15 @@ BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 
 
 def text_of(element: Element, tag: str, default: str = "") -> str:
-    """Text of a child, or the default where it is empty or not there."""
+    """Return the text of a child, or the default where it is empty or not there."""
     return (element.findtext(tag) or "").strip() or default
 
 
 def numbers_of(element: Element, tag: str, default: str, place: str, count: int = 0) -> tuple[float, ...]:
-    """Numbers of a child, `count` of them or any; raises LinkwiseError naming the place for others."""
+    """Return the numbers of a child, or of the default where it is empty or not there.
+
+    Raises LinkwiseError naming the place unless they are `count`; 0 allows any number of them.
+    """
     text = text_of(element, tag, default)
     try:
         values = tuple(map(float, text.split()))
@@ -26,7 +29,7 @@ def numbers_of(element: Element, tag: str, default: str, place: str, count: int 
 
 
 def yes(element: Element, tag: str, default: bool = False) -> bool:
-    """Whether a child says true; raises LinkwiseError for neither true nor false."""
+    """Return whether a child says true; raises LinkwiseError for neither true nor false."""
     text = text_of(element, tag, str(default))
     if text.lower() not in BOOLEANS:
         raise LinkwiseError(f"{element.tag} {name_of(element)!r}: <{tag}>{text}</{tag}> needs true or false")
@@ -34,5 +37,5 @@ def yes(element: Element, tag: str, default: bool = False) -> bool:
 
 
 def name_of(element: Element) -> str:
-    """Name of a component."""
+    """Return the name of a component."""
     return element.get("name", "")

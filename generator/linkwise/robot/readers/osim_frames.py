@@ -1,4 +1,4 @@
-"""Frames of an OpenSim model: on which body each is, and where."""
+"""Frames of an OpenSim model: the body that carries each, and its pose there."""
 
 import posixpath
 from collections.abc import Iterable
@@ -17,14 +17,14 @@ BODY, OFFSET = "Body", "PhysicalOffsetFrame"
 
 @dataclass(frozen=True)
 class Placed:
-    """A frame: the body that has it, and where it is in that one's frame."""
+    """A frame: the body that carries it, and its pose in that body's frame."""
 
     body: str
     rotation: Rotation = IDENTITY
     translation: tuple[float, float, float] = ZERO3
 
     def behind(self, rotation: Rotation, translation: tuple[float, ...]) -> "Placed":
-        """A frame that is so placed in this one."""
+        """Return the frame that has this pose in this frame."""
         moved = transforms.add(self.translation, transforms.rotate(self.rotation, translation))
         return Placed(self.body, transforms.compose(self.rotation, rotation), moved)
 
@@ -32,7 +32,10 @@ class Placed:
 def offset_of(
     element: Element, place: str, translation: str, orientation: str
 ) -> tuple[Rotation, tuple[float, ...]]:
-    """Rotation and translation of elements by these names; angles are about the frame's own x, y, then z."""
+    """Return rotation and translation from elements of these names.
+
+    The angles are about the frame's own x, y, then z.
+    """
     x, y, z = numbers_of(element, orientation, "0 0 0", place, 3)
     # Rx Ry Rz is the transpose of Rz' Ry' Rx', which turn back.
     turn = transforms.snap([list(row) for row in zip(*transforms.from_rpy(-x, -y, -z), strict=True)])
@@ -66,7 +69,10 @@ class Frames:
             self._enter(part, own)
 
     def found(self, path: str, owner: Element, passed: tuple[str, ...] = ()) -> Placed:
-        """The frame at a path from its owner on, or the only one of its name; LinkwiseError for none."""
+        """Return the frame at a path from its owner on, or the only one of its name.
+
+        Raises LinkwiseError where there is none, or several of the name.
+        """
         whole = posixpath.normpath(posixpath.join(self._paths.get(id(owner), "/"), path))
         name = posixpath.basename(whole)
         if whole == f"/{GROUND}":

@@ -15,16 +15,16 @@ LINEAR = "LinearFunction"
 
 
 def function_of(owner: Element, tag: str, place: str) -> Curve | None:
-    """The function that an element has; None for none. Raises LinkwiseError for one that is not modelled."""
+    """Return the function of an element, None for none; raises LinkwiseError for one that is not modelled."""
     written = written_function(owner, tag)
     return None if written is None else _known(written, place)
 
 
 def written_function(owner: Element, tag: str) -> Element | None:
-    """The element of a function that another one has.
+    """Return the element of a function that another element has; None for none.
 
-    It is a child of its own, with or without the name `tag`, or stands in a child that is called so; no other
-    child of what has functions holds elements.
+    It is a child of its own, with or without the name `tag`, or stands in a child of that name; no other
+    child of an element with functions holds elements.
     """
     for child in owner:
         if child.tag == tag and len(child):
@@ -54,7 +54,7 @@ def _linear(element: Element, place: str) -> Curve:
 
 
 def _polynomial(element: Element, place: str) -> Curve:
-    """Its coefficients stand the highest power first."""
+    """Return a polynomial; its coefficients stand in the file with the highest power first."""
     return Curve((0.0,), (numbers_of(element, "coefficients", "0", place)[::-1],))
 
 
@@ -80,13 +80,13 @@ def _through_points(
 
 
 def piecewise_linear(x: Sequence[float], y: Sequence[float]) -> Curve:
-    """Straight lines between points, and on beyond the ends."""
+    """Return straight lines between points, continued beyond the ends."""
     slopes = [(d - b) / (c - a) for (a, b), (c, d) in pairwise(zip(x, y, strict=True))]
     return Curve(tuple(x[:-1]), tuple(zip(y, slopes, strict=False)))
 
 
 def simm_spline(x: Sequence[float], y: Sequence[float]) -> Curve:
-    """SIMM's cubic spline, and straight lines beyond its ends.
+    """Return SIMM's cubic spline, with straight lines beyond its ends.
 
     Its third derivative at an end is that of the cubic through the four points there (G. Forsythe,
     M. Malcolm, C. Moler, Computer Methods for Mathematical Computations, 1977, ch. 4); with three points, 0.
@@ -112,7 +112,7 @@ def simm_spline(x: Sequence[float], y: Sequence[float]) -> Curve:
 
 
 def _third_difference(x: Sequence[float], y: Sequence[float]) -> float:
-    """Divided difference of four points: a sixth of the third derivative of the cubic through them."""
+    """Return the divided difference of four points: a sixth of the third derivative of their cubic."""
     differences = list(y)
     for order in range(1, 4):
         differences = [
@@ -132,4 +132,4 @@ FUNCTIONS: dict[str, Callable[[Element, str], Curve]] = {
     "natCubicSpline": _through_points(simm_spline),
     "MultiplierFunction": _multiplied,
 }
-"""What is read of OpenSim's functions of one variable; natural splines are old names of the SimmSpline."""
+"""Readers of OpenSim's functions of one variable; natural splines are old names of the SimmSpline."""

@@ -21,7 +21,10 @@ UNITS: dict[Kind, Literal["rad", "m"]] = {"prismatic": "m", "revolute": "rad"}
 
 
 def from_ground(joints: Iterable["OsimJoint"]) -> tuple["OsimJoint", ...]:
-    """The joints as they lead away from ground, some of them turned; raises LinkwiseError for a loop."""
+    """Return the joints in an order that leads away from ground, some of them turned round.
+
+    Raises LinkwiseError for a loop, and for a body that no joints connect to ground.
+    """
     found: list[OsimJoint] = []
     reached, waiting = {GROUND}, list(joints)
     while waiting:
@@ -46,9 +49,9 @@ def from_ground(joints: Iterable["OsimJoint"]) -> tuple["OsimJoint", ...]:
 
 @dataclass(frozen=True)
 class OsimJoint:
-    """A joint, its frames on both bodies, and its coordinates' elements.
+    """A joint, its frames on both bodies, and the elements of its coordinates.
 
-    Where it is `reversed`, its coordinates say where the parent is from the child on.
+    If it is `reversed`, its coordinates describe the parent's pose relative to the child.
     """
 
     element: Element
@@ -59,11 +62,14 @@ class OsimJoint:
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the joint."""
         return name_of(self.element)
 
     def connection(self, rules: Mapping[str, Rule]) -> Connection:
-        """The joint, with what its coordinates are."""
+        """Return the joint as a Connection, with the rules of its coordinates.
+
+        Raises LinkwiseError for a free coordinate that moves no axis.
+        """
         turn = transforms.transpose(self.child.rotation)
         axes = tuple(self._axes())
         carriers = {name: carrier(axes, name) for name in map(name_of, self.coordinates)}
@@ -110,7 +116,7 @@ class OsimJoint:
         )
 
     def notes(self, rules: Mapping[str, Rule]) -> Iterator[Note]:
-        """Say which free coordinates OpenSim calls coupled, and keeps in radians."""
+        """Yield a note on each free coordinate that OpenSim calls coupled, and keeps in radians."""
         axes = tuple(self._axes())
         for name in map(name_of, self.coordinates):
             at = carrier(axes, name) if rules[name].free == name else None
@@ -119,11 +125,11 @@ class OsimJoint:
 
     @property
     def turned(self) -> "OsimJoint":
-        """The same joint as it leads from its child to its parent."""
+        """Joint turned round, leading from its child to its parent."""
         return replace(self, parent=self.child, child=self.parent, reversed=not self.reversed)
 
     def _axes(self) -> Iterator[MovedAxis]:
-        """Axes from the parent on: of a reversed joint the last one first, and each the other way."""
+        """Yield the axes from the parent on; those of a reversed joint in reverse order and direction."""
         axes = tuple(axes_of(self.element, list(map(name_of, self.coordinates))))
         if not self.reversed:
             yield from axes

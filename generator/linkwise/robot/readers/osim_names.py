@@ -1,6 +1,6 @@
-"""What is read of an OpenSim model's components, so that a name that is misspelt is not passed over.
+"""Names that are read of an OpenSim model's components, so that a misspelt name is not passed over.
 
-OpenSim takes the default for what it does not find and says nothing: under <axes> an axis would be another.
+OpenSim silently takes the default for what it does not find: under <axes> an axis would be another.
 """
 
 from xml.etree.ElementTree import Element
@@ -44,7 +44,7 @@ OF_END = {
         "constant_distance"
     ),
 }
-"""The same by how the tag ends."""
+"""Children that are read, and others near one of them, by the end of the component's tag."""
 
 
 def refuse_misspelt_names(model: Element) -> None:

@@ -1,6 +1,6 @@
-"""The dynamics of an SDFormat model, Gazebo's; what it says beyond them is noted. Meshes are never opened.
+"""Reader of SDFormat models, Gazebo's; other content than dynamics is noted. Meshes are never opened.
 
-A joint whose child hangs on another joint already closes a loop: it is cut and becomes a constraint, at the
+A joint whose child another joint carries already closes a loop: it is cut and becomes a constraint, at the
 place and along the axis that it has at q = 0, which is how the file shows the model. A root that no joint
 holds to the world is free, as in SDFormat. A link that is called `world` is the world.
 """
@@ -33,14 +33,14 @@ from linkwise.robot.readers.xml_names import ignored
 from linkwise.robot.robot import Vec3
 
 OF_WORLD = (0.0, 0.0, -9.8)
-"""Gravity of a world that says nothing of it."""
+"""Gravity, in m/s², of a world that does not give it."""
 DOWN = (0.0, 0.0, -9.81)
-"""That of a model on its own, as of a URDF file."""
+"""Gravity, in m/s², of a model on its own, as for a URDF file."""
 GRAVITY = ("gravity", "physics/gravity")
 
 
 def read_sdf(path: Path) -> Description:
-    """Read a robot; raises LinkwiseError naming the element and the remedy."""
+    """Return the description of a robot; raises LinkwiseError naming the element and the remedy."""
     root = parse(path)
     if root.tag != "sdf":
         raise LinkwiseError(f"the root element is <{root.tag}>; an SDFormat file has <sdf>")
@@ -79,7 +79,7 @@ def _version(root: Element) -> tuple[int, int]:
 
 
 def _model(root: Element) -> Element:
-    """The one model of the file; raises LinkwiseError for others, and for what stands in other files."""
+    """Return the one model of the file; raises LinkwiseError for others, and for parts in other files."""
     models = [*root.findall("model"), *root.findall("world/model")]
     if len(models) != 1:
         names = listed(repr(model.get("name")) for model in models)
@@ -98,7 +98,10 @@ def _model(root: Element) -> Element:
 
 
 def _body(link: Element, places: Mapping[str, Vec3]) -> Body:
-    """A link, and where its joint is on it."""
+    """Return a link, with the place of its joint on it.
+
+    Raises LinkwiseError for mass properties that the file leaves to SDFormat's defaults or to Gazebo.
+    """
     name, place = link.get("name", ""), place_of(link)
     inertial = link.find("inertial")
     if inertial is None:
@@ -122,7 +125,7 @@ def _body(link: Element, places: Mapping[str, Vec3]) -> Body:
 
 
 def _pose_of_inertia(inertial: Element, link: str, place: str) -> Pose:
-    """Where a link's inertia is in the link; raises LinkwiseError for a pose in another frame."""
+    """Return the pose of a link's inertia in the link; raises LinkwiseError for a pose in another frame."""
     relative = relative_to(inertial)
     if relative not in ("", link):
         raise LinkwiseError(
@@ -133,7 +136,7 @@ def _pose_of_inertia(inertial: Element, link: str, place: str) -> Pose:
 
 
 def _free(links: Iterable[Element], tree: Sequence[SdfJoint], poses: ModelPoses) -> FreeRoot | None:
-    """Where the file shows the link that no joint carries."""
+    """Return the pose at which the file shows the link that no joint carries; None if there is none."""
     carried = {joint.child for joint in tree}
     root = next((link for link in links if link.get("name") not in carried), None)
     if root is None:
@@ -143,7 +146,7 @@ def _free(links: Iterable[Element], tree: Sequence[SdfJoint], poses: ModelPoses)
 
 
 def _gravity(root: Element) -> Vec3:
-    """Gravity in the world's axes; before version 1.6 it stood in the <physics> of the world."""
+    """Return gravity in the world's axes, in m/s²; before version 1.6 it stood in the world's <physics>."""
     world = root.find("world")
     if world is None:
         return DOWN

@@ -23,7 +23,7 @@ from linkwise.robot.readers.sdf_poses import (
 from linkwise.robot.robot import NOTHING, UNLIMITED, Limits, Passive, Rotation, Scalar, TieKind
 
 TIES: dict[str, TieKind] = {"ball": "point", "revolute": "hinge", "continuous": "hinge", "fixed": "frame"}
-"""What is left of a joint that is cut."""
+"""Constraint that replaces a joint that is cut, by the joint's type."""
 DYNAMICS = {
     "stiffness": "spring_stiffness",
     "rest": "spring_reference",
@@ -31,14 +31,14 @@ DYNAMICS = {
     "friction": "friction",
 }
 IN_MODEL = "use_parent_model_frame"
-"""The switch before version 1.7 for an axis in the model's axes."""
+"""Switch, before version 1.7, for an axis given in the model's axes."""
 ENDLESS = 1e16
-"""SDFormat's own number for a limit that is none."""
+"""Number by which SDFormat means no limit."""
 
 
 @dataclass(frozen=True)
 class SdfJoint:
-    """A joint, with the poses of its two links and its own in the model at q = 0, and its axis there."""
+    """A joint, with its own pose, the poses of its two links and its axis, all in the model at q = 0."""
 
     element: Element
     parent: str
@@ -50,26 +50,26 @@ class SdfJoint:
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the joint."""
         return self.element.get("name", "")
 
     @property
     def type(self) -> str:
-        """Its type in the file."""
+        """Type of the joint in the file."""
         return self.element.get("type", "")
 
     @property
     def in_parent(self) -> Pose:
-        """Its pose in the parent link."""
+        """Pose of the joint in the parent link."""
         return self.of_parent.inverse().times(self.here)
 
     @property
     def in_child(self) -> Pose:
-        """Its pose in the child link."""
+        """Pose of the joint in the child link."""
         return self.of_child.inverse().times(self.here)
 
     def connection(self) -> Connection:
-        """The joint as one of the tree."""
+        """Return the joint as one of the tree."""
         return Connection(
             self.name,
             self.type,
@@ -84,7 +84,7 @@ class SdfJoint:
         )
 
     def tie(self) -> AnchoredTie:
-        """The joint as a constraint; raises LinkwiseError for one that none stands for."""
+        """Return the joint as a constraint; raises LinkwiseError for one that no constraint can replace."""
         if self.type not in TIES or self.element.find("axis/mimic") is not None:
             what = "mimics another" if self.type in TIES else f"is {self.type}"
             raise LinkwiseError(
@@ -101,7 +101,10 @@ class SdfJoint:
         return AnchoredTie(self.name, kind, first, second)
 
     def losses(self, closes: bool) -> Iterator[Omission]:
-        """What it has of its own and no torque holds: a joint that closes a loop, or not of one axis."""
+        """Yield the passive properties of the joint that the torques leave out.
+
+        These are all of them if the joint closes a loop or is not of one axis; else there are none.
+        """
         if not closes and self.type in SINGLE:
             return
         why = "on a joint that closes a loop" if closes else f"on {self.type}"
@@ -110,7 +113,7 @@ class SdfJoint:
                 yield Omission(what, self.name, f"{number!r} {why}", bodies=(self.parent, self.child))
 
     def _axes_in(self, link: Pose, kind: TieKind) -> Rotation:
-        """Axes that a tie of this kind holds together, in those of a link: z is a hinge's."""
+        """Return the axes that a tie of this kind holds together, in those of a link: z is a hinge's."""
         back = transforms.transpose(link.rotation)
         if kind == "point":
             return IDENTITY
@@ -129,7 +132,7 @@ class SdfJoint:
         }
 
     def _limits(self) -> Limits:
-        """Numbers of 1e16 and beyond, and efforts and velocities below 0, stand for no limit there."""
+        """Return the limits; numbers of 1e16 and beyond, and efforts and velocities below 0, mean none."""
         place = place_of(self.element)
         lower, upper, velocity, effort = (
             numbers_in(self.element, f"axis/limit/{what}", usual, place)
@@ -143,7 +146,7 @@ class SdfJoint:
         )
 
     def _mimic(self) -> Mimic | None:
-        """SDFormat's rule is multiplier (q - reference) + offset."""
+        """Return the mimic rule, None for none; SDFormat's is multiplier (q - reference) + offset."""
         mimic, place = self.element.find("axis/mimic"), place_of(self.element)
         if mimic is None:
             return None
@@ -155,9 +158,9 @@ class SdfJoint:
 def sdf_joints(
     elements: Iterable[Element], poses: ModelPoses, version: tuple[int, int]
 ) -> tuple[list[SdfJoint], list[SdfJoint]]:
-    """Joints of the tree, and those that close loops, in the file's order.
+    """Return the joints of the tree, and those that close loops, in the file's order.
 
-    Of several joints with one child, the first that is not a ball carries it. Raises LinkwiseError for one
+    Among several joints with one child, the first that is not a ball carries it. Raises LinkwiseError for one
     without a parent or a child.
     """
     joints = [_joint(element, poses, version) for element in elements]
@@ -188,9 +191,10 @@ def _joint(element: Element, poses: ModelPoses, version: tuple[int, int]) -> Sdf
 def _axis(
     element: Element, own: Rotation, poses: ModelPoses, version: tuple[int, int]
 ) -> tuple[float, float, float]:
-    """Axis of a joint in the model's axes, given in its own, or as its version has it; z without <xyz>.
+    """Return the axis of a joint in the model's axes; z without <xyz>.
 
-    Raises LinkwiseError for the way of another version to name its frame.
+    It is given in the joint's own axes, or as its version has it. Raises LinkwiseError for another version's
+    way to name the frame.
     """
     axis, place = element.find("axis/xyz"), place_of(element)
     numbers = (0.0, 0.0, 1.0) if axis is None else numbers_of(axis, 3, place)

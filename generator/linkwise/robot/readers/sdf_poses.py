@@ -1,7 +1,7 @@
-"""Where the links, joints and frames of an SDFormat model are, in the axes of the model, and it in the world.
+"""Poses of the links, joints and frames of an SDFormat model, in the model's axes, and its own in the world.
 
-From version 1.7 on, poses stand relative to any named frame, and frames hang on one another; before, links
-stand in the model and joints in their child.
+From version 1.7 on, poses are relative to any named frame, and frames are attached to one another; before,
+links stand in the model and joints in their child.
 """
 
 import math
@@ -19,35 +19,35 @@ from linkwise.robot.robot import Rotation, Vec3
 MODEL, WORLD = "__model__", "world"
 PLACED = ("link", "joint", "frame")
 TURNS = {"euler_rpy": 6, "quat_xyzw": 7}
-"""How a pose may give its turn, with how many numbers it then has."""
+"""Formats of a pose's rotation, with the count of numbers that the pose then has."""
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Turn and place of a frame in another: x there is rotation x + translation."""
+    """Rotation and position of a frame in another: x there is rotation x + translation."""
 
     rotation: Rotation = IDENTITY
     translation: Vec3 = ZERO3
 
     def times(self, inner: "Pose") -> "Pose":
-        """A pose in this frame, seen from outside."""
+        """Return a pose that is given in this frame as seen from outside."""
         shift = transforms.rotate(self.rotation, inner.translation)
         turn = transforms.compose(self.rotation, inner.rotation)
         return Pose(turn, transforms.add(self.translation, shift))
 
     def inverse(self) -> "Pose":
-        """The way back."""
+        """Return the inverse pose."""
         back = transforms.transpose(self.rotation)
         return Pose(back, transforms.minus(transforms.rotate(back, self.translation)))
 
 
 class ModelPoses:
-    """Frames of a model by name."""
+    """Poses of the frames of a model, by name."""
 
     def __init__(self, model: Element, version: tuple[int, int]) -> None:
-        """Raises LinkwiseError for two frames of one name, and for a canonical link that is not there."""
+        """Collect the frames; raises LinkwiseError for two of one name, and for a missing canonical link."""
         self._model, self._named, self._whole = version >= (1, 7), dict[str, Element](), model
-        # Of links and frames that stand in chains, each of which many ask for.
+        # Kept, as links and frames stand in chains, and each is asked for many times.
         self._poses, self._carriers = dict[int, Pose](), {WORLD: WORLD}
         for tag in PLACED:
             for element in model.findall(tag):
@@ -60,9 +60,10 @@ class ModelPoses:
         self._canonical = self._canonical_link()
 
     def of_model(self) -> Pose:
-        """Pose of the model in the world, of which <pose> places a frame of the model, by default its own.
+        """Return the pose of the model in the world.
 
-        Raises LinkwiseError for a pose relative to what else the world has.
+        <pose> places a frame of the model, by default its own. Raises LinkwiseError for a pose relative to
+        anything else in the world.
         """
         place = place_of(self._whole)
         relative = relative_to(self._whole)
@@ -75,7 +76,10 @@ class ModelPoses:
         return at if placed is None else at.times(self.of(placed).inverse())
 
     def of(self, element: Element) -> Pose:
-        """Pose of a link, a joint or a frame in the model; raises LinkwiseError for poses in a circle."""
+        """Return the pose of a link, joint or frame in the model.
+
+        Raises LinkwiseError for poses in a circle.
+        """
         way = dict[int, Element]()
         at: Element | None = element
         while at is not None and id(at) not in self._poses:
@@ -89,14 +93,17 @@ class ModelPoses:
         return found
 
     def named(self, name: str, asked_by: str) -> Pose:
-        """Pose of a frame by its name, the world among them; raises LinkwiseError where there is none."""
+        """Return the pose of a frame, or of the world, by name; raises LinkwiseError where there is none."""
         if name == WORLD:
             return self.of_model().inverse()
         found = self._found(name, asked_by)
         return Pose() if found is None else self.of(found)
 
     def link_of(self, name: str, asked_by: str) -> str:
-        """Link that carries a frame, the world's name for the world; raises LinkwiseError for none."""
+        """Return the link that carries a frame, the world's name for the world.
+
+        Raises LinkwiseError where there is none.
+        """
         way = set[str]()
         while (carrier := self._carriers.get(name)) is None:
             if name in way:
@@ -116,7 +123,7 @@ class ModelPoses:
         return carrier
 
     def _before(self, element: Element) -> Element | None:
-        """What the pose of an element is relative to; None for the model."""
+        """Return the element that an element's pose is relative to; None for the model."""
         relative, place = relative_to(element), place_of(element)
         if relative and not self._model:
             raise LinkwiseError(
@@ -141,9 +148,9 @@ class ModelPoses:
         return self._named[name]
 
     def _canonical_link(self) -> str:
-        """The link that the model's own frame is attached to: the first, unless the model names another.
+        """Return the link that the model's own frame is attached to: the first, unless the model names one.
 
-        It is never one called as the world, which no model carries about.
+        It is never a link that is called as the world, which no model carries.
         """
         links = [name for name, element in self._named.items() if element.tag == "link" and name != WORLD]
         named = self._whole.get("canonical_link")
@@ -157,7 +164,7 @@ class ModelPoses:
 
 
 def pose_in(element: Element, place: str) -> Pose:
-    """What <pose> of an element says; raises LinkwiseError for other than its numbers."""
+    """Return the pose that <pose> of an element gives; raises LinkwiseError for other than its numbers."""
     pose = element.find("pose")
     if pose is None:
         return Pose()
@@ -186,13 +193,16 @@ def pose_in(element: Element, place: str) -> Pose:
 
 
 def relative_to(element: Element) -> str:
-    """The frame that <pose> of an element names; empty where it names none."""
+    """Return the frame that <pose> of an element names; empty where it names none."""
     pose = element.find("pose")
     return "" if pose is None else pose.get("relative_to", "")
 
 
 def numbers_of(element: Element, count: int, place: str) -> tuple[float, ...]:
-    """Numbers in an element's text; of an empty pose they are zeros."""
+    """Return the numbers in an element's text, zeros for an empty pose.
+
+    Raises LinkwiseError naming the place unless they are `count`.
+    """
     words = (element.text or "").split() or ["0"] * (count if element.tag == "pose" else 0)
     try:
         values = tuple(float(word) for word in words)
@@ -207,18 +217,18 @@ def numbers_of(element: Element, count: int, place: str) -> tuple[float, ...]:
 
 
 def numbers_in(element: Element, path: str, default: float, place: str) -> float:
-    """The number of a child, or what stands for it where there is none."""
+    """Return the number of a child, or the default where there is none."""
     found = element.find(path)
     return default if found is None else numbers_of(found, 1, place)[0]
 
 
 def text_of(element: Element, tag: str) -> str:
-    """Text of a child, empty without it."""
+    """Return the text of a child, empty without it."""
     return (element.findtext(tag) or "").strip()
 
 
 def is_true(text: str, what: str, place: str) -> bool:
-    """Whether a switch is on, which it is not where it is empty; SDFormat reads it in capitals, too.
+    """Return whether a switch is on; an empty one is off, and capitals are accepted, as in SDFormat.
 
     Raises LinkwiseError for what switches nothing on or off.
     """
@@ -229,5 +239,5 @@ def is_true(text: str, what: str, place: str) -> bool:
 
 
 def place_of(element: Element) -> str:
-    """The element in words."""
+    """Return the element in words."""
     return f"{element.tag} {element.get('name', '')!r}"

@@ -1,4 +1,4 @@
-"""What an SDFormat file says beyond the dynamics of rigid bodies, and what is read of each element."""
+"""Content of an SDFormat file beyond the dynamics of rigid bodies, and the names read of each element."""
 
 from collections.abc import Iterable, Iterator
 from xml.etree.ElementTree import Element
@@ -66,18 +66,18 @@ VOCABULARY = {
     ),
     Known(),
 )
-"""What is read of each element, and what is known beside it; the last ones hold text alone."""
+"""Names that are read of each element, and those known beside them; the last ones hold text alone."""
 
 DECAYS = ("linear", "angular")
 
 
 def known(element: Element) -> Known | None:
-    """What SDFormat knows of an element."""
+    """Return the names that SDFormat knows in an element; None for an unknown element."""
     return VOCABULARY.get(element.tag)
 
 
 def omissions(links: Iterable[Element], joints: Iterable[Element]) -> Iterator[Omission]:
-    """Return each force and inertia that the torques leave out, but for those of `SdfJoint.losses`."""
+    """Yield each force and inertia that the torques leave out, but for those of `SdfJoint.losses`."""
     for link in links:
         name = link.get("name", "")
         for what, detail in acting(link):

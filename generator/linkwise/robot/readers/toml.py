@@ -1,4 +1,4 @@
-"""Robots in TOML, schema 1."""
+"""Reader of robots in TOML, schema 1."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -20,7 +20,7 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
 def read_toml(path: Path) -> Description:
-    """Read a robot; raises LinkwiseError naming the table, the key and the remedy."""
+    """Return the description of a robot; raises LinkwiseError naming the table, the key and the remedy."""
     data = toml_data(path)
     parameters = named_parameters(data.get("parameters", {}))
     top = TomlTable("the file", data, TOP, parameters)
@@ -76,7 +76,7 @@ def _connection(data: dict[str, Any], parameters: Mapping[str, float]) -> Connec
 
 
 def _of_one_axis(table: TomlTable, keys: Iterable[str]) -> dict[str, float]:
-    """Those of the keys that are there, which only a joint of one axis takes."""
+    """Return the values of the keys that are there; raises LinkwiseError if the joint is not of one axis."""
     there = [key for key in keys if key in table.data]
     kind = table.data.get("type", "revolute")
     if there and kind not in SINGLE:

@@ -1,4 +1,4 @@
-"""[[constraint]] of TOML: in a robot's own file, or in one beside a robot's file of any format."""
+"""Constraints in TOML ([[constraint]]): of a robot's own file, or of one beside a file of any format."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -22,7 +22,10 @@ KINDS: tuple[TieKind, ...] = get_args(TieKind)
 
 
 def with_constraint_file(description: Description, path: Path) -> Description:
-    """Return a robot with the constraints of a file beside its own; raises LinkwiseError."""
+    """Return a robot with the constraints of a file beside its own.
+
+    Raises LinkwiseError for a file without constraints, or with a parameter that the robot's file has too.
+    """
     require_file(path, wanted="a TOML file with [[constraint]] in it")
     data = toml_data(path)
     TomlTable("the file", data, TOP, {})
@@ -97,7 +100,7 @@ def _anchor(table: TomlTable, end: str, kind: TieKind, description: Description)
 
 
 def _placed(frame: str, turn: Rotation, place: Vec3, description: Description) -> Anchor:
-    """Return a place in the axes of a link or, if none is called so, of a site, as one on a link."""
+    """Return a place in the axes of a link or, if no link has the name, of a site, as a place on a link."""
     if frame in {body.name for body in description.bodies}:
         return Anchor(frame, turn, place)
     for site in description.sites:

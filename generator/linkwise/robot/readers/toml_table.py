@@ -1,4 +1,4 @@
-"""Tables of a TOML file: what they must hold, and what to say when it is something else."""
+"""Tables of a TOML file, with checks of their content and errors that name the table and the key."""
 
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -14,7 +14,7 @@ from linkwise.robot.readers.formula import parse_formula
 from linkwise.robot.robot import Scalar, Vec3, unusable
 
 LARGEST = MIB
-"""Bytes of a file."""
+"""Largest size of a file, in bytes."""
 
 
 def toml_data(path: Path) -> dict[str, Any]:
@@ -33,7 +33,7 @@ def toml_data(path: Path) -> dict[str, Any]:
 
 
 class TomlTable:
-    """One table of the file; getters that name table and key when something is wrong."""
+    """One table of the file; its getters raise LinkwiseError that names table and key if one is wrong."""
 
     def __init__(self, place: str, data: Any, known: Iterable[str], parameters: Mapping[str, float]) -> None:
         if not isinstance(data, dict):
@@ -45,14 +45,14 @@ class TomlTable:
                 raise LinkwiseError(f"{place} has the unknown key {key!r}; known are {near}")
 
     def text(self, key: str, default: str | None = None) -> str:
-        """A string."""
+        """Return the string of a key."""
         value = self.data.get(key, default)
         if not isinstance(value, str):
             raise LinkwiseError(f"{self.place} needs {key!r}, a string")
         return value
 
     def scalar(self, key: str, value: Any) -> Scalar:
-        """`value` of a key as a number or a formula."""
+        """Return the `value` of a key as a number or a formula."""
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             return as_float(f"{self.place}: {key!r}", value)
         if isinstance(value, str):
@@ -61,14 +61,14 @@ class TomlTable:
         raise LinkwiseError(f"{self.place}: {key!r} must be a number or a formula in quotes")
 
     def number(self, key: str) -> float:
-        """A number without parameters."""
+        """Return the number of a key, without parameters."""
         value = self.scalar(key, self.data[key])
         if not isinstance(value, float):
             raise LinkwiseError(f"{self.place}: {key!r} takes a number only, without parameters")
         return value
 
     def vector(self, key: str, default: list[float] | None) -> Vec3:
-        """Three numbers or formulas."""
+        """Return the three numbers or formulas of a key."""
         value = self.data.get(key, default)
         if not isinstance(value, list) or len(value) != 3:
             raise LinkwiseError(f"{self.place} needs {key!r}, three numbers")
@@ -76,7 +76,7 @@ class TomlTable:
         return x, y, z
 
     def numbers(self, key: str, default: list[float]) -> tuple[float, float, float]:
-        """Three numbers without parameters."""
+        """Return the three numbers of a key, without parameters."""
         x, y, z = self.vector(key, default)
         if not all(isinstance(item, float) for item in (x, y, z)):
             raise LinkwiseError(f"{self.place}: {key!r} takes numbers only, parameters cannot turn a frame")
@@ -84,7 +84,7 @@ class TomlTable:
 
 
 def named_parameters(data: Any) -> dict[str, float]:
-    """Return the table [parameters] of a file."""
+    """Return the numbers in the table [parameters] of a file, by name."""
     if not isinstance(data, dict):
         raise LinkwiseError("[parameters] must be a table of numbers")
     for name, value in data.items():

@@ -1,4 +1,4 @@
-"""The dynamics of a URDF file; what it says beyond them is noted as ignored. Meshes are never opened."""
+"""Reader of URDF files; content beyond the dynamics is noted as ignored. Meshes are never opened."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -17,7 +17,7 @@ from linkwise.robot.robot import NOTHING, UNLIMITED, Limits, Passive
 
 
 def read_urdf(path: Path) -> Description:
-    """Read a robot; raises LinkwiseError naming the element and the remedy."""
+    """Return the description of a robot; raises LinkwiseError naming the element and the remedy."""
     robot = parse(path)
     if robot.tag != "robot":
         raise LinkwiseError(f"the root element is <{robot.tag}>; a URDF file has <robot>")
@@ -103,7 +103,7 @@ def _connection(element: Element, passive: Mapping[str, Passive]) -> Connection:
 
 
 def _limits(element: Element, place: str) -> Limits:
-    """What <limit> says; a continuous joint has no ends, whatever stands there."""
+    """Return the limits that <limit> gives; a continuous joint has no ends, whatever stands there."""
     limit = element.find("limit")
     if limit is None or element.get("type") not in SINGLE:
         return UNLIMITED

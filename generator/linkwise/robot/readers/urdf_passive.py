@@ -28,7 +28,7 @@ class Given(NamedTuple):
 
 
 def passives(robot: Element) -> dict[str, Passive]:
-    """What the joints of one axis have of their own, by their names."""
+    """Return the passive properties of the joints of one axis, by the joints' names."""
     found: dict[str, dict[str, float]] = {}
     for given in given_numbers(robot):
         found.setdefault(given.joint, {})[given.what] = given.number
@@ -36,7 +36,7 @@ def passives(robot: Element) -> dict[str, Passive]:
 
 
 def given_numbers(robot: Element) -> Iterator[Given]:
-    """Everything that is said of joints of one axis, the last word on each last."""
+    """Yield every passive number that is given for joints of one axis; the number that counts comes last."""
     joints = {joint.get("name", ""): joint for joint in robot.findall("joint") if joint.get("type") in SINGLE}
     for name, joint in joints.items():
         for dynamics in joint.findall("dynamics"):
@@ -65,7 +65,7 @@ def _rotor(joint: str, actuator: Element) -> Iterator[Given]:
 
 
 def _number(element: Element) -> float | None:
-    """The element's number, in its text or as an attribute; None where there is none."""
+    """Return the element's number, in its text or as an attribute; None where there is none."""
     try:
         return float((element.get("value") or element.text or "").strip())
     except ValueError:

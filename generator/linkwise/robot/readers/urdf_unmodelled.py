@@ -1,4 +1,4 @@
-"""What a URDF file says beyond the dynamics of rigid bodies and what `urdf_passive` reads."""
+"""Content of a URDF file beyond the dynamics of rigid bodies and what `urdf_passive` reads."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import replace
@@ -28,7 +28,7 @@ SWITCHES = {
     "kinematic": (("true", "1"), "Gazebo's switch for dynamics"),
     "enable_wind": (("true", "1"), "Gazebo's wind"),
 }
-"""Gazebo's ways to take a link's weight away, to hold it, and to push it."""
+"""Switches of Gazebo that take a link's weight away, hold the link, or push it."""
 
 TIES = {
     "loop_joint": "joint that closes a loop",
@@ -75,23 +75,23 @@ VOCABULARY = {
         idle=names("acceleration deceleration jerk power current command_effort gear_velocity"),
     ),
 }
-"""What is read of each element, and what is known beside it."""
+"""Names that are read of each element, and those known beside them."""
 SEVERAL_AXES = replace(
     VOCABULARY["joint"],
     once=VOCABULARY["joint"].once - {"limit"},
     idle=VOCABULARY["joint"].idle | {"limit"},
 )
-"""Of a joint that is not of one axis: its limits are not read."""
+"""Names of a joint that is not of one axis: its limits are not read."""
 
 
 def known(element: Element) -> Known | None:
-    """What URDF knows of an element."""
+    """Return the names that URDF knows in an element; None for an unknown element."""
     several = element.tag == "joint" and element.get("type") not in SINGLE
     return SEVERAL_AXES if several else VOCABULARY.get(element.tag)
 
 
 def omissions(robot: Element) -> Iterator[Omission]:
-    """Return each force and inertia that the torques leave out."""
+    """Yield each force and inertia that the torques leave out."""
     links = {link.get("name", "") for link in robot.findall("link")}
     for joint in robot.findall("joint"):
         name = joint.get("name", "")
@@ -117,7 +117,7 @@ def omissions(robot: Element) -> Iterator[Omission]:
 
 
 def _ties(robot: Element, links: Collection[str]) -> Iterator[Omission]:
-    """What ties links together beside the joints, of the file or in Gazebo's part of it, and links there."""
+    """Yield what ties links together beside the joints, with the joints and links in Gazebo's elements."""
     parts = [(part, TIES.get(local_name(part.tag))) for part in robot]
     parts += [
         (inner, f"Gazebo's {tag}")
@@ -133,7 +133,7 @@ def _ties(robot: Element, links: Collection[str]) -> Iterator[Omission]:
 
 
 def acting(part: Element, read: Collection[int] = ()) -> Iterator[tuple[str, str]]:
-    """What of an extension loads joints, with its value, but for elements that were `read`, by id."""
+    """Yield what of an extension loads joints, with its value, but for elements that were `read`, by id."""
     for element in part.iter():
         if id(element) in read:
             continue

@@ -1,4 +1,4 @@
-"""XML files: parsed within bounds, and the numbers of their attributes."""
+"""Parsing of XML files within bounds, and the numbers of their attributes."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,15 +12,15 @@ from linkwise.robot.readers.bounded import MIB, content
 
 XACRO = "this is xacro, a language of macros; expand it first: xacro FILE > robot.urdf"
 LARGEST = 4 * MIB
-"""Bytes of a file."""
+"""Largest size of a file, in bytes."""
 MAX_DEPTH = 256
-"""Most elements inside each other: MJCF nests the links of a chain."""
+"""Deepest nesting of elements: MJCF nests the links of a chain."""
 
 MACROS = ("${", "$(")
 
 
 class _Builder(TreeBuilder):
-    """Builds the elements of a file that is neither deep nor full of macros."""
+    """Builder of the elements of a file that is neither deep nor full of macros."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -45,9 +45,9 @@ class _Builder(TreeBuilder):
 
 
 def parse(path: Path, largest: int = LARGEST, as_xml: Callable[[bytes], bytes] | None = None) -> Element:
-    """Root element; raises LinkwiseError for malformed XML, and for xacro, which is to be expanded first.
+    """Return the root element; raises LinkwiseError for malformed XML, and for xacro, to be expanded first.
 
-    largest: most bytes of the file; as_xml: what makes XML of a file that is not quite
+    largest: most bytes of the file; as_xml: makes XML of a file that is not quite
     """
     data = content(path, largest)
     data = as_xml(data) if as_xml else data
@@ -69,7 +69,7 @@ def parse(path: Path, largest: int = LARGEST, as_xml: Callable[[bytes], bytes] |
 
 
 def numbers(element: Element, key: str, default: str, count: int, place: str) -> tuple[float, ...]:
-    """Numbers of an attribute; raises LinkwiseError naming the element where they are not `count`."""
+    """Return the numbers of an attribute; raises LinkwiseError naming the element unless they are `count`."""
     text = element.get(key, default)
     try:
         values = tuple(float(item) for item in text.split())

@@ -1,8 +1,9 @@
-"""What a format calls its elements and attributes: a name that is misspelt is not passed over.
+"""Names of a format's elements and attributes: a name that is misspelt is not passed over.
 
-Near a name that is read, an unknown one is refused, as what it holds, a mass say, would vanish. Any other is
-noted, and told wherever the robot is used, with its place; so is what says how a robot moves but stands where
-nothing reads it, an <inertial> within a <visual> say. Names with a namespace are extensions.
+An unknown name near one that is read is refused, as its content, for example a mass, would vanish. Any other
+is noted with its place, and reported wherever the robot is used; so is an element that says how a robot moves
+but stands where nothing reads it, for example an <inertial> within a <visual>. Names with a namespace are
+extensions.
 """
 
 from collections import Counter
@@ -17,23 +18,24 @@ from linkwise.escape import short
 from linkwise.robot.notes import Note
 
 FAR = 3
-"""Wrong letters that make another name of it."""
+"""Number of wrong letters that make it another name."""
 SHORT = 6
-"""Letters from which on two may be wrong."""
+"""Shortest name, in letters, of which two may be wrong."""
 
 Names: TypeAlias = frozenset[str]
 
 
 def names(text: str) -> Names:
-    """Names from a list with spaces between them."""
+    """Return the names in a list with spaces between them."""
     return frozenset(text.split())
 
 
 @dataclass(frozen=True)
 class Known:
-    """What an element may hold: children that are read `once` or `many` times, and attributes.
+    """Names that an element may hold: children that are read `once` or `many` times, and attributes.
 
-    idle: children and attributes that are known not to load a joint, or whose loads are told by themselves
+    idle: children and attributes that are known not to load a joint, or whose loads are reported by
+    themselves
     """
 
     once: Names = frozenset()
@@ -43,32 +45,33 @@ class Known:
 
 
 STRAYS = names("model link joint inertial mass inertia mimic dynamics")
-"""Elements that say how a robot moves; they are looked for where nothing is read."""
+"""Elements that describe how a robot moves; they are looked for where nothing is read."""
 FOREIGN = names("actor components gazebo loop_joint plugin population ros2_control state transmission")
-"""Elements in which such names mean something else, or are told by themselves."""
+"""Elements in which such names mean something else, or are reported by themselves."""
 
 Place: TypeAlias = tuple[str, ...]
-"""An element from the nearest around it that has a name inwards."""
+"""Path to an element, from the nearest around it that has a name inwards."""
 Vocabulary: TypeAlias = Callable[[Element], Known | None]
-"""What the format knows of an element; None for one that is not looked into."""
+"""Function that gives the names known in an element; None for one that is not looked into."""
 
 
 @dataclass(frozen=True)
 class _Unread:
-    """What is not read: how often there is what is known, and the places of what is not."""
+    """Names that are not read: counts of those that are known, and places of those that are not."""
 
     idle: Counter[str] = field(default_factory=Counter)
     unknown: dict[str, list[Place]] = field(default_factory=dict)
 
     def add(self, what: str, place: Place, count: int = 1) -> None:
-        """Note something unknown."""
+        """Add an unknown name at a place, `count` times."""
         self.unknown.setdefault(what, []).extend([place] * count)
 
 
 def ignored(elements: Iterable[Element], known: Vocabulary, format: str) -> tuple[Note, ...]:
-    """A note for each kind of child and attribute that is not read, with how often, and where if unknown.
+    """Return a note, with a count, for each kind of child and attribute that is not read.
 
-    Raises LinkwiseError for a name near one that is read, and for a second child where one is read.
+    An unknown one is noted with its place. Raises LinkwiseError for a name near one that is read, and for a
+    second child where one is read.
     """
     unread = _Unread()
     for element in elements:
@@ -81,7 +84,7 @@ def ignored(elements: Iterable[Element], known: Vocabulary, format: str) -> tupl
 
 
 def _times(places: list[Place]) -> str:
-    """How often, and where first."""
+    """Return in words how often something occurs, and where first."""
     return f"{len(places)} ×{' first' if len(places) > 1 else ''} in {' of '.join(reversed(places[0]))}"
 
 
@@ -114,7 +117,7 @@ def _look_into(element: Element, known: Vocabulary, outside: Place, unread: _Unr
 
 
 def _strays(element: Element) -> Iterator[str]:
-    """What of an element that is not read would say how the robot moves if it stood elsewhere."""
+    """Yield tags in an element that is not read which elsewhere would describe how the robot moves."""
     for child in element if local_name(element.tag) not in FOREIGN else ():
         if child.tag in STRAYS:
             yield child.tag
@@ -134,19 +137,19 @@ def refuse_misspelt(place: str, shown: str, name: str, meant: dict[str, str]) ->
 
 
 def local_name(name: str) -> str:
-    """A name without its namespace."""
+    """Return a name without its namespace."""
     return name.rpartition("}")[2].rpartition(":")[2]
 
 
 def _shown(name: str) -> str:
-    """A name with its namespace behind it."""
+    """Return a name with its namespace behind it."""
     space, _, rest = name.removeprefix("{").rpartition("}")
     return f"{rest} of {space}" if space else rest
 
 
 @lru_cache
 def _distance(a: str, b: str) -> int:
-    """Letters to put in, leave out, change, or exchange with the next, to make one of the other."""
+    """Return the count of letters to insert, leave out, change, or swap with the next, to make a into b."""
     if abs(len(a) - len(b)) > FAR:
         return FAR
     if not a or not b:

@@ -1,6 +1,7 @@
-"""Motion of joints that rows A hold, of ties or of contacts, and whether a position is one to compute it at.
+"""Motion of joints under constraint rows A, of ties or contacts, and the positions suited for computing it.
 
-A is (samples, C, n). Joints `rest` follow the others, `own`, where A_d, A's columns of them, has full rank.
+A is (samples, C, n). Joints `rest` follow the others, `own`, where A_d, the columns of A for `rest`, has full
+rank.
 """
 
 from collections.abc import Sequence
@@ -9,40 +10,44 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwise.check.loop_equations import following
-from linkwise.check.newton_euler import NewtonEuler
-from linkwise.check.states import States
+from linkwise.oracle.loop_equations import following
+from linkwise.oracle.newton_euler import NewtonEuler
+from linkwise.oracle.states import States
 from linkwise.package.load import Array
 
 FAR = 100.0
-"""Of `condition_of`, below which a position is far from singular ones."""
+"""Value of `condition_of` below which a position is far from singular ones."""
 MOST = 1e6
-"""The same, above which nothing is left to compare."""
+"""Value of `condition_of` above which nothing is left to compare."""
 STEADY = 1e-2
-"""Least eigenvalue of a mass matrix beside that of others."""
+"""Least eigenvalue of a mass matrix, relative to the median of that of all."""
 REGULAR = 1e-8
-"""Least eigenvalue of any, with ones on its diagonal: below, joints can move together without a mass."""
+"""Least eigenvalue of any mass matrix, with ones on its diagonal: below, joints can move together without a
+mass."""
 REFINED = 3
 LEAST = 1e-300
-"""In place of a singular value that is 0."""
+"""Replacement for a singular value that is 0."""
 
 
 def condition_of(rows: Array, rest: Sequence[int]) -> Array:
-    """What A (samples, C, n) moves at most, to what A_d, its columns `rest`, moves at least: (samples,)."""
+    """Return the largest singular value of A (samples, C, n) over the least of columns `rest`, (samples,)."""
     most, sizes = (np.linalg.svd(part, compute_uv=False) for part in (rows, rows[..., rest]))
     condition: Array = most[:, 0] / np.maximum(sizes[:, -1], LEAST)
     return condition
 
 
 def far_from_singular(rows: Array, rest: Sequence[int]) -> NDArray[np.intp]:
-    """Which of A (samples, C, n) are, by columns `rest`: the best first if none is far enough."""
+    """Return the indices of those of A (samples, C, n) that are far from singular in columns `rest`.
+
+    If none is, the best are returned that can be compared at all, the very best first.
+    """
     condition = condition_of(rows, rest)
     found = np.flatnonzero(condition < FAR)
     return found if found.size else np.argsort(condition)[: np.count_nonzero(condition < MOST)]
 
 
 def mass_matrix(recursion: NewtonEuler, q: Array) -> Array:
-    """M (samples, n, n), column by column, all columns at once."""
+    """Return M (samples, n, n), column by column, with all columns in one call."""
     samples, n = q.shape
     rest, units = np.zeros((samples * n, n)), np.tile(np.eye(n), (samples, 1))
     torque = recursion.torque(np.repeat(q, n, 0), rest, units, gravity=False)
@@ -51,7 +56,10 @@ def mass_matrix(recursion: NewtonEuler, q: Array) -> Array:
 
 
 def held_mass(recursion: NewtonEuler, q: Array, rows: Array, own: Sequence[int]) -> Array:
-    """M, with noise where who takes the others out by G has that of G^T M G: in rows and columns of `own`."""
+    """Return M (samples, n, n), with the noise of G^T M G, if any, in the rows and columns of `own`.
+
+    A solution that eliminates the other joints by G has that noise.
+    """
     mass = mass_matrix(recursion, q)
     if recursion.noise:
         of_own = np.ix_(range(len(q)), own, own)
@@ -62,22 +70,22 @@ def held_mass(recursion: NewtonEuler, q: Array, rows: Array, own: Sequence[int])
 
 
 def unit_sizes(mass: Array) -> Array:
-    """sqrt(M_ii) (samples, n), 1 where that is none: what a coordinate is measured by in a mass matrix."""
+    """Return sqrt(M_ii) (samples, n), 1 where that is 0: the unit of each coordinate in a mass matrix."""
     diagonal = np.abs(mass.diagonal(0, -2, -1))
     return np.where(diagonal > 0.0, np.sqrt(diagonal), 1.0)
 
 
 def motions(mass: Array, rows: Array) -> Array:
-    """N (samples, n, m), what joints may do under rows A: orthonormal if each is measured by sqrt(M_ii)."""
+    """Return N (samples, n, m), joints' motions under rows A: orthonormal if measured by sqrt(M_ii) each."""
     size = unit_sizes(mass)
     null = np.swapaxes(np.linalg.svd(rows / size[:, None, :])[2][:, rows.shape[1] :], -1, -2)
     return null / size[:, :, None]
 
 
 def steady(recursion: NewtonEuler, q: Array, mapped: Array) -> NDArray[np.bool_]:
-    """Which positions (samples, n) are not next to a singular mass matrix, as others go.
+    """Return which positions (samples, n) are not next to a singular mass matrix, compared with the others.
 
-    mapped: G (samples, n, m); of G^T M G, with ones on its diagonal, the least eigenvalue counts
+    mapped: G (samples, n, m); the least eigenvalue of G^T M G, with ones on its diagonal, counts
     """
     mass = np.swapaxes(mapped, -1, -2) @ mass_matrix(recursion, q) @ mapped
     size = unit_sizes(mass)
@@ -91,10 +99,12 @@ def steady(recursion: NewtonEuler, q: Array, mapped: Array) -> NDArray[np.bool_]
 def held_motion(
     recursion: NewtonEuler, states: States, rows: Array, rates: Array, tau: Array, own: Sequence[int]
 ) -> tuple[Array, Array]:
-    """qdd and lambda of torques under rows that do not follow from each other and leave `own` free.
+    """Return qdd (samples, n) and lambda (samples, C) of torques under rows A.
 
-    Of M qdd - A^T lambda = tau - h and A qdd = -dA/dt qd as one system, in units of which each joint's mass
-    and each row's largest number are 1: a light link's motion is not lost beside a body's.
+    The rows do not follow from each other, and leave `own` free.
+    M qdd - A^T lambda = tau - h and A qdd = -dA/dt qd are solved as one system, in units in which each
+    joint's
+    mass and each row's largest number are 1: a light link's motion is not lost beside a body's.
     """
     q, qd, _ = states.motion
     mass = held_mass(recursion, q, rows, own)
@@ -113,13 +123,13 @@ def held_motion(
         force = recursion.noise(force, np.abs(tau) + np.abs(bias))
     given = np.concatenate([force[..., None] / size[..., None], -change / largest], 1)
     found = _solved(system, given)
-    if recursion.noise:  # whoever solves it rounds what the equations sum up
+    if recursion.noise:  # any solution rounds the sums in the equations
         found = _solved(system, recursion.noise(given, np.abs(system) @ np.abs(found)))
     return found[:, :n, 0] / size, -found[:, n:, 0] / largest[..., 0]
 
 
 def _solved(system: Array, given: Array) -> Array:
-    """A solution that is off by no more than rounding of the equations' own sums: refined (Skeel 1980)."""
+    """Return a solution that is off by no more than rounding of the equations' sums: refined (Skeel 1980)."""
     found: Any = np.linalg.solve(system, given)
     for _ in range(REFINED):
         left = given - system.astype(np.longdouble) @ found
@@ -129,9 +139,9 @@ def _solved(system: Array, given: Array) -> Array:
 
 
 def with_noise(recursion: NewtonEuler, product: Array, solution: Array, columns: Array) -> Array:
-    """A solution of least squares (samples, m, n) times columns, with its noise if there is any.
+    """Return `product`, a least-squares solution (samples, m, n) times columns, with its noise if any.
 
-    It is by singular vectors, of which every number is rounded by the size of the largest.
+    The solution is by singular vectors, of which every number is rounded by the size of the largest.
     """
     if not recursion.noise:
         return product

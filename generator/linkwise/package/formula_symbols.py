@@ -1,4 +1,4 @@
-"""What stands for each quantity in formulas that are read: as plain text and as LaTeX, no two alike."""
+"""Symbols of the quantities in printed formulas, as plain text and as LaTeX, no two alike."""
 
 import re
 from collections.abc import Sequence
@@ -9,14 +9,14 @@ from linkwise.escape import identifiers, latex_symbol
 
 WORDS = "|".join(("sin", "cos", "tan", "sqrt", "exp", "log", "pi", "E", "e", "I", *kwlist))
 USABLE = re.compile(rf"(?!(q|qd|qdd|tau)_|({WORDS})$)[A-Za-z][0-9A-Za-z_]*")
-"""Names of parameters that a formula can hold as they are, and that stand for nothing else in it.
+"""Pattern of parameter names that a formula can use as they are, and that stand for nothing else in it.
 
-Words of Python's, such as lambda, are none: formulas.txt is in its notation.
+Words of Python's, such as lambda, are not among them: formulas.txt is in its notation.
 """
 MOTION = {"q": "q", "qd": r"\dot{q}", "qdd": r"\ddot{q}"}
 """LaTeX of q_k, q̇_k and q̈_k without their index."""
 OWN = re.compile(r"(q|\\tau)_\{\d+\}")
-"""LaTeX that a parameter's name could be made into, and that a coordinate or a torque has."""
+"""Pattern of LaTeX that a parameter's name could be made into, and that a coordinate or a torque has."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,12 @@ class FormulaSymbol:
 
 
 def motion_symbol(kind: str, k: int) -> FormulaSymbol:
-    """Symbol of q_k, qd_k or qdd_k, k counted from 1."""
+    """Return the symbol of q_k, qd_k or qdd_k, k counted from 1."""
     return FormulaSymbol(f"{kind}_{k}", f"{MOTION[kind]}_{{{k}}}")
 
 
 def parameter_symbols(names: Sequence[str]) -> list[FormulaSymbol]:
-    """Symbols of parameters: their own names where these are usable, else names made of them."""
+    """Return the symbols of parameters: their own names where these are usable, else names made of them."""
     usable = [name for name in names if USABLE.fullmatch(name)]
     made = iter(identifiers([name for name in names if name not in usable], "p_", usable))
     symbols: list[FormulaSymbol] = []

@@ -5,13 +5,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from linkwise_runtime.constraints.independent_joints import chosen_independent, rank_of, redundant_names
+from linkwise_runtime.rule.joint_tree import TreeTie
 
-from linkwise.emit.definition import rigid_tree
-from linkwise.emit.loop_closing import Array, closed_loops
+from linkwise.constraints.loop_closing import Array, closed_loops
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.notes import BESIDE, LEAST, Note
-from linkwise.robot.robot import Coupling, Robot, Tie
+from linkwise.robot.robot import Coupling, Robot
+from linkwise.symbolic.definition import rigid_tree
 from linkwise.symbolic.system import RigidSystem, System
 
 
@@ -19,7 +20,7 @@ def constrained_system(system: System) -> System:
     """Return the system with its independent coordinates found, if it has constraints; else as it is.
 
     Raises LinkwiseError for constraints that never close, that hold nothing or all that moves, and for
-    coordinates asked for that others do not follow.
+    requested coordinates that the others do not follow.
     """
     if not isinstance(system, RigidSystem) or system.robot.independent:
         return system
@@ -27,7 +28,7 @@ def constrained_system(system: System) -> System:
     if not (robot.ties or robot.couplings):
         return system
     tree = rigid_tree(system)
-    assert tree is not None  # of rigid links there is one
+    assert tree is not None  # rigid links always have one
     loops = closed_loops(tree, len(robot.coordinates))
     chosen = _independent(robot, loops.rows)
     position = loops.position(chosen)
@@ -38,13 +39,17 @@ def constrained_system(system: System) -> System:
 
 
 def constraints_of(robot: Robot) -> Iterator[tuple[str, str]]:
-    """Names of what ties joints, and what it holds, in words; none of an open tree."""
+    """Yield the name of each constraint of the joints, and what it holds, in words; none of an open tree."""
     yield from ((tie.name, _about_tie(tie, robot)) for tie in robot.ties)
     yield from ((coupling.name, _about_coupling(coupling, robot)) for coupling in robot.couplings)
 
 
 def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
-    """Return those asked for if they do, else those that pivoting leaves, rather driven ones."""
+    """Return the independent coordinates: those asked for, or those that pivoting leaves, driven ones first.
+
+    Raises LinkwiseError for constraints that hold nothing or all that moves, and for coordinates asked for
+    that are too many or too few, or that the others do not follow.
+    """
     names = [coordinate.name for coordinate in robot.coordinates]
     rank = rank_of(rows)
     free = len(names) - rank
@@ -79,9 +84,9 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
 
 
 def _proposed(robot: Robot, rows: Array) -> tuple[int, ...]:
-    """Return those that pivoting leaves.
+    """Return the independent coordinates that pivoting leaves.
 
-    Dependent are first joints that the file has follow others, which these give wherever they are, unless
+    Dependent are first joints that the file has follow others, from which they follow everywhere, unless
     actuators drive them; then rather joints that nothing drives, that follow, that slide, that no spring
     holds, those farthest from the ground, and the last.
     """
@@ -98,13 +103,13 @@ def _proposed(robot: Robot, rows: Array) -> tuple[int, ...]:
 
 
 def _depths(robot: Robot, coordinate: int) -> list[int]:
-    """Return how many joints are before those of a coordinate."""
+    """Return the length of the chain to each joint of a coordinate, itself included."""
     own = (at for at, link in enumerate(robot.links) if link.joint.coordinate == coordinate)
     return [len(robot.chain(at)) for at in own]
 
 
 def _asked(names: Iterable[str]) -> str:
-    """The option that asks for joints; one whose name has a comma has an option of its own."""
+    """Return the options that ask for joints; one whose name has a comma has an option of its own."""
     plain, apart = list[str](), list[str]()
     for name in names:
         (apart if "," in name else plain).append(name)
@@ -116,8 +121,8 @@ def _count(number: int) -> str:
     return f"{number} joint{' is' if number == 1 else 's are'}"
 
 
-def _about_tie(tie: Tie, robot: Robot) -> str:
-    """What it holds, in words."""
+def _about_tie(tie: TreeTie, robot: Robot) -> str:
+    """Return what a tie holds, in words."""
     first, second = (robot.named_frames[frame].name for frame in (tie.first, tie.second))
     length = f" of {tie.length:g} m" if tie.kind == "distance" else ""
     return f"{tie.kind}{length}, {first} and {second}"

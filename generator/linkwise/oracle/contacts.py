@@ -1,16 +1,16 @@
-"""Rows of a frame that the ground holds, from the recursion's own velocities, and how joints follow there."""
+"""Constraint rows of a frame that the ground holds, from the recursion's own velocities."""
 
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from linkwise_runtime.quantities import Contact
+from linkwise_runtime.rule.joint_tree import TreeFrame
 from numpy.typing import NDArray
 
-from linkwise.check.body_reference import COMPLEX_STEP
-from linkwise.check.loop_equations import RANK, TURNS_AND_SHIFTS, LoopEquations
-from linkwise.check.newton_euler import NewtonEuler
-from linkwise.package.entries import FrameEntry
+from linkwise.oracle.loop_equations import RANK, TURNS_AND_SHIFTS, LoopEquations
+from linkwise.oracle.newton_euler import NewtonEuler
+from linkwise.oracle.reference import COMPLEX_STEP
 from linkwise.package.load import Array
 
 POINT = np.array([0.1, -0.2, 0.15])
@@ -18,24 +18,24 @@ AXIS = np.array([0.3, 0.5, -0.8])
 NORMAL = np.array([0.2, -0.1, 0.9])
 RADIUS = 0.07
 SPACIOUS = 20.0
-"""Contacts are nearer on links that reach less than 1 / this, in m."""
+"""Contacts lie nearer on robots that reach less than 1 / this, in m."""
 KINDS = {"held": "frame", "hinged": "hinge", "point": "point", "rolling": "point"}
-"""Kinds of contacts, and of ties that have as many rows."""
+"""Kinds of contacts, and the kind of tie that has as many rows."""
 
 
 @dataclass(frozen=True)
 class ContactEquations:
-    """A contact, beside the ties of the robot if it has some."""
+    """Equations of a contact, together with the robot's ties if it has some."""
 
     recursion: NewtonEuler
     ties: LoopEquations | None
-    frame: FrameEntry
+    frame: TreeFrame
     kind: str
 
     @property
     def asked(self) -> dict[str, Any]:
-        """What the package is asked for."""
-        length = min(1.0, SPACIOUS * self.recursion.reach) or 1.0  # no reach: all of it in one point
+        """Arguments of the contact, as a package is asked for it."""
+        length = min(1.0, SPACIOUS * self.recursion.reach) or 1.0  # no reach: the whole robot is in one point
         given: dict[str, Any] = {"frame": self.frame.name, "kind": self.kind, "point": tuple(length * POINT)}
         if self.kind == "hinged":
             given["axis"] = tuple(AXIS)
@@ -44,12 +44,12 @@ class ContactEquations:
         return given
 
     def own(self, rows: Any) -> slice:
-        """Where the contact's rows stand among all, which have those of couplings last."""
+        """Return the slice of the contact's rows among all rows, of which those of couplings are last."""
         end = rows.shape[1] - (0 if self.ties is None else len(self.ties.tree.couplings))
         return slice(end - sum(TURNS_AND_SHIFTS[KINDS[self.kind]]), end)
 
     def rows(self, q: Array) -> Array:
-        """A, (samples, C, n)."""
+        """Return A (samples, C, n)."""
         own = contact_rows(self.recursion, self.frame, Contact(**self.asked), q)
         if self.ties is None:
             return own
@@ -58,7 +58,7 @@ class ContactEquations:
         return np.concatenate([rows[:, :before], own, rows[:, before:]], 1)
 
     def freedoms(self, q: Array) -> NDArray[np.intp]:
-        """How many joints may move by themselves, (samples,): metres are measured in the robot's size."""
+        """Return how many joints may move by themselves, (samples,); metres are scaled by a robot's size."""
         size, rows = self.recursion.reach or 1.0, self.rows(q)
         kinds = [*(tie.kind for tie in (self.ties.tree.ties if self.ties else ())), KINDS[self.kind]]
         units = [unit for kind in kinds for unit in np.repeat([1.0, size], TURNS_AND_SHIFTS[kind])]
@@ -70,17 +70,17 @@ class ContactEquations:
         return found
 
     def rates(self, q: Array, qd: Array) -> Array:
-        """dA/dt."""
+        """Return dA/dt (samples, C, n)."""
         rate: Array = self.rows(q + 1j * COMPLEX_STEP * qd).imag / COMPLEX_STEP
         return rate
 
 
-def contact_rows(recursion: NewtonEuler, frame: FrameEntry, contact: Contact, q: Array) -> Array:
-    """A of a contact on a frame, (samples, rows, n)."""
+def contact_rows(recursion: NewtonEuler, frame: TreeFrame, contact: Contact, q: Array) -> Array:
+    """Return A of a contact on a frame, (samples, rows, n)."""
     samples, n = q.shape
     units, many = np.tile(np.eye(n), (samples, 1)), np.repeat(q, n, 0)
     place = np.array(frame.translation) + np.array(frame.rotation) @ np.array(contact.point)
-    speed = recursion.points([(frame.body, place)], many, units, 0.0 * units)[0]
+    speed = recursion.points([(frame.joint, place)], many, units, 0.0 * units)[0]
     moved = np.swapaxes(speed.reshape(samples, n, 6), -1, -2)
     turn, shift = moved[:, :3], moved[:, 3:]
     match contact.kind:
@@ -92,7 +92,7 @@ def contact_rows(recursion: NewtonEuler, frame: FrameEntry, contact: Contact, q:
             parts = [across @ np.swapaxes(axes, -1, -2) @ turn, shift]
         case "point":
             parts = [shift]
-        case _:  # a ball rolls: at rest is the point that is a radius below its centre
+        case _:  # a rolling ball: the point one radius below its centre is at rest
             normal: Array = np.array(contact.normal)
             down = -contact.radius * normal / np.linalg.norm(normal)
             parts = [shift + np.cross(turn, down[None, :, None], axis=1)]

@@ -1,9 +1,10 @@
-"""What constraints are held against: motion in the null space of A, and least squares, where loops close.
+"""Reference for constraints: motion in the null space of A, and least squares, where loops close.
 
 With N an orthonormal basis of the null space, M qdd + h = tau + A^T lambda and A qdd = -dA/dt qd give
 (N^T M N) z = N^T (tau - h - M p) for qdd = N z + p, p = -A^+ dA/dt qd; lambda is what A^T lambda fits best.
 N is orthonormal in joints measured by sqrt(M_ii), so that a light link's motion is not lost beside a body's.
-The package goes another way: it takes the dependent joints out, by QR. What that may lose is in the noise.
+The package goes another way: it eliminates the dependent joints, by QR. The noise includes what that may
+lose.
 
 Loops may be open by some micrometres, where a file's numbers are rounded: rows are those of `basis`, U^T A
 and U^T dA/dt for U^T lambda, which are as good as all of them where loops close.
@@ -14,8 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.check.body_reference import by_unit
-from linkwise.check.held_motion import (
+from linkwise.oracle.held_motion import (
     condition_of,
     far_from_singular,
     held_mass,
@@ -24,24 +24,25 @@ from linkwise.check.held_motion import (
     steady,
     with_noise,
 )
-from linkwise.check.loop_equations import LoopEquations
-from linkwise.check.newton_euler import NewtonEuler
-from linkwise.check.rounding import measured
-from linkwise.check.states import States
+from linkwise.oracle.loop_equations import LoopEquations
+from linkwise.oracle.newton_euler import NewtonEuler
+from linkwise.oracle.reference import by_unit
+from linkwise.oracle.rounding import measured
+from linkwise.oracle.states import States
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest, RigidTree
 
 STATES = 12
 TRIED = 60
 SMALL = 1e-7
-"""Singular values below this part of the largest are those of rows that follow from others."""
+"""Singular values below this part of the largest belong to rows that follow from others."""
 
 
 @dataclass(frozen=True)
 class LoopReference:
-    """Answers to `states`, in which loops close, by name, samples first, and the scales of their rounding.
+    """Answers at `states`, in which loops close, by name, samples first, and the scales of their rounding.
 
-    tau: (samples, n), on all joints
+    tau: torques on all joints, (samples, n)
     """
 
     equations: LoopEquations
@@ -53,11 +54,11 @@ class LoopReference:
 
 
 def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopReference | None:
-    """The answers where loops close; None where none of the states leads there."""
+    """Return the answers where loops close; None where none of the states leads there."""
     equations = LoopEquations(NewtonEuler(manifest, tree), tree)
     own = tree.independent
     rest = [k for k in range(len(manifest.joints)) if k not in own]
-    # Ever less far around where the package has them closed: somewhere there is always one.
+    # Ever closer to where the package has the loops closed, so that some start always succeeds.
     tried = states.q[:TRIED]
     starts = [tried, *(tree.closed_position + tried * part for part in (0.5, 0.1, 0.02))]
     q = equations.closed_near(np.concatenate(starts))
@@ -78,7 +79,7 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
 
 
 def _answers(equations: LoopEquations, motion: tuple[Array, Array, Array], tau: Array) -> dict[str, Array]:
-    """Everything that a package says of q, yd and ydd, and of torques."""
+    """Return all answers of a package to q, yd and ydd, and to torques, by name."""
     (q, yd, ydd), own = motion, equations.tree.independent
     rest = [k for k in range(q.shape[1]) if k not in own]
     rows, basis = equations.rows(q), equations.basis(q)
@@ -91,7 +92,7 @@ def _answers(equations: LoopEquations, motion: tuple[Array, Array, Array], tau: 
     shares, link_forces = _shared(equations, own, held, States(q, qd, qdd))
 
     def share(speed: Array, change: Array, gravity: bool = False) -> Array:
-        """Of each q, for as many motions in turn as there are for one."""
+        """Return the shares at each q, for as many motions in turn as there are for one."""
         times = len(speed) // len(q)
         again = np.repeat(q, times, 0)
         other = _Followed(equations, own, rest, again)
@@ -101,7 +102,7 @@ def _answers(equations: LoopEquations, motion: tuple[Array, Array, Array], tau: 
 
     of_own = States(yd, yd, ydd)
     c2 = by_unit(lambda y, yd, ydd, e: share(0.0 * yd, e), of_own)
-    # A quadratic form of yd, whose central difference is its derivative; the closing convention takes half.
+    # The central difference of a quadratic form of yd is its derivative; the closing convention takes half.
     c1 = by_unit(lambda y, yd, ydd, e: (share(yd + e, 0.0 * yd) - share(yd - e, 0.0 * yd)) / 4.0, of_own)
     units = equations.units[:, None]
     found = {
@@ -128,11 +129,12 @@ def _answers(equations: LoopEquations, motion: tuple[Array, Array, Array], tau: 
 def _induced(
     equations: LoopEquations, states: States, tied: tuple[Array, Array, Array], tau: Array
 ) -> dict[str, Array]:
-    """Accelerations (samples, n, ...) and forces of ties (samples, C, ...) by source.
+    """Return accelerations (samples, n, ...) and forces of ties (samples, C, ...) by source.
 
     Each source x with force F_x, and the constraints' own with A q̈ = b, b = −Ȧ_s q̇_s, has
 
-        q̈_x = N (Nᵀ M N)⁻¹ Nᵀ (F_x − M p_x) + p_x,  p_x = A⁺ b_x      λ_x: what Aᵀ λ_x = M q̈_x − F_x fits best
+        q̈_x = N (Nᵀ M N)⁻¹ Nᵀ (F_x − M p_x) + p_x,  p_x = A⁺ b_x
+        λ_x: what Aᵀ λ_x = M q̈_x − F_x fits best
     """
     (rows, rates, basis), torque = tied, equations.recursion.partial_torque
     q, qd, _ = states.motion
@@ -165,7 +167,7 @@ def _induced(
 
 @dataclass(frozen=True)
 class _Followed:
-    """Motion of all joints by that of the independent ones, by least squares."""
+    """Motion of all joints that follows from the independent ones, by least squares."""
 
     equations: LoopEquations
     own: Sequence[int]
@@ -174,16 +176,16 @@ class _Followed:
 
     @property
     def map(self) -> Array:
-        """G, (samples, n, m)."""
+        """Velocity map G, (samples, n, m)."""
         return self.equations.velocity_map(self.q)
 
     def velocity(self, yd: Array) -> Array:
-        """qd."""
+        """Return qd (samples, n)."""
         full: Array = (self.map @ yd[..., None])[..., 0]
         return full
 
     def acceleration(self, qd: Array, ydd: Array) -> Array:
-        """qdd."""
+        """Return qdd (samples, n)."""
         rows, drift = self.equations.rows(self.q), self.equations.rates(self.q, qd) @ qd[..., None]
         full = self.velocity(ydd)
         full[:, self.rest] -= (np.linalg.pinv(rows[..., self.rest]) @ drift)[..., 0]
@@ -193,7 +195,7 @@ class _Followed:
 def _shared(
     equations: LoopEquations, own: Sequence[int], rows: Array, states: States, gravity: bool = True
 ) -> tuple[Array, Array]:
-    """What independent joints and ties bear of each link: S tau^ + A^T lambda = tau_j."""
+    """Return the shares of each link that independent joints and ties carry: S tau^ + A^T lambda = tau_j."""
     samples, _, n = rows.shape
     driven = np.broadcast_to(np.eye(n)[:, own], (samples, n, len(own)))
     both = np.concatenate([driven, np.swapaxes(rows, -1, -2)], -1)

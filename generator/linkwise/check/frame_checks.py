@@ -1,4 +1,4 @@
-"""What the kinematics of frames is held against: the recursion's own frames, one unit velocity at a time.
+"""Checks of the kinematics of frames against the recursion's own frames, one unit velocity at a time.
 
 With q̇ = e_k the recursion's velocities are column k of the Jacobian, and their complex step along q̇ is that
 column's rate. Scales are bounds of what each number is summed from, as in `magnitudes`.
@@ -12,18 +12,17 @@ import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 from numpy.typing import NDArray
 
-from linkwise.check.body_reference import COMPLEX_STEP
 from linkwise.check.compare import Entries, Result, compare
-from linkwise.check.magnitudes import Magnitudes
-from linkwise.check.newton_euler import NewtonEuler
-from linkwise.check.reference import TOLERANCE
-from linkwise.check.states import States
+from linkwise.oracle.magnitudes import Magnitudes
+from linkwise.oracle.newton_euler import NewtonEuler
+from linkwise.oracle.reference import COMPLEX_STEP, TOLERANCE
+from linkwise.oracle.states import States
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest, RigidTree
 
 STATES = 12
 MOST_FRAMES = 16
-"""Frames that calls for a single one are tried with; poses are of all."""
+"""Most frames that calls for a single one are tried with; poses are checked for all."""
 
 Quantity = tuple[Array, Array]
 """Values and their scales."""
@@ -31,7 +30,7 @@ Quantity = tuple[Array, Array]
 
 @dataclass(frozen=True)
 class FrameReference:
-    """Answers to `states`, samples first, then frames: those of `chosen` frames, each at its point."""
+    """Answers at `states`, samples first, then frames: those of the `chosen` frames, each at its point."""
 
     states: States
     chosen: tuple[str, ...]
@@ -46,19 +45,19 @@ class FrameReference:
 
 
 def frame_reference(manifest: Manifest, tree: RigidTree, states: States) -> FrameReference:
-    """The recursion's answers at some of the states."""
+    """Return the recursion's answers at some of the states."""
     states = states.at(chosen_rows(len(states.q)))
     count = len(tree.frames)
     chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_FRAMES)).astype(int))
     frames = [tree.frames[f] for f in chosen]
     points = np.random.default_rng(3).uniform(-1.0, 1.0, (len(frames), 3))
     recursion, sizes = NewtonEuler(manifest, tree), Magnitudes(manifest, tree)
-    at = [(frame.body, frame.translation, frame.rotation) for frame in frames]
+    at = [(frame.joint, frame.translation, frame.rotation) for frame in frames]
     seen = [(body, np.array(t) + np.array(r) @ x) for (body, t, r), x in zip(at, points, strict=True)]
     (q, qd, qdd), most = states.motion, [np.abs(x) for x in states.motion]
     speed, change = recursion.points(seen, q, qd, qdd)
     speeds, changes = sizes.points(seen, *most)
-    whole = [(frame.body, np.array(frame.translation)) for frame in tree.frames]
+    whole = [(frame.joint, np.array(frame.translation)) for frame in tree.frames]
     return FrameReference(
         states,
         tuple(frame.name for frame in frames),
@@ -74,14 +73,14 @@ def frame_reference(manifest: Manifest, tree: RigidTree, states: States) -> Fram
 
 
 def chosen_rows(count: int) -> NDArray[np.intp]:
-    """Which of `count` states the reference is for."""
+    """Return the indices, among `count` states, of those that the reference is for."""
     return np.linspace(0, count - 1, min(STATES, max(2, count // 2))).astype(np.intp)
 
 
 def _columns(
     velocity: Callable[..., Array], sizes: Callable[..., Quantity], states: States
 ) -> tuple[Quantity, Quantity]:
-    """Jacobian and its rate, (samples, ..., n), of what has this velocity."""
+    """Return the Jacobian of a velocity function and its rate, (samples, ..., n), each with its scale."""
     n = states.q.shape[1]
     q, qd = (np.repeat(x, n, 0) for x in (states.q, states.qd))
     units, rest = np.tile(np.eye(n), (len(states.q), 1)), 0.0 * q
@@ -91,7 +90,7 @@ def _columns(
 
     moved = velocity(q + 1j * COMPLEX_STEP * qd, units, rest).imag / COMPLEX_STEP
     at, speed = np.abs(q), np.abs(qd)
-    # Of an acceleration bound A, quadratic in the velocities, A(q̇ + e_k) - A(q̇) - A(e_k) bounds dJ_k/dt.
+    # A is an acceleration bound, quadratic in velocities: A(q̇ + e_k) - A(q̇) - A(e_k) bounds dJ_k/dt.
     bound = sizes(at, speed + units, rest)[1] - sizes(at, speed, rest)[1] - sizes(at, units, rest)[1]
     jacobian = sorted_out(velocity(q, units, rest)), sorted_out(sizes(at, units, rest)[0])
     return jacobian, (sorted_out(moved), sorted_out(bound))
@@ -120,7 +119,7 @@ def _centre(
 
 
 def frame_calls(name: str, model: Dynamics, reference: FrameReference) -> Iterator[Result]:
-    """Each call of a back end's kinematics."""
+    """Yield the results of each call of a back end's kinematics."""
     states, told = reference.states, "against Newton-Euler recursion"
     kinematics: Any = model.kinematics
     value, scale = reference.poses
@@ -157,7 +156,7 @@ def _of_points(kinematics: Any, reference: FrameReference) -> Iterator[Entries]:
 
 
 def _of_loads(kinematics: Any, reference: FrameReference) -> Iterator[Entries]:
-    """-J^T (moment, force), on a point of the frame, and where that is in the world."""
+    """Yield -J^T (moment, force) of loads given at a point of the frame, and at its place in the world."""
     q = reference.states.q
     wrenches = np.random.default_rng(4).uniform(-1.0, 1.0, (len(reference.chosen), 6))
     for f, (frame, point) in enumerate(zip(reference.chosen, reference.points, strict=True)):
@@ -170,7 +169,7 @@ def _of_loads(kinematics: Any, reference: FrameReference) -> Iterator[Entries]:
             f"load on {frame}", kinematics.load_torque(q, frame, point=point, **loads), expected, bound
         )
         place = pose[:, :3, :3] @ point + pose[:, :3, 3]
-        # The force's moment about the world's origin is a part of what this one is summed from.
+        # This moment is summed from numbers as large as the force's moment about the world's origin.
         arm = reach[:, :3, 3].sum(-1) + np.abs(point).sum()
         bound = bound + arm[:, None] * np.abs(wrench[3:]).sum() * scale[:, :3].sum(1)
         yield Entries(

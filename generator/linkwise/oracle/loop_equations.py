@@ -1,56 +1,57 @@
-"""phi(q) = 0 of a package's ties and couplings, from the recursion's own frames, and where it holds.
+"""Equations phi(q) = 0 of a package's ties and couplings, from the recursion's frames, and where they hold.
 
-Rows of A are velocities of frames at one unit velocity after the other, and their complex step is dA/dt.
-A coupling's row is divided by the largest of its factors, `units`: what it is counted in is a file's choice,
-and beside it rows of ties would be lost, or its own.
+Rows of A are velocities of frames for one unit velocity after the other, and their complex step is dA/dt. A
+coupling's row is divided by the largest of its factors, `units`: its unit is the file's choice, and without
+this the rows of ties, or the row itself, would be lost beside the other.
 """
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from linkwise_runtime.rule.joint_tree import TreeFrame
 from numpy.polynomial.polynomial import polyder, polyval
 
-from linkwise.check.body_reference import COMPLEX_STEP
-from linkwise.check.newton_euler import NewtonEuler
-from linkwise.package.entries import FrameEntry, RigidTree
+from linkwise.oracle.newton_euler import NewtonEuler
+from linkwise.oracle.reference import COMPLEX_STEP
+from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array
 
 TURNS_AND_SHIFTS = {"frame": (3, 3), "hinge": (2, 3), "point": (0, 3), "distance": (0, 1)}
-"""Rows of each kind of tie that hold turns, and of those behind them that hold shifts."""
+"""Rows of each kind of tie that hold rotations, and of those after them that hold translations."""
 STEPS = 60
 LONGEST = 0.5
-"""Of a step towards closing, in rad and m."""
+"""Longest step towards closing, in rad and m."""
 CLOSED = 1e-4
-"""In m, rad and units of couplings, as a package has it: numbers of files are rounded, and loops that hold
-something twice then close to some micrometres only."""
+"""Accuracy of closing, in m, rad and units of couplings, as a package has it: numbers of files are rounded,
+and loops that hold something twice then close to some micrometres only."""
 SETTLED = 1e-9
-"""Of the last step, in rad and m, where nothing can be closed further."""
+"""Size of the last step, in rad and m, below which nothing can be closed further."""
 RANK = 1e-5
 """Singular values below this part of the largest are zero: numbers of files are rounded."""
 
 
 class LoopEquations(NamedTuple):
-    """Ties and couplings of a tree."""
+    """Equations of the ties and couplings of a tree."""
 
     recursion: NewtonEuler
     tree: RigidTree
 
     @property
-    def _ends(self) -> list[FrameEntry]:
+    def _ends(self) -> list[TreeFrame]:
         """Frames of the ties, the first and the second of each."""
         return [self.tree.frames[f] for tie in self.tree.ties for f in (tie.first, tie.second)]
 
     @property
     def units(self) -> Array:
-        """What each row of phi and A is divided by, (C,)."""
+        """Divisor of each row of phi and A, (C,)."""
         ties = [1.0] * sum(sum(TURNS_AND_SHIFTS[tie.kind]) for tie in self.tree.ties)
         factors = ([f for _, own in coupling.terms for f in own[1:]] for coupling in self.tree.couplings)
         largest = (max(map(abs, own), default=0.0) or 1.0 for own in factors)
         return np.array([*ties, *largest])
 
     def violation(self, q: Array) -> Array:
-        """phi, (samples, C); of small turns about axes, the sines."""
+        """Return phi (samples, C); of small turns about axes, the sines."""
         found: list[Array] = []
         poses = self.recursion.poses(self._ends, q)
         for at, tie in enumerate(self.tree.ties):
@@ -78,13 +79,13 @@ class LoopEquations(NamedTuple):
         return np.concatenate(found, -1) / self.units
 
     def rows(self, q: Array) -> Array:
-        """A, (samples, C, n)."""
+        """Return A (samples, C, n)."""
         samples, n = q.shape
         units, many = np.tile(np.eye(n), (samples, 1)), np.repeat(q, n, 0)
         found = []
         poses, speeds = self.recursion.poses(self._ends, q), np.zeros((samples, n, 0, 6))
         if self.tree.ties:
-            places = [(frame.body, np.array(frame.translation)) for frame in self._ends]
+            places = [(frame.joint, np.array(frame.translation)) for frame in self._ends]
             moving = self.recursion.points(places, many, units, 0.0 * units)[0]
             speeds = moving.reshape(samples, n, len(places), 6)
         for at, tie in enumerate(self.tree.ties):
@@ -111,27 +112,27 @@ class LoopEquations(NamedTuple):
         return np.concatenate(found, 1) / self.units[:, None]
 
     def velocity_map(self, q: Array) -> Array:
-        """G (samples, n, m) of qd = G yd, y the tree's independent joints, by least squares."""
+        """Return G (samples, n, m) of qd = G yd, y the tree's independent joints, by least squares."""
         return following(self.rows(q), self.tree.independent)
 
     def basis(self, q: Array) -> Array:
-        """Orthonormal columns (samples, C, d) of what dependent joints move of the rows.
+        """Return orthonormal columns (samples, C, d) that span what dependent joints move of the rows.
 
-        Where loops close, no joint moves anything else; where they are open a little, this is what is held.
+        Where loops close, no joint moves anything else; where they are open a little, only this is held.
         """
         rest = [k for k in range(q.shape[1]) if k not in self.tree.independent]
         basis: Array = np.linalg.svd(self.rows(q)[..., rest])[0][..., : len(rest)]
         return basis
 
     def rates(self, q: Array, qd: Array) -> Array:
-        """dA/dt, (samples, C, n)."""
+        """Return dA/dt (samples, C, n)."""
         rate: Array = self.rows(q + 1j * COMPLEX_STEP * qd).imag / COMPLEX_STEP
         return rate
 
     def closed_near(self, q: Array) -> Array:
-        """Those of some positions from which least steps of all joints lead to where loops are open least.
+        """Return the closed positions to which steps of least norm of all joints lead from some positions.
 
-        That is not at all, but for what the numbers of a file leave.
+        They are closed but for what rounded numbers of a file leave; starts that lead to none are left out.
         """
         q, size = q.copy(), np.full(len(q), np.inf)
         for _ in range(STEPS):
@@ -147,7 +148,10 @@ class LoopEquations(NamedTuple):
 
 
 def following(rows: Array, own: Sequence[int]) -> Array:
-    """G (samples, n, m) of qd = G yd under rows A (samples, C, n), y the joints `own`, by least squares."""
+    """Return G (samples, n, m) of qd = G yd under rows A (samples, C, n), by least squares.
+
+    y are the joints `own`.
+    """
     samples, _, n = rows.shape
     rest = [k for k in range(n) if k not in own]
     found = np.zeros((samples, n, len(own)))

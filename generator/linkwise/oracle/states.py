@@ -1,4 +1,4 @@
-"""The states at which answers are held against each other."""
+"""States at which answers are compared."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,12 +15,13 @@ DRAWS = 40
 AT_REST = 4
 """States beside the random ones: without acceleration, without velocity, without either, twice."""
 NUMBERS = 1 << 21
-"""Numbers of a quantity (samples, n, N, n) that are computed at a time: large robots have fewer states."""
+"""Most numbers of a quantity (samples, n, N, n) that are computed at a time: large robots have fewer
+states."""
 
 
 @dataclass(frozen=True)
 class States:
-    """The states of all checks, each array (samples, n)."""
+    """States of all checks, each array (samples, n)."""
 
     q: Array
     qd: Array
@@ -28,30 +29,30 @@ class States:
 
     @property
     def motion(self) -> tuple[Array, Array, Array]:
-        """q, qd and qdd."""
+        """Position q, velocity qd and acceleration qdd."""
         return self.q, self.qd, self.qdd
 
     def at(self, rows: Any) -> "States":
-        """Some of the samples, in any shape (..., n)."""
+        """Return some of the samples, in any shape (..., n)."""
         return States(self.q[rows], self.qd[rows], self.qdd[rows])
 
 
 @dataclass(frozen=True)
 class Found:
-    """States that something is defined at, and how many were tried for them."""
+    """States at which something is defined, and how many were tried for them."""
 
     states: States
     tried: int
 
 
 def affordable(samples: int, n: int, links: int) -> tuple[int, int]:
-    """How many of `samples` random states the memory of a check allows, 2 at least, and of those at rest."""
+    """Return how many of `samples` random states a check's memory allows, 2 at least, and states at rest."""
     few = min(samples, max(2, NUMBERS // (n * n * links) - AT_REST))
     return few, AT_REST if few > 2 or samples <= 2 else 2
 
 
 def random_states(joints: Sequence[JointEntry], samples: int, seed: int = 0, rest: int = AT_REST) -> States:
-    """Random states, no rate near 0, and states at rest; float32 holds them.
+    """Return random states, no rate near 0, and states at rest; float32 holds them exactly.
 
     rest: how many of those at rest, the last ones
 
@@ -69,7 +70,7 @@ def random_states(joints: Sequence[JointEntry], samples: int, seed: int = 0, res
 
 
 def _range(joint: JointEntry) -> tuple[float, float]:
-    """Limits, where both are there and leave something to move; else all around, or half a metre."""
+    """Return the limits; ±π rad or ±0.5 m if one is missing, or if they leave no range or a wider one."""
     wide = np.pi if joint.unit == "rad" else 0.5
     if joint.lower is None or joint.upper is None or not 0.0 < joint.upper - joint.lower < 2 * wide:
         return -wide, wide
@@ -79,9 +80,10 @@ def _range(joint: JointEntry) -> tuple[float, float]:
 def states_where(
     defined: Callable[[States], NDArray[np.bool_]], joints: Sequence[JointEntry], samples: int
 ) -> Found:
-    """States that `defined` says True of, (count,) for `count` of them, up to `samples` and those at rest.
+    """Return the states for which `defined` is True, up to `samples` and those at rest.
 
-    If that is less than half of the random ones, positions of other sizes are tried too, 1 mm to 30 rad.
+    `defined` returns (count,) for `count` states. If less than half as many as asked for are left, positions
+    of other sizes are tried too, 1 mm to 30 rad.
     """
     states = random_states(joints, samples)
     kept = states.at(defined(states))

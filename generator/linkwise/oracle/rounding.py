@@ -1,8 +1,9 @@
-"""How far rounding may move an answer: the same answer of a robot whose every number is off by a little.
+"""Measure of how far rounding may move an answer: its change if every number of the robot is off by a little.
 
-What is found by solving equations loses as many digits as their matrix is badly conditioned, which no bound
-of sums tells. Noise of a known size in all that goes in, and in what is summed of it on the way, changes it;
-that change, over the size of the noise, is how large the numbers are that such an answer is summed from.
+An answer that is found by solving equations loses as many digits as their matrix is badly conditioned, which
+no bound of sums shows. Noise of a known size in all that goes in, and in what is summed of it on the way,
+changes it; that change, over the size of the noise, is how large the numbers are that such an answer is
+summed from.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,25 +16,25 @@ from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array
 
 NOISE = 1e-11
-"""Relative; far above rounding, and small enough for matrices that lose ten digits."""
+"""Relative noise; far above rounding, and small enough for matrices that lose ten digits."""
 DRAWS = 2
 JOINTS = 10
-"""From so many on their number counts."""
+"""Number of joints above which their number counts."""
 
 
 def gathered(joints: int) -> float:
-    """How many times more roundings there are of so many joints, one after the other, than of a few."""
+    """Return how many times more roundings there are for so many joints, one after the other, than a few."""
     return max(1.0, joints / JOINTS)
 
 
 def measured(
     answers: Callable[[RigidTree], Mapping[str, Array]], tree: RigidTree, losing: Array | float = 1.0
 ) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Answers by name, samples first, and as many scales: each sample's largest change, for all its numbers.
+    """Return answers by name, samples first, and scales: each sample's largest change, for all its numbers.
 
     Entries of one sample share their scale, for a solution's errors are as large as its largest number's.
-    losing: how much more than this the package's own way to solve may lose (samples,): who takes dependent
-    joints out multiplies by the inverse of their columns A_d twice
+    losing: how much more than this the package's own way to solve may lose (samples,): to eliminate dependent
+    joints multiplies by the inverse of their columns A_d twice
     """
     values = dict(answers(tree))
     scales = {what: np.zeros(len(value)) for what, value in values.items()}
@@ -57,7 +58,7 @@ class NoisyTree(RigidTree):
     generator: np.random.Generator
 
     def rounded(self, value: Array, size: Array) -> Array:
-        """The value with noise of what it is summed from, in both parts of a complex one."""
+        """Return the value with noise of the size of what it is summed from, in both parts if complex."""
         noise = NOISE * size * self.generator.standard_normal(value.shape)
         if np.iscomplexobj(value):
             noise = noise + 1j * NOISE * size * self.generator.standard_normal(value.shape)
@@ -65,7 +66,7 @@ class NoisyTree(RigidTree):
 
 
 def _noisy(tree: RigidTree, generator: np.random.Generator) -> NoisyTree:
-    """The tree with NOISE in every number, by the size of the vector or matrix that it is of."""
+    """Return the tree with NOISE in every number, by the size of the vector or matrix that it is part of."""
 
     def off(number: float) -> float:
         return float(number * (1.0 + NOISE * generator.standard_normal()))

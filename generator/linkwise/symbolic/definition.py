@@ -1,33 +1,25 @@
-"""What a manifest says that a robot is, rigid bodies or energies, by which its package can be checked."""
+"""Definition of a robot in a manifest, as rigid bodies or energies, by which its package can be checked."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import astuple
 from math import isfinite
 
 import sympy as sp
+from linkwise_runtime.rule.joint_tree import TreeCoupling, TreeCurve, TreeFrame
 from sympy.printing.str import StrPrinter
 
-from linkwise.emit.formula_symbols import motion_symbol, parameter_symbols
-from linkwise.package.entries import CurveEntry, FileJointEntry, FollowerEntry
-from linkwise.package.manifest import (
-    BodyEntry,
-    CouplingEntry,
-    EnergyEntry,
-    FrameEntry,
-    JointEntry,
-    PassiveEntry,
-    RigidTree,
-    TieEntry,
-)
+from linkwise.package.entries import FileJointEntry, FollowerEntry
+from linkwise.package.formula_symbols import motion_symbol, parameter_symbols
+from linkwise.package.manifest import BodyEntry, EnergyEntry, JointEntry, PassiveEntry, RigidTree
 from linkwise.robot.robot import Robot, Scalar, Vec3
 from linkwise.symbolic.system import EnergySystem, RigidSystem, System
 
 LARGEST = 2**53
-"""Whole numbers beyond are no longer all floats; those of fractions need not even be near one."""
+"""Largest whole number up to which all are floats; fractions of larger ones are written as decimals."""
 
 
 def joint_entries(system: System) -> tuple[JointEntry, ...]:
-    """Names, units and limits of the coordinates."""
+    """Return the names, units and limits of the coordinates."""
     if not isinstance(system, RigidSystem):
         return tuple(JointEntry(c.name, c.unit) for c in system.coordinates)
     return tuple(
@@ -37,7 +29,7 @@ def joint_entries(system: System) -> tuple[JointEntry, ...]:
 
 
 def rigid_tree(system: System) -> RigidTree | None:
-    """Return where the bodies are and what they carry; None for a user's own energies."""
+    """Return the bodies, frames, passive axes and constraints of a robot; None for a user's own energies."""
     if not isinstance(system, RigidSystem):
         return None
     robot, values = system.robot, dict(system.parameters)
@@ -64,12 +56,12 @@ def rigid_tree(system: System) -> RigidTree | None:
                 number(link.mass),
                 numbers(link.com),
                 (numbers(link.inertia[0]), numbers(link.inertia[1]), numbers(link.inertia[2])),
-                CurveEntry(link.joint.curve.starts, link.joint.curve.pieces) if link.joint.curve else None,
+                TreeCurve(link.joint.curve.starts, link.joint.curve.pieces) if link.joint.curve else None,
             )
             for link in robot.links
         ),
         tuple(
-            FrameEntry(
+            TreeFrame(
                 frame.name,
                 frame.link,
                 frame.rotation,  # type: ignore[arg-type]  # likewise
@@ -81,8 +73,8 @@ def rigid_tree(system: System) -> RigidTree | None:
             PassiveEntry(axis.joint, axis.coordinate, axis.ratio, *astuple(axis.own))
             for axis in robot.passive
         ),
-        tuple(TieEntry(*astuple(tie)) for tie in robot.ties),
-        tuple(CouplingEntry(coupling.name, coupling.terms) for coupling in robot.couplings),
+        robot.ties,
+        tuple(TreeCoupling(coupling.name, coupling.terms) for coupling in robot.couplings),
         robot.independent,
         robot.closed_position,
         {
@@ -103,14 +95,14 @@ def follower_entries(system: System) -> tuple[FollowerEntry, ...]:
             one.name,
             one.unit,
             names.index(one.coordinate) if one.coordinate else None,
-            CurveEntry(one.curve.starts, one.curve.pieces),
+            TreeCurve(one.curve.starts, one.curve.pieces),
         )
         for one in system.robot.followers
     )
 
 
 def file_joint_entries(system: System) -> tuple[FileJointEntry, ...]:
-    """Return the joints of the robot's file that move; none where each is one coordinate, in that order."""
+    """Return the moving joints of the robot's file; none where each is one coordinate, in the same order."""
     joints = system.robot.file_joints if isinstance(system, RigidSystem) else ()
     if all(one.kind == "single" and one.pinocchio == at for at, one in enumerate(joints)):
         return ()
@@ -118,7 +110,7 @@ def file_joint_entries(system: System) -> tuple[FileJointEntry, ...]:
 
 
 def in_radians(system: System) -> tuple[str, ...]:
-    """Return the names of those, and of coordinates, that logs have in radians, always."""
+    """Return the names of the followers and coordinates that logs always have in radians."""
     following = system.robot.followers if isinstance(system, RigidSystem) else ()
     return (
         *(one.name for one in system.coordinates if one.coupled),
@@ -135,7 +127,7 @@ def energies(system: System) -> tuple[EnergyEntry, ...] | None:
 
 
 def _places(robot: Robot) -> Iterator[tuple[str, Scalar]]:
-    """Every number of a tree that may hang on parameters, by its place."""
+    """Yield every number of a tree that may depend on parameters, with its place."""
     yield from _entries("gravity", robot.gravity)
     for b, link in enumerate(robot.links):
         yield f"bodies[{b}].mass", link.mass
@@ -152,7 +144,7 @@ def _entries(place: str, vector: Vec3) -> Iterator[tuple[str, Scalar]]:
 
 
 def _texts(system: System) -> Callable[[Scalar], str]:
-    """Formulas in the symbols of formulas.txt, every number with all its digits."""
+    """Return a function that writes formulas in the symbols of formulas.txt, with all digits of numbers."""
     parameters = parameter_symbols([symbol.name for symbol in system.parameters])
     names = {own: sp.Symbol(shown.text) for own, shown in zip(system.parameters, parameters, strict=True)}
     for k, c in enumerate(system.coordinates, 1):
@@ -168,7 +160,7 @@ def _texts(system: System) -> Callable[[Scalar], str]:
 
 
 class _Exact(StrPrinter):  # type: ignore[misc]
-    """Numbers as Python reads them back to the last bit; constants such as zeta(3) are numbers too."""
+    """Printer of numbers that Python reads back to the last bit, constants such as zeta(3) among them."""
 
     def _print(self, expr: sp.Basic, **options: object) -> str:
         if isinstance(expr, sp.Expr) and expr.is_number and not expr.is_Rational:

@@ -1,4 +1,4 @@
-"""What regressors are held against: the recursion, for bodies that have one inertial parameter each."""
+"""Checks of regressors against the recursion, for bodies that have one inertial parameter each."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -8,38 +8,36 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 
-from linkwise.check.body_reference import by_unit
-from linkwise.check.compare import Entries, Result, compare
-from linkwise.check.magnitudes import Magnitudes
+from linkwise.check.compare import Entries, Result, Rows, compare
 from linkwise.check.model_calls import FLOAT32
-from linkwise.check.newton_euler import NewtonEuler
-from linkwise.check.packed_layout import Rows
-from linkwise.check.reference import TOLERANCE, Reference
-from linkwise.check.states import NUMBERS, States
+from linkwise.oracle.magnitudes import Magnitudes
+from linkwise.oracle.newton_euler import NewtonEuler
+from linkwise.oracle.reference import TOLERANCE, Reference, by_unit
+from linkwise.oracle.states import NUMBERS, States
 from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 MOST = 12
-"""States, at most."""
+"""Most states."""
 MOMENTS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-"""Ixx, Ixy, Iyy, Ixz, Iyz, Izz, as the regressor has them."""
+"""Indices of Ixx, Ixy, Iyy, Ixz, Iyz, Izz, in the order of the regressor."""
 
 
 def regressor_reference(manifest: Manifest, tree: RigidTree, states: States) -> Reference:
-    """Y of tau, c2, c1 and g, of the first few states."""
+    """Return Y of tau, c2, c1 and g, at the first few states."""
     n, links = len(manifest.joints), len(manifest.links)
     few = states.at(slice(max(1, min(MOST, NUMBERS // (10 * n * n * links)))))
     values, scales = _rows(manifest, tree, few)
     for what, value in values.items():
-        # A mass at e_a without inertia about the origin has m and mc_a.
+        # A mass at e_a without inertia about the origin has the parameters m and mc_a.
         value[..., 1:4] -= value[..., :1]
         scales[what][..., 1:4] += scales[what][..., :1]
     return Reference("Newton-Euler recursion", TOLERANCE, few, values, scales)
 
 
 def regressor_calls(name: str, model: Dynamics, reference: Reference) -> Iterator[Result]:
-    """Both calls of a back end, of all states, of one and of none, and in single precision."""
+    """Yield checks of both calls of a back end, at all states, one and none, and in single precision."""
     states, every = reference.states, np.arange(len(reference.states.q))
 
     def entries(kind: type, rows: Rows) -> Iterator[Entries]:
@@ -58,7 +56,7 @@ def regressor_calls(name: str, model: Dynamics, reference: Reference) -> Iterato
 
 
 def _unit_bodies() -> Iterator[tuple[float, Any, Any]]:
-    """Mass, centre of mass, and inertia about it."""
+    """Yield mass, centre of mass, and inertia about it, of each unit body."""
     none = np.zeros((3, 3))
     yield 1.0, (0.0, 0.0, 0.0), none
     for a in range(3):
@@ -71,7 +69,7 @@ def _unit_bodies() -> Iterator[tuple[float, Any, Any]]:
 
 
 def _rows(manifest: Manifest, tree: RigidTree, states: States) -> tuple[dict[str, Array], dict[str, Array]]:
-    """tau, c2, c1 and g, and bounds of what they are summed from, where all links carry each unit body."""
+    """Return tau, c2, c1 and g, and bounds of what they are summed from, where links carry each unit body."""
     units = [
         replace(tree.bodies[0], mass=mass, com=com, inertia=inertia) for mass, com, inertia in _unit_bodies()
     ]
@@ -97,7 +95,7 @@ def _rows(manifest: Manifest, tree: RigidTree, states: States) -> tuple[dict[str
     scales = {
         "Y": size(at, speed, change),
         "Y c2": by_unit(lambda q, qd, _, e: size(q, 0.0 * qd, e, gravity=False), most),
-        # Of a bound B that is quadratic in qd, 1/2 dB/dqd_k = 1/2 (B(qd + e_k) - B(qd) - B(e_k)).
+        # The bound B is quadratic in qd: 1/2 dB/dqd_k = 1/2 (B(qd + e_k) - B(qd) - B(e_k)).
         "Y c1": by_unit(lambda q, qd, _, e: 0.5 * (moving(q, qd + e) - moving(q, qd) - moving(q, e)), most),
         "Y g": size(at, rest, rest),
     }

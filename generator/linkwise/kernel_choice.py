@@ -1,4 +1,4 @@
-"""Which kind of kernel a package gets: straight lines of closed forms, or loops over links and joints."""
+"""Choice of a package's kind of kernel: straight lines of closed forms, or loops over links and joints."""
 
 from collections.abc import Iterable, Iterator
 from typing import get_args
@@ -16,10 +16,11 @@ from linkwise.symbolic.system import EnergySystem, RigidSystem, System, refuse_c
 CHOICES = ("auto", "straight", "loops")
 
 MOST_STRAIGHT = 12_000
-"""Operations up to which closed forms are derived, as `closed_form_cost` estimates them: docs/kernels.md."""
+"""Most operations for which closed forms are derived, as `closed_form_cost` estimates them:
+docs/kernels.md."""
 
 MOST_DERIVED = 50_000
-"""Operations, estimated alike, up to which closed forms are worth minutes where loops cannot be had."""
+"""Most operations, estimated alike, for which closed forms are worth minutes where loops cannot be had."""
 
 LEAST_SHARE = 0.1
 """Closed forms of a large robot need more than this share of the operations of loops: planar arms 0.15.
@@ -31,7 +32,7 @@ Of links behind a single joint they need almost none.
 def chosen_kernel(
     system: System, choice: str, backends: Iterable[str] | None, derivation: str = "rule"
 ) -> KernelKind:
-    """Kind of kernel for one of CHOICES and the back ends asked for by name, None for all there are.
+    """Return the kind of kernel for one of CHOICES and the back ends asked for by name, None for all.
 
     Raises LinkwiseError for a choice that is not one, and for loops over energies or for a derivation from
     them, and for closed forms of joints that follow curves, formulas among them.
@@ -61,20 +62,20 @@ def chosen_kernel(
 
 
 def fault(system: System, kind: KernelKind, backends: Iterable[str] | None) -> str:
-    """Why a robot cannot have these back ends with this kind of kernel; nothing if it can."""
+    """Return why a robot cannot have these back ends with this kind of kernel; empty if it can."""
     return next((why for _, why in _faults(system, kind, backends)), "")
 
 
 def _faults(
     system: System, kind: KernelKind, backends: Iterable[str] | None
 ) -> Iterator[tuple[BackendFiles, str]]:
-    """Those of these back ends that cannot be, and why."""
+    """Return those of these back ends that cannot be had, and why."""
     names = usual_backends(system, kind) if backends is None else backends
     return ((one, why) for one in chosen_backends(names, kind) if (why := one.fault(system)))
 
 
 def check_size(system: System, kind: KernelKind, backends: Iterable[str] | None) -> None:
-    """Raise LinkwiseError, which names a way that there is, where these back ends cannot be."""
+    """Raise LinkwiseError, which names another way, where these back ends cannot be had."""
     found = next(_faults(system, kind, backends), None)
     if found is None:
         return
@@ -91,10 +92,10 @@ def _derivable(system: System) -> bool:
 
 
 def closed_form_cost(system: RigidSystem) -> float:
-    """Operations of the closed forms of all links, estimated from the link of the middle path length.
+    """Return the operations of the closed forms of all links, estimated from the link of median path length.
 
-    That one's are counted in one frame, about its centre of mass, and all others are taken to save as much as
-    it does of what loops would take. No link is derived where even the sparsest would have too many.
+    Its operations are counted in one frame, about its centre of mass, and all others are assumed to save as
+    much as it does of what loops would take. No link is derived where even the sparsest would have too many.
     """
     loops, costs = decomposition_cost(system), link_costs(system)
     behind_more = sum(cost for link, cost in zip(system.links, costs, strict=True) if len(link.joints) > 1)

@@ -1,4 +1,4 @@
-"""What joints take of their own against the manifest's numbers, joint by joint."""
+"""Checks of the joints' passive torques against the manifest's numbers, joint by joint."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.model_calls import FLOAT32
-from linkwise.check.reference import Reference
-from linkwise.check.states import States
 from linkwise.check.sum_checks import is_tied, regular
+from linkwise.oracle.reference import Reference
+from linkwise.oracle.states import States
 from linkwise.package.entries import PassiveEntry
 from linkwise.package.load import Array
 
@@ -21,7 +21,10 @@ SHARES = ("spring", "damping", "friction", "armature")
 def passive_calls(
     name: str, model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference
 ) -> Iterator[Result]:
-    """The call for many states, for one, and in single precision; all zeros where no joint has anything."""
+    """Yield checks of the call for many states, for one, and in single precision.
+
+    All values are zero where no joint has passive torques.
+    """
     states = reference.states
     values, scales = passive_reference(joints, states)
 
@@ -29,7 +32,7 @@ def passive_calls(
         motion: list[Any] = [x[rows].astype(dtype) for x in states.motion]
         found = model.passive_torque(*motion)
         for what, value, expected, scale in zip(SHARES, found, values, scales, strict=True):
-            # Rows of one state stand for a batch of one, as errors are told by sample.
+            # A single state becomes a batch of one, as errors are reported by sample.
             shape = (-1, expected.shape[1])
             yield Entries(
                 what,
@@ -53,9 +56,9 @@ def passive_calls(
 def _torques_of_accelerations(
     model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference, at: NDArray[np.bool_]
 ) -> Entries:
-    """Torques that forward dynamics was given, against those that its accelerations take.
+    """Return torques given to forward dynamics beside those that its accelerations need.
 
-    Both are summed from what links ask for, at rest too: their weight alone has rounding.
+    Both are summed from the torques of the links, also at rest: gravity alone has rounding.
     """
     states = reference.states.at(at)
     q, qd, qdd = states.motion
@@ -69,9 +72,9 @@ def _torques_of_accelerations(
 
 
 def passive_reference(joints: Sequence[PassiveEntry], states: States) -> tuple[Array, Array]:
-    """Shares (4, samples, n), and the sizes of what they are summed from.
+    """Return shares (4, samples, n), and the sizes of what they are summed from.
 
-    Of a joint at p = r q a torque f does the work f dp = r f dq: it counts r times on the coordinate.
+    For a joint at p = r q a torque f does the work f dp = r f dq: it counts r times on the coordinate.
     """
     q, qd, qdd = states.motion
     values, scales = np.zeros((2, len(SHARES), *q.shape))

@@ -1,4 +1,4 @@
-"""Where the loops of a robot close at its own numbers: found once, before anything is generated."""
+"""Search for where the loops of a robot close at its own numbers: done once, before anything is generated."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -15,12 +15,8 @@ from linkwise_runtime.constraints.closing_search import (
 from linkwise_runtime.constraints.held_frames import held_by
 from linkwise_runtime.rule.joint_tree import (
     JointTree,
-    TreeCoupling,
-    TreeCurve,
-    TreeFrame,
     TreeJoint,
     TreeLink,
-    TreeTie,
 )
 from numpy.typing import NDArray
 
@@ -29,21 +25,23 @@ from linkwise.package.entries import RigidTree
 
 Array = NDArray[np.float64]
 FAR = 0.3
-"""Positions whose least singular value of A_d is below this part of the best one's are next to singular."""
+"""Positions whose least singular value of A_d is below this part of the best one's count as next to
+singular."""
 FLAT = 1e-4
-"""Slopes below this part of a coupling's factors are none: steps end where rows have all but lost rank."""
+"""Slopes below this part of a coupling's factors count as zero: steps end where rows have all but lost
+rank."""
 
 
 class ClosedLoops(NamedTuple):
-    """Positions in which constraints hold, A (C, n) at one, with comparable rows, and whose each row is."""
+    """Positions in which constraints hold, A (C, n) at one, with comparable rows, and each row's owner."""
 
     closed: tuple[Closing, ...]
-    """The one nearest to zero first."""
+    """Positions, the one nearest to zero first."""
     rows: Array
     owners: tuple[str, ...]
 
     def position(self, independent: Sequence[int]) -> tuple[float, ...]:
-        """The first one of them where the other joints follow well, as far as any does, to 1e-9."""
+        """Return the first closed position where the other joints follow well, or as well as any, to 1e-9."""
         dependent = [k for k in range(self.rows.shape[1]) if k not in independent]
         least = [_share(at.comparable, dependent) for at in self.closed]
         best = next(at for at, size in zip(self.closed, least, strict=True) if size >= FAR * max(least))
@@ -51,13 +49,16 @@ class ClosedLoops(NamedTuple):
 
 
 def _share(rows: Array, dependent: Sequence[int]) -> float:
-    """How well dependent joints follow beside how well any may; not at all where no joint moves the rows."""
+    """Return how well dependent joints follow beside how well any may; 0 where no joint moves the rows."""
     most = float(np.abs(rows).max())
     return float(np.linalg.svd(rows[:, dependent], compute_uv=False)[-1]) / most if most else 0.0
 
 
 def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
-    """Return some, and A where it has its largest rank; raises LinkwiseError, which names what stays open."""
+    """Return closed positions, and A where it has its largest rank.
+
+    Raises LinkwiseError, which names what stays open.
+    """
     moved = joint_tree(tree)
     held = held_by(moved, ())
     starts, equations = random_starts(joints), TieEquations(moved, joints, held)
@@ -74,7 +75,7 @@ def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
 
 
 def _check_slopes(tree: RigidTree, found: Closing) -> None:
-    """Raise LinkwiseError for a coupling whose sum has no slope where it is zero, as that of squares."""
+    """Raise LinkwiseError for a coupling whose sum has no slope where it is zero, as a sum of squares."""
     for coupling, slope in zip(tree.couplings, found.slopes, strict=True):
         size = min(max(map(abs, factors[1:])) for _, factors in coupling.terms)
         if slope <= FLAT * size:
@@ -85,7 +86,7 @@ def _check_slopes(tree: RigidTree, found: Closing) -> None:
 
 
 def _told(found: Closing, owners: tuple[str, ...], rows: list[str], tries: int) -> str:
-    """What stays open, by how much."""
+    """Return what stays open, and by how much, in words."""
     worst = int(np.abs(found.left).argmax())
     return (
         f"constraint {owners[worst]!r} never closes: from {tries} positions that were tried, "
@@ -94,26 +95,18 @@ def _told(found: Closing, owners: tuple[str, ...], rows: list[str], tries: int) 
 
 
 def joint_tree(tree: RigidTree) -> JointTree:
-    """Return what tree.py has, without the formulas of run-time parameters."""
+    """Return the tree that tree.py has, without the formulas of run-time parameters."""
     return JointTree(
         tree.gravity,
         tuple(
-            TreeJoint(
-                b.parent,
-                b.kind,
-                b.coordinate,
-                b.ratio,
-                b.rotation,
-                b.translation,
-                TreeCurve(b.curve.starts, b.curve.pieces) if b.curve else None,
-            )
+            TreeJoint(b.parent, b.kind, b.coordinate, b.ratio, b.rotation, b.translation, b.curve)
             for b in tree.bodies
         ),
         tuple(TreeLink(b.link, at, b.mass, b.com, b.inertia) for at, b in enumerate(tree.bodies)),
-        tuple(TreeFrame(f.name, f.body, f.rotation, f.translation) for f in tree.frames),
+        tree.frames,
         {},
-        tuple(TreeTie(t.name, t.kind, t.first, t.second, t.length) for t in tree.ties),
-        tuple(TreeCoupling(c.name, c.terms) for c in tree.couplings),
+        tree.ties,
+        tree.couplings,
         tree.independent,
         tree.closed_position,
     )

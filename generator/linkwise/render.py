@@ -1,4 +1,4 @@
-"""The one place that knows Jinja2."""
+"""The one place that uses Jinja2."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -23,12 +23,12 @@ def _environment() -> Environment:
 
 
 def render(template: str, view: Mapping[str, Any]) -> str:
-    """Text of `templates/<template>` with the fields of `view`; a missing field raises."""
+    """Return the text of `templates/<template>` with the fields of `view`; a missing field raises."""
     return _environment().get_template(template).render(view)
 
 
 def variables(template: str) -> set[str]:
-    """Names that a template needs, for the test that they are its view's fields."""
+    """Return the names that a template needs, for the test that they are its view's fields."""
     environment = _environment()
     source, _, _ = environment.loader.get_source(environment, template)  # type: ignore[union-attr]
     return meta.find_undeclared_variables(environment.parse(source))

@@ -1,9 +1,9 @@
-"""How large the numbers are that a partial torque is summed from: what its rounding is measured by.
+"""Sizes of the numbers that a partial torque is summed from, by which its rounding is measured.
 
-Spatial vectors about the base, with lengths for vectors: sums add magnitudes, products multiply them,
-so that nothing cancels. Closed forms in a common frame add such numbers too, and lose what cancels of them.
-Along a path of many joints they do so again and again, by which its sizes are larger here.
-A torque that is 0 by geometry has no size of its own; of its operands rounding leaves some 1e-16.
+Spatial vectors about the base, with lengths for vectors: sums add magnitudes, products multiply them, so that
+nothing cancels. Closed forms in a common frame add such numbers too, and lose what cancels among them. Along
+a path of many joints they do so again and again, so sizes are larger there. A torque that is 0 by geometry
+has no size of its own; rounding of its operands leaves some 1e-16 of them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,16 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.check.curve_reference import displacement_bound
-from linkwise.check.newton_euler import Points, path_of
-from linkwise.check.rounding import gathered
+from linkwise.oracle.newton_euler import Points, displacement_bound, path_of
+from linkwise.oracle.rounding import gathered
 from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
 
 
 @dataclass(frozen=True)
 class _Sizes:
-    """Of a frame: distance from the base; |ω|, |v|, |α|, |a − gravity| of its twist and its change.
+    """Sizes of a frame: distance from the base; |ω|, |v|, |α|, |a − gravity| of its twist and its change.
 
     v and a are those of the point at the base's origin, moving with the frame.
     lost: how many times more than numbers of size 1 the angles before it are rounded, with sine and cosine
@@ -45,14 +44,14 @@ class Magnitudes:
         self.links = [index[link.name] for link in manifest.links]
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
-        """Bounds of |τ_ij|, shape (samples, n, N)."""
+        """Return bounds of |τ_ij|, shape (samples, n, N)."""
         own = [[self.bodies[at]] for at in self.links]
         return self.torques_of(own, q, qd, qdd, gravity)[..., 0]
 
     def torques_of(
         self, carried: Sequence[Sequence[BodyEntry]], q: Array, qd: Array, qdd: Array, gravity: bool = True
     ) -> Array:
-        """The same (samples, n, N, X) where each link has the masses of X bodies in turn."""
+        """Return bounds of |τ_ij| (samples, n, N, X) where each link has the masses of X bodies in turn."""
         frames = self._frames(q, qd, qdd, self.gravity if gravity else 0.0)
         reaches = np.stack([frame.reach for frame in frames], 1)
         slopes = np.stack([displacement_bound(body, q, 1) for body in self.bodies], 1)
@@ -65,7 +64,7 @@ class Magnitudes:
                 reach = frame.reach + _length(body.com)
                 turning = frame.alpha + frame.omega**2
                 force = abs(body.mass) * (frame.a + frame.omega * frame.v + turning * reach)
-                # v × p is 0, but who differentiates ½ m v² sums it all the same.
+                # v × p is 0, but differentiating ½ m v² sums it all the same.
                 moment = reach * force + abs(body.mass) * (frame.v + frame.omega * reach) ** 2
                 moment = moment + float(np.linalg.norm(body.inertia)) * turning
                 about = moment[:, None] + reaches[:, path] * force[:, None]
@@ -76,7 +75,7 @@ class Magnitudes:
         return tau
 
     def lagrangian(self, q: Array, qd: Array) -> Array:
-        """Bounds of kinetic + |potential| energy of each link, shape (samples, N)."""
+        """Return bounds of kinetic + |potential| energy of each link, shape (samples, N)."""
         frames = self._frames(q, qd, 0.0 * qd, 0.0)
         sizes = []
         for at in self.links:
@@ -88,7 +87,7 @@ class Magnitudes:
         return np.stack(sizes, -1)
 
     def poses(self, points: Points, q: Array) -> Array:
-        """Bounds of a frame's matrix whose origin is a point, (samples, points, 4, 4)."""
+        """Return bounds of the matrices of frames whose origins are points, (samples, points, 4, 4)."""
         found = np.ones((len(q), len(points), 4, 4))
         for p, (frame, lever) in enumerate(self._carriers(points, q, 0.0 * q, 0.0 * q)):
             found[:, p, :3, 3] = (frame.reach + lever)[:, None]
@@ -96,7 +95,7 @@ class Magnitudes:
         return found
 
     def points(self, points: Points, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
-        """Bounds of (ω, v) and (α, a) of points, (samples, points, 6) each."""
+        """Return bounds of (ω, v) and (α, a) of points, (samples, points, 6) each."""
         speeds, changes = [], []
         for frame, lever in self._carriers(points, q, qd, qdd):
             reach, turning = frame.reach + lever, frame.alpha + frame.omega**2
@@ -107,7 +106,7 @@ class Magnitudes:
         return np.stack(speeds, 1), np.stack(changes, 1)
 
     def _carriers(self, points: Points, q: Array, qd: Array, qdd: Array) -> Iterator[tuple[_Sizes, float]]:
-        """What carries each point, and how far it is from the origin of that."""
+        """Yield the sizes of the frame that carries each point, and the point's distance from its origin."""
         frames, zero = self._frames(q, qd, qdd, 0.0), np.zeros(len(q))
         ground = _Sizes(zero, zero, zero, zero, zero, zero + 1.0)
         for body, place in points:
@@ -130,7 +129,10 @@ class Magnitudes:
 
 
 def _carried(body: BodyEntry, up: _Sizes, turn: Array, rate: Array, change: Array) -> _Sizes:
-    """A frame on `up`: V + S q̇ and A + S q̈ + V × S q̇, with S = (z, s), |s| the distance of a hinge's axis."""
+    """Return the sizes of a frame on `up`: V + S q̇ and A + S q̈ + V × S q̇.
+
+    S = (z, s), with |s| the distance of a hinge's axis.
+    """
     sliding = body.kind == "prismatic"
     reach = up.reach + _length(body.translation) + (turn if sliding else 0.0)
     z, s = (0.0, np.ones_like(turn)) if sliding else (1.0, reach)

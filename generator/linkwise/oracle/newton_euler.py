@@ -1,8 +1,8 @@
 """Recursive Newton–Euler over a package's rigid bodies: an oracle that shares nothing with the generator.
 
 Plain vectors in the world's axes, forces at centres of mass, one link at a time; the textbook recursion. It
-takes complex motion too, being but sums, products, sines and cosines: complex steps differentiate it to
-the last digit (Squire and Trapp, SIAM Review 40(1), 1998).
+accepts complex motion too, as it has only sums, products, sines and cosines: complex steps differentiate it
+to the last digit (Squire and Trapp, SIAM Review 40(1), 1998).
 """
 
 from collections.abc import Sequence
@@ -10,20 +10,24 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from linkwise_runtime.rule.joint_tree import TreeFrame
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from linkwise.check.curve_reference import displacement
-from linkwise.check.rounding import NoisyTree
+from linkwise.oracle.rounding import NoisyTree
 from linkwise.package.load import Array
-from linkwise.package.manifest import BodyEntry, FrameEntry, Manifest, RigidTree
+from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
 
 Points = Sequence[tuple[int | None, Array]]
-"""What carries each point, a body or None for the ground, and where it is in the axes of that, (3,)."""
+"""Carrier of each point, a body or None for the ground, and the point in the carrier's axes, (3,)."""
 
 
 @dataclass(frozen=True)
 class _FrameMotion:
-    """A frame in the world's axes: rotation (samples, 3, 3); origin, its velocity, ω, α, and a − gravity."""
+    """Motion of a frame in the world's axes.
+
+    It has the rotation (samples, 3, 3), the origin, its velocity, ω, α, and a − gravity.
+    """
 
     rotation: Array
     origin: Array
@@ -34,7 +38,7 @@ class _FrameMotion:
 
 
 class _BodyMotion(NamedTuple):
-    """A body's frame, and its joint's axis."""
+    """Motion of a body's frame, and its joint's axis."""
 
     frame: _FrameMotion
     axis: Array
@@ -57,14 +61,14 @@ class NewtonEuler:
         self._placed = [(np.array(body.rotation), np.array(body.translation)) for body in self.bodies]
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
-        """τ_ij, shape (samples, n, N), for inputs of shape (samples, n)."""
+        """Return τ_ij, shape (samples, n, N), for inputs of shape (samples, n)."""
         own = [[self.bodies[at]] for at in self.links]
         return self.torques_of(own, q, qd, qdd, gravity)[..., 0]
 
     def torques_of(
         self, carried: Sequence[Sequence[BodyEntry]], q: Array, qd: Array, qdd: Array, gravity: bool = True
     ) -> Array:
-        """τ_ij (samples, n, N, X) where each link has the masses of X bodies in turn, not its own."""
+        """Return τ_ij (samples, n, N, X) where each link has the masses of X bodies in turn, not its own."""
         motions = self._motions(q, qd, qdd, self.gravity if gravity else 0.0 * self.gravity)
         axes, origins = (
             np.stack(parts, 1)[:, :, None]
@@ -86,7 +90,10 @@ class NewtonEuler:
         return tau
 
     def torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
-        """τ_i of all links together, (samples, n), by one pass inwards; inputs as of `partial_torque`."""
+        """Return τ_i of all links together, (samples, n), by one pass inwards.
+
+        Inputs are those of `partial_torque`.
+        """
         motions = self._motions(q, qd, qdd, self.gravity if gravity else 0.0 * self.gravity)
         tau = np.zeros(q.shape, np.result_type(q, qd, qdd))
         forces, moments = np.zeros((2, len(self.bodies), len(q), 3), tau.dtype)
@@ -105,7 +112,10 @@ class NewtonEuler:
         return tau
 
     def energies(self, q: Array, qd: Array) -> tuple[Array, Array]:
-        """Kinetic and potential energy of each link in J, (samples, N); the base's origin is at height 0."""
+        """Return kinetic and potential energy of each link in J, (samples, N) each.
+
+        The base's origin is at height 0.
+        """
         motions = self._motions(q, qd, 0.0 * qd, self.gravity)
         kinetic, potential = [], []
         for at in self.links:
@@ -117,31 +127,34 @@ class NewtonEuler:
             potential.append(-body.mass * (frame.origin + lever) @ self.gravity)
         return np.stack(kinetic, -1), np.stack(potential, -1)
 
-    def poses(self, frames: Sequence[FrameEntry], q: Array) -> Array:
-        """Homogeneous matrices from the coordinates of frames to the world's, (samples, frames, 4, 4)."""
+    def poses(self, frames: Sequence[TreeFrame], q: Array) -> Array:
+        """Return homogeneous matrices from frames' coordinates to the world's, (samples, frames, 4, 4)."""
         found = np.zeros((len(q), len(frames), 4, 4), q.dtype)
         found[..., 3, 3] = 1.0
-        carriers = self._carriers([frame.body for frame in frames], q, 0.0 * q, 0.0 * q)
+        carriers = self._carriers([frame.joint for frame in frames], q, 0.0 * q, 0.0 * q)
         for f, (frame, carrier) in enumerate(zip(frames, carriers, strict=True)):
             found[:, f, :3, :3] = carrier.rotation @ np.array(frame.rotation)
             found[:, f, :3, 3] = carrier.origin + carrier.rotation @ np.array(frame.translation)
         return found
 
     def places(self, points: Points, q: Array) -> Array:
-        """Where points are in the world, (samples, points, 3)."""
+        """Return the places of points in the world, (samples, points, 3)."""
         carriers = self._carriers([body for body, _ in points], q, 0.0 * q, 0.0 * q)
         found = (at.origin + at.rotation @ place for at, (_, place) in zip(carriers, points, strict=True))
         return np.stack(list(found), 1)
 
     def points(self, points: Points, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
-        """(ω, v) and (α, a) of points and what carries them, (samples, points, 6) each; no gravity in a."""
+        """Return (ω, v) and (α, a) of points on their carriers, (samples, points, 6) each.
+
+        There is no gravity in a.
+        """
         speeds, changes = [], []
         for at, (_, place) in zip(self._carriers([b for b, _ in points], q, qd, qdd), points, strict=True):
             arm = at.rotation @ place
             speed = _cross(at.omega, arm)
             change = _cross(at.alpha, arm) + _cross(at.omega, speed)
             shift = at.v + speed
-            if self.noise and not np.iscomplexobj(q):  # of a complex step it would be no slope's
+            if self.noise and not np.iscomplexobj(q):  # in a complex step it would not be the slope's
                 reach = _length(at.origin + arm)
                 shift = self.noise(shift, _length(at.v) + _length(at.omega) * reach)
             speeds.append(np.concatenate([at.omega, shift], -1))
@@ -149,7 +162,7 @@ class NewtonEuler:
         return np.stack(speeds, 1), np.stack(changes, 1)
 
     def _wrenches(self, bodies: Sequence[BodyEntry], frame: _FrameMotion) -> tuple[Array, Array, Array]:
-        """Force at the centre of mass, moment about it, and where it is, (samples, X, 3), of X bodies.
+        """Return force at the centre of mass, moment about it, and its place, (samples, X, 3), of X bodies.
 
         Noise is of the size of what both are summed from about the base, as closed forms do in one frame.
         """
@@ -172,14 +185,14 @@ class NewtonEuler:
         return force, moment, origin + lever
 
     def _carriers(self, bodies: Sequence[int | None], q: Array, qd: Array, qdd: Array) -> list[_FrameMotion]:
-        """Frames of some bodies, or of the ground, in motion without gravity."""
+        """Return the frames of some bodies, or of the ground, in motion without gravity."""
         motions = self._motions(q, qd, qdd, 0.0 * self.gravity)
         zero = np.zeros((len(q), 3))
         ground = _FrameMotion(np.broadcast_to(np.eye(3), (len(q), 3, 3)), zero, zero, zero, zero, zero)
         return [ground if body is None else motions[body].frame for body in bodies]
 
     def _motions(self, q: Array, qd: Array, qdd: Array, gravity: Array) -> list[_BodyMotion]:
-        """Motion of each body, from the ground outwards."""
+        """Return the motion of each body, from the ground outwards."""
         zero = np.zeros((len(q), 3))
         upright = np.broadcast_to(np.eye(3), (len(q), 3, 3))
         ground = _FrameMotion(upright, zero, zero, zero, zero, zero - gravity)
@@ -197,7 +210,10 @@ class NewtonEuler:
 def _moved(
     kind: str, placed: tuple[Array, Array], up: _FrameMotion, turn: Array, rate: Array, change: Array
 ) -> _BodyMotion:
-    """Motion of a body placed on `up`, its parent; turn, rate and change of its joint are (samples, 1)."""
+    """Return the motion of a body placed on `up`, its parent.
+
+    turn, rate and change of its joint are (samples, 1).
+    """
     rotation, omega, alpha = up.rotation @ placed[0], up.omega, up.alpha
     axis, arm = rotation[:, :, 2], up.rotation @ placed[1]
     if kind == "prismatic":
@@ -217,7 +233,7 @@ def _moved(
 
 @dataclass(frozen=True)
 class _LinkPath:
-    """What carries a link, from its body to the ground: bodies, whether each turns, and its coordinate."""
+    """Path of a link, from its body to the ground: bodies, whether each turns, and its coordinate."""
 
     bodies: NDArray[np.intp]
     turning: NDArray[np.bool_]
@@ -225,14 +241,14 @@ class _LinkPath:
 
     @classmethod
     def of(cls, bodies: Sequence[BodyEntry], at: int) -> "_LinkPath":
-        """That of the body at a place."""
+        """Return the path of the body at an index."""
         path = path_of(bodies, at)
         turning = np.array([bodies[b].kind == "revolute" for b in path])
         return cls(np.array(path), turning, np.array([bodies[b].coordinate for b in path]))
 
 
 def path_of(bodies: Sequence[BodyEntry], at: int) -> list[int]:
-    """A body, what carries it, and so on to the ground."""
+    """Return the indices of a body, of its parent, and so on to the ground."""
     back, path = bodies[at].parent, [at]
     while back is not None:
         path.append(back)
@@ -241,13 +257,13 @@ def path_of(bodies: Sequence[BodyEntry], at: int) -> list[int]:
 
 
 def _turned(inertia: Array, rotation: Array) -> Array:
-    """Inertia about the centre of mass, in the world's axes."""
+    """Return the inertia about the centre of mass, in the world's axes."""
     turned: Array = rotation @ inertia @ rotation.swapaxes(-1, -2)
     return turned
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Vector product of each pair (..., 3), as np.cross gives it in ten times the time."""
+    """Return the vector product of each pair (..., 3), as np.cross gives it in ten times the time."""
     (a0, a1, a2), (b0, b1, b2) = ([x[..., k] for k in range(3)] for x in (a, b))
     product = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
     product[..., 0] = a1 * b2 - a2 * b1
@@ -257,19 +273,19 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _length(vectors: Array) -> Array:
-    """Length of each (..., 3), (..., 1)."""
+    """Return the length (..., 1) of each vector (..., 3)."""
     length: Array = np.sqrt((np.abs(vectors) ** 2).sum(-1, keepdims=True))
     return length
 
 
 def _dot(a: Array, b: Array) -> Array:
-    """Scalar product of each pair; nothing is conjugated."""
+    """Return the scalar product of each pair; nothing is conjugated."""
     product: Array = np.einsum("si,si->s", a, b)
     return product
 
 
 def _applied(matrices: Array, vectors: Array) -> Array:
-    """Each matrix times its vector."""
+    """Return each matrix times its vector."""
     product: Array = (matrices @ vectors[..., None])[..., 0]
     return product
 
@@ -277,3 +293,34 @@ def _applied(matrices: Array, vectors: Array) -> Array:
 def _about_z(angle: Array) -> Array:
     c, s, o, i = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
     return np.moveaxis(np.array([[c, -s, o], [s, c, o], [o, o, i]]), -1, 0)
+
+
+def displacement(body: BodyEntry, q: Array, derivative: int = 0) -> Array:
+    """Return the displacement of a body's joint, or a derivative by its coordinate, (samples, 1).
+
+    q is (samples, n).
+    """
+    x = q[:, body.coordinate : body.coordinate + 1]
+    if body.curve is None:
+        return body.ratio * (
+            x if derivative == 0 else np.ones_like(x) if derivative == 1 else np.zeros_like(x)
+        )
+    moved = np.zeros_like(x)
+    ends = (*body.curve.starts[1:], np.inf)
+    lower = -np.inf
+    for start, upper, piece in zip(body.curve.starts, ends, body.curve.pieces, strict=True):
+        of_piece = Polynomial(piece).deriv(derivative) if derivative else Polynomial(piece)
+        within = (x.real >= lower) & (x.real < upper)
+        moved = np.where(within, of_piece(x - start), moved)
+        lower = upper
+    return body.ratio * moved
+
+
+def displacement_bound(body: BodyEntry, q: Array, derivative: int = 0) -> Array:
+    """Return the magnitude of a joint's displacement, or of its derivative, (samples,).
+
+    It is the larger one of coordinates of these magnitudes with either sign.
+    """
+    either = (np.abs(displacement(body, sign * q, derivative)[:, 0]) for sign in (1.0, -1.0))
+    bound: Array = np.maximum(*either)
+    return bound

@@ -1,0 +1,1 @@
+"""References that packages are compared with: nothing here is shared with what writes them."""
