@@ -997,7 +997,7 @@ def test_a_planted_cache_fails_and_is_never_run(mode: py_compile.PycInvalidation
     shutil.rmtree(package / "forms/__pycache__")
     source = package / "forms/link_1.py"
     text, times = source.read_text(), (source.stat().st_atime_ns, source.stat().st_mtime_ns)
-    source.write_text(text.replace(" = 0.", " = 1.", 1).replace("c1 = xp.cos(q1)", "c1 = xp.sin(q1)"))
+    source.write_text(text.replace(" = 0.", " = 1.", 1).replace("cos1 = xp.cos(q1)", "cos1 = xp.sin(q1)"))
     assert source.stat().st_size == len(text.encode()) != source.read_text() != text
     os.utime(source, ns=times)
     py_compile.compile(str(source), invalidation_mode=mode)

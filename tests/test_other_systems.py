@@ -20,7 +20,7 @@ from linkwise.emit.assemble import DEVICES, checked_identifier
 from linkwise_runtime.native.native_build import STACK, Sources, library, require_stack
 from linkwise_runtime.native.native_cache import cache_directory, is_whole, locked
 from linkwise_runtime.native.native_compiler import FLAGS, AppleCompiler, find_compiler
-from linkwise_runtime.native.native_process import answer
+from linkwise_runtime.native.native_process import answer, run_all
 from linkwise_runtime.native.native_system import MacOS, Windows
 from other_system import UNFIT, locks
 from search_path import before
@@ -304,13 +304,19 @@ def test_no_package_is_called_as_a_device_of_windows_is() -> None:
             checked_identifier(name, "robot")
 
 
-def test_what_a_program_writes_to_a_file_is_read_once_and_after_its_end_alone() -> None:
+@pytest.mark.parametrize("in_memory", [True, False])
+def test_what_a_program_writes_to_a_file_is_read_once_and_after_its_end_alone(
+    in_memory: bool, on: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Both write and read at one place: whoever read before the end would move where the rest is written."""
-    said = bytearray()
-    with Windows().outlet() as stream:
-        stream.write(b"half")
-        Windows().hear(stream, said, ended=False)
-        stream.write(b" and whole")
-        Windows().hear(stream, said, ended=True)
-        Windows().hear(stream, said, ended=True)
-    assert said == b"half and whole"
+    on("win32")
+    if not in_memory:
+        monkeypatch.delattr(os, "memfd_create", raising=False)
+    program = [
+        "sh",
+        "-c",
+        "printf half; printf half >&2; sleep 0.4; printf ' and whole'; echo ' and all' >&2; exit 3",
+    ]
+    assert answer(program, 10) == b"half and whole"
+    with pytest.raises(RuntimeError, match=r"^sh failed: half and all$"):
+        run_all([program], lambda _: None)

@@ -401,7 +401,7 @@ def test_what_is_no_file_in_the_place_of_one_of_a_set_is_named_and_stays(
 def test_a_workplace_without_locks_is_left_to_its_writer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(workplace, "_locked", lambda lock, otherwise: otherwise)
+    monkeypatch.setattr(workplace, "locked", lambda lock, otherwise: otherwise)
     with whole_directory(tmp_path / "target", nothing_refused) as draft:
         sweep(tmp_path)
         (draft / "a").touch()

@@ -20,6 +20,27 @@ BAD: dict[str, tuple[tuple[str, ...], str]] = {
         (HEAD, "[analysis]\ncutoff = '6'\n", TRIALS),
         "[analysis]: 'cutoff' is '6'; give a number",
     ),
+    "wrong type in a list": ((HEAD, "columns = ['*', 3]\n", TRIALS), "'columns'[1] is 3; give a text"),
+    "wrong type in a table": (
+        (HEAD, "[robot]\nlock = {joint1 = 'x'}\n", TRIALS),
+        "[robot]: 'lock'.joint1 is 'x'; give a number",
+    ),
+    "no list": ((HEAD, "[analysis]\npayload = 3\n", TRIALS), "[analysis]: 'payload' is 3; give a list"),
+    "no table": ((HEAD, "[robot]\nlock = [3]\n", TRIALS), "[robot]: 'lock' is [3]; give a table"),
+    "no flag": ((HEAD, "pages = 1\n", TRIALS), "'pages' is 1; give true or false"),
+    "no whole number": ((HEAD, "[analysis]\nwindow = 3.5\n", TRIALS), "'window' is 3.5; give a whole number"),
+    "none of the choices": (
+        (HEAD, '[[figure]]\ncolumns = "tau/*"\nband = "wide"\n', TRIALS),
+        "[[figure]]: 'band' is 'wide'; give 'deviation' or 'range' or 'none'",
+    ),
+    "a number too large for a float": (
+        (HEAD, f"[analysis]\ncutoff = {'9' * 400}\n", TRIALS),
+        f"[analysis]: 'cutoff' is {'9' * 40}…{'9' * 39}; give a number",
+    ),
+    "nothing of what is needed": (
+        (HEAD, '[[figure]]\nband = "range"\n', TRIALS),
+        "[[figure]] needs 'columns'",
+    ),
     "impossible choice": (
         (HEAD, "[analysis]\ncutoff = -6\n", TRIALS),
         "--cutoff -6: give a frequency in Hz above 0",

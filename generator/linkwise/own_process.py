@@ -1,4 +1,7 @@
-"""Work in a process of its own, where a fault of compiled code may end it, or where it may not end."""
+"""Work in a process of its own, where a fault of compiled code may end it, or where it may not end.
+
+`multiprocessing` lets none of its daemons, which a study's workers are, begin a process of its own.
+"""
 
 import faulthandler
 import os

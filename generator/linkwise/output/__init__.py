@@ -2,7 +2,8 @@
 
 A writer works in a hidden folder beside its target, `workplace`, which it holds locked while it lives; the
 result is put in place by one step of the file system, `exchange`. After a kill at any moment the old target
-or the new one is there whole, and the next run of linkwise there removes what the dead one left.
+or the new one is there whole, and the next run of linkwise there removes what the dead one left. Libraries
+replace single files so, none a folder, nor one on systems that cannot exchange two names, such as Windows.
 """
 
 from linkwise.output.workplace import passing_folder, sweep

@@ -4,8 +4,7 @@ import ctypes
 import errno
 import os
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -25,12 +24,18 @@ def put(draft: Path, target: Path) -> bool:
     The former folder is then at `draft`. Raises OSError; nothing has changed then.
     """
     for _ in range(TRIES):  # another writer may put its own there, or be between its two renames
-        with _tried(*TAKEN):
+        try:
             system_here().moved(draft.rename, target)  # over nothing or, where it can be, an empty folder
             return False
-        with _tried(errno.ENOENT, *TAKEN):
+        except OSError as error:
+            if error.errno not in TAKEN:
+                raise
+        try:
             exchange(draft, target)
             return True
+        except OSError as error:
+            if error.errno not in (errno.ENOENT, *TAKEN):
+                raise
     raise OSError(errno.EBUSY, "others keep writing there")
 
 
@@ -94,13 +99,3 @@ def _swap() -> Callable[[bytes, bytes], int] | None:
     if hasattr(library, "renamex_np"):
         return lambda one, other: int(library.renamex_np(one, other, SWAP))
     return None
-
-
-@contextmanager
-def _tried(*numbers: int) -> Iterator[None]:
-    """Suppress an OSError of these numbers only."""
-    try:
-        yield
-    except OSError as error:
-        if error.errno not in numbers:
-            raise

@@ -146,14 +146,18 @@ def _held(work: Path, flags: int) -> int | None:
         if making:
             raise
         return None
-    if _locked(lock, otherwise=making) and _is_at(lock, work / LOCK):
+    if locked(lock, otherwise=making) and _is_at(lock, work / LOCK):
         return lock
     os.close(lock)
     return None
 
 
-def _locked(lock: int, otherwise: bool) -> bool:
-    """Lock an open file, and return True; False where another has it, `otherwise` without locks of files."""
+def locked(lock: int, otherwise: bool) -> bool:
+    """Lock an open file, and return True; False where another has it, `otherwise` without locks of files.
+
+    The lock is the runtime's, which needs no library: filelock would be a second one, and would make the
+    file that `sweep` only looks for.
+    """
     try:
         return system_here().lock(lock)
     except (ImportError, OSError):
@@ -169,7 +173,7 @@ def _is_at(lock: int, path: Path) -> bool:
 
 
 def _cleared(work: Path) -> None:
-    """Put back what is in `old` and remove the workplace, which is locked; errors leave it to a sweep."""
+    """Put back what is in `old` and empty the workplace, which is locked; errors leave it to a sweep."""
     with suppress(OSError):
         if not {LOCK, NEW, OLD, REST}.issuperset(os.listdir(work)):
             return
@@ -182,13 +186,10 @@ def _cleared(work: Path) -> None:
             (work / OLD).rename(work / REST)
         for name in (NEW, REST):
             shutil.rmtree(work / name, ignore_errors=True)
-        if os.listdir(work) in ([LOCK], []):
-            (work / LOCK).unlink(missing_ok=True)
-            work.rmdir()
 
 
 def _left(work: Path, lock: int) -> None:
-    """Release the lock, and remove a workplace left for its sake, where open files keep their names."""
+    """Release the lock, as open files may keep their names, and remove a workplace that has nothing else."""
     os.close(lock)
     with suppress(OSError):
         if os.listdir(work) == [LOCK]:

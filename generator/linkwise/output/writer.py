@@ -160,11 +160,9 @@ def _blocker(place: Path) -> Path | None:
 @contextmanager
 def _ended_by_signal() -> Iterator[None]:
     """Let signals that end a program end the work as an error does: what is half written is removed."""
-    numbers = ENDING
-    if threading.current_thread() is not threading.main_thread():
-        numbers = []  # only the main thread may set handlers
-    former = {number: signal.getsignal(number) for number in numbers}
-    own = [number for number, handler in former.items() if handler == signal.SIG_DFL]
+    # Only the main thread may set handlers.
+    numbers = ENDING if threading.current_thread() is threading.main_thread() else []
+    own = [number for number in numbers if signal.getsignal(number) == signal.SIG_DFL]
     try:
         for number in own:
             signal.signal(number, lambda number, _: sys.exit(128 + number))

@@ -1,4 +1,9 @@
-"""Compiled modules that Python keeps in `__pycache__`, which run in place of the sources beside them."""
+"""Compiled modules that Python keeps in `__pycache__`, which run in place of the sources beside them.
+
+linkwise imports packages without them, but the Python of a package's user does not, and would run whatever
+lies there. They are compared part by part: code objects count as equal with any size of stack, and as
+different without the columns that -X no_debug_ranges leaves out.
+"""
 
 import importlib.util
 import inspect

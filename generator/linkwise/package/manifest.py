@@ -153,8 +153,7 @@ class Manifest:
             )
         try:
             require(schema == SCHEMA and type(schema) is int, "schema", f"the number {SCHEMA}")
-            manifest: Manifest = decoded(cls, data, "", also=("schema", "units", "conventions", "checksums"))
-            return manifest
+            return decoded(cls, data, "", also=("schema", "units", "conventions", "checksums"))
         except ValueError as error:
             raise LinkwiseError(f"{path} is damaged: {error}; generate the robot again") from error
 
@@ -212,9 +211,8 @@ def _read(path: Path) -> dict[str, Any]:
         require(isinstance(data, dict), "the whole", "an object")
     except OSError as error:
         raise LinkwiseError(f"{path} cannot be read: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:
-        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
-        raise LinkwiseError(f"{path} is damaged: {reason}; generate the robot again") from error
+    except ValueError as error:
+        raise LinkwiseError(f"{path} is damaged: {error}; generate the robot again") from error
     entries: dict[str, Any] = data
     return entries
 

@@ -5,7 +5,8 @@ trial is tried once more, after all others, and no more often, as it may be the 
 
 Each process has a pipe of its own and shares nothing with the others: no lock dies with one of them, and a
 process that ends at any instant leaves nobody waiting. `concurrent.futures` keeps one queue for all, and
-takes a process's exit after a signal for a result.
+takes a process's exit after a signal for a result. loky ends all processes where one dies, leaves them
+running where this one is killed, and ends them by a program, pgrep, which may be missing.
 """
 
 import multiprocessing
@@ -109,7 +110,7 @@ def _work(tasks: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, *ENDING})
-    _end_with_parent()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     with suppress(EOFError, OSError):  # the pipe's other end is gone; a trial reports its own
         while True:
             tasks.send(run_trial(tasks.recv()))
@@ -118,12 +119,8 @@ def _work(tasks: Connection) -> None:
 def _end_with_parent() -> None:
     """End this process when its parent ends, however that ends, without another trial."""
     if (parent := multiprocessing.parent_process()) is not None:
-
-        def watch() -> None:
-            parent.join()
-            os._exit(1)
-
-        threading.Thread(target=watch, daemon=True).start()
+        parent.join()
+        os._exit(1)
 
 
 @contextmanager

@@ -12,14 +12,14 @@ from linkwise.analysis.analysis_choices import AnalysisChoices
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
+from linkwise.package.decode import filled, known_keys, toml_value
 from linkwise.robot import Options
 from linkwise.robot.readers.toml_table import tables, toml_data
 from linkwise.study.cycles import written_cycles
 from linkwise.study.running_moments import STATISTICS
 from linkwise.study.study_paths import require_there, resolved
 from linkwise.study.study_plan import SUBJECT, Comparison, Cycles, PaperFigure, StudyPlan
-from linkwise.study.trial_entries import OWN, trials_of
-from linkwise.study.typed_tables import filled, given_flag, given_text, given_texts, known_keys
+from linkwise.study.trial_entries import OWN, given_text, trials_of
 
 COLUMNS = (
     *("trial", "cycle", "percent", "time", "column", "unit", "statistic", "subjects", "trials"),
@@ -60,10 +60,10 @@ def read_study(path: Path, trust_python: bool = False) -> StudyPlan:
             trials,
             _options(data.get("robot", {}), folder),
             _cycles(data, folder),
-            given_texts(data, "columns", ("**",)),
+            toml_value(tuple[str, ...], "'columns'", data.get("columns", ["**"])),
             tuple(filled(Comparison, "[[compare]]", item) for item in tables(data, "compare")),
             tuple(filled(PaperFigure, "[[figure]]", item) for item in tables(data, "figure")),
-            pages=given_flag(data, "pages"),
+            pages=toml_value(bool, "'pages'", data.get("pages", True)),
             trust_python=trust_python,
         )
         _check(plan)

@@ -7,11 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import gettempdir
 
-from linkwise_runtime.native.native_system import system_here
-
 from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names
 from linkwise.output import sweep
+from linkwise.output.workplace import locked
 from linkwise.study.study_mark import StudyMark
 from linkwise.study.study_paths import removed, require_own
 from linkwise.study.study_plan import StudyPlan
@@ -50,7 +49,7 @@ def held_study(out: Path) -> Iterator[None]:
     except OSError as error:
         raise LinkwiseError(f"{out}: {error.strerror or error}") from error
     with file:
-        if not _locked(file.fileno()):
+        if not locked(file.fileno(), otherwise=True):
             raise LinkwiseError(f"{out}: another linkwise is at work there; wait, or give another --out")
         _sweep(out)
         try:
@@ -62,14 +61,6 @@ def held_study(out: Path) -> Iterator[None]:
 def _sweep(out: Path) -> None:
     for place in (out, out / TRIALS, Path(gettempdir())):
         sweep(place)
-
-
-def _locked(descriptor: int) -> bool:
-    """Take the lock; return False if another process holds it, as far as the file system knows."""
-    try:
-        return system_here().lock(descriptor)
-    except (ImportError, OSError):
-        return True
 
 
 def refuse_unless_study(out: Path, plan: StudyPlan) -> None:

@@ -75,7 +75,7 @@ class StudyMark:
         if not is_file(path):
             return None
         try:
-            mark: StudyMark = decoded(cls, parsed(read_back(path)), "")
+            mark = decoded(cls, parsed(read_back(path)), "")
             for name in mark.files:
                 is_plain = is_inside(name) and "/" not in name
                 require(is_plain and is_of_study(name), f"{name!r} among 'files'", "a name of a study's file")
@@ -83,9 +83,8 @@ class StudyMark:
                     require_own(out / name)
         except LinkwiseError:
             raise
-        except (ValueError, RecursionError) as error:
-            reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
-            raise LinkwiseError(f"{path} is damaged: {reason}; give another --out") from error
+        except ValueError as error:
+            raise LinkwiseError(f"{path} is damaged: {error}; give another --out") from error
         return mark
 
     def files_in(self, out: Path) -> tuple[Path, ...]:

@@ -7,11 +7,11 @@ from typing import Any
 
 from linkwise.analysis.analysis_choices import AnalysisChoices
 from linkwise.errors import LinkwiseError, within
+from linkwise.package.decode import filled, known_keys, toml_value
 from linkwise.robot.readers.toml_table import tables
 from linkwise.study.study_paths import is_address, resolved
 from linkwise.study.study_plan import OF_FILES, SUBJECT, Trial
 from linkwise.study.trial_patterns import expanded
-from linkwise.study.typed_tables import filled, given_text, known_keys
 
 OWN = ("name", "subject", "log", "robot")
 """Keys of a trial besides factors and choices."""
@@ -69,3 +69,13 @@ def _label(entry: Mapping[str, Any], factor: str, place: str) -> str:
     if not (label := str(value).strip()):
         raise LinkwiseError(f"{factor!r} is empty; give a text")
     return label
+
+
+def given_text(data: Mapping[str, Any], key: str, default: str | None = None) -> str:
+    """Return a text of a table; raise LinkwiseError for an empty one, and for none without a default."""
+    if key not in data and default is None:
+        raise LinkwiseError(f"needs {key!r}")
+    value: str = toml_value(str, repr(key), data.get(key, default))
+    if not value.strip():
+        raise LinkwiseError(f"{key!r} is {value!r}; give a text")
+    return value

@@ -53,11 +53,10 @@ class TrialRecord:
         try:
             if not (folder / RECORD).exists():
                 return None
-            record: TrialRecord = decoded(cls, parsed(read_back(folder / RECORD)), "")
-            return record
+            return decoded(cls, parsed(read_back(folder / RECORD)), "")
         except LinkwiseError:
             raise
-        except (OSError, ValueError, RecursionError):
+        except (OSError, ValueError):
             return None
 
 

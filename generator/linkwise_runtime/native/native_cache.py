@@ -10,12 +10,13 @@ import errno
 import hashlib
 import os
 import stat
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from io import BufferedReader
 from pathlib import Path
 
-from .native_system import system_here
+from .native_system import STEP, system_here
 
 ELSEWHERE = "set LINKWISE_CACHE to another directory"
 SAFELY = sum(getattr(os, flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
@@ -83,9 +84,9 @@ def locked(path: Path, tell: Callable[[str], None]) -> Iterator[None]:
     with ExitStack() as held:
         try:
             file = held.enter_context(_opened(path, os.O_RDWR | os.O_CREAT))
-            if not system.lock(file.fileno()):
+            while not system.lock(file.fileno()):
                 tell("another process is at it")
-                system.lock(file.fileno(), wait=True)
+                time.sleep(STEP)
         except OSError as error:
             raise RuntimeError(f"cannot lock {path}: {error.strerror}; {ELSEWHERE}") from None
         yield

@@ -1,14 +1,15 @@
 """Runs a compiler: several commands at a time, with a time limit, and progress on a terminal."""
 
+import os
 import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from typing import IO, cast
+from contextlib import ExitStack, contextmanager, suppress
+from typing import IO, Any
 
 from .native_system import system_here
 
@@ -46,93 +47,76 @@ def run_all(commands: Sequence[Sequence[str]], tell: Tell) -> None:
 
     `tell` is called with how many have ended.
     """
-    running: list[_Running] = []
-    try:
-        for command in commands:
-            running.append(_started(command, "stderr"))
-        if not _ended(running, PATIENCE, tell):
-            name = commands[0][0]
-            raise RuntimeError(f"{name} is not done after {PATIENCE:.0f} s; point CC to another C compiler")
-    finally:
-        for one in running:
-            one.close()
-    for one, command in zip(running, commands, strict=True):
-        if one.process.returncode:
-            reason = _reason(bytes(one.said), one.process.returncode)
-            raise RuntimeError(f"{command[0]} failed: {reason}")
+    with ExitStack() as held:
+        running = [held.enter_context(_started(command, "stderr")) for command in commands]
+        start = time.monotonic()
+        while left := [process for process, _ in running if process.poll() is None]:
+            seconds = time.monotonic() - start
+            if seconds > PATIENCE:
+                name = commands[0][0]
+                raise RuntimeError(
+                    f"{name} is not done after {PATIENCE:.0f} s; point CC to another C compiler"
+                )
+            tell(f"{len(running) - len(left)} of {len(running)} parts, {seconds:.0f} s")
+            with suppress(subprocess.TimeoutExpired):
+                left[0].wait(STEP)
+        for (process, said), command in zip(running, commands, strict=True):
+            if process.returncode:
+                raise RuntimeError(f"{command[0]} failed: {_reason(_read(said), process.returncode)}")
 
 
 def answer(command: Sequence[str], seconds: float) -> bytes:
     """Return a command's stdout; raise RuntimeError if it cannot run or does not end in so many seconds."""
-    one = _started(command, "stdout")
-    try:
-        if not _ended([one], seconds, lambda _: None):
-            raise RuntimeError(
-                f"{' '.join(command)} gives no answer in {seconds:.0f} s; point CC to a C compiler"
-            )
-    finally:
-        one.close()
-    return bytes(one.said)
+    with _started(command, "stdout") as (process, said):
+        try:
+            process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            told = f"{' '.join(command)} gives no answer in {seconds:.0f} s; point CC to a C compiler"
+            raise RuntimeError(told) from None
+        return _read(said)
 
 
-@dataclass(frozen=True)
-class _Running:
-    """A program that is listened to until it ends itself, not until all programs that it started have ended.
+@contextmanager
+def _started(command: Sequence[str], heard: str) -> Iterator[tuple["subprocess.Popen[bytes]", IO[bytes]]]:
+    """Start a command, and yield it with a file of what it writes to its stdout or its stderr.
 
-    A compiler's wrapper may leave a server behind, which keeps the same stdout and stderr open for hours.
+    It is ended, with all that it started, if it still runs in the end. `subprocess.run` would read from a
+    pipe until all programs have ended that have it open: a compiler's wrapper may leave a server behind.
     """
-
-    process: "subprocess.Popen[bytes]"
-    stream: IO[bytes]
-    said: bytearray
-
-    def has_ended(self) -> bool:
-        """Return whether the program has ended; add what it has written so far to `said`."""
-        ended = self.process.poll() is not None  # asked first: what it wrote before its end can then be read
-        system_here().hear(self.stream, self.said, ended)
-        return ended
-
-    def close(self) -> None:
-        """End the program, and all that it started, if it still runs."""
-        if self.process.poll() is None:
-            system_here().stop(self.process)
-            self.process.wait()
-        self.stream.close()
+    with ExitStack() as held:
+        try:
+            said = held.enter_context(_passing_file())
+            outlets: dict[str, Any] = {
+                "stdout": subprocess.DEVNULL,
+                "stderr": subprocess.DEVNULL,
+                heard: said,
+            }
+            process = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True, **outlets)
+        except OSError as error:
+            raise RuntimeError(
+                f"{command[0]} cannot be run: {error.strerror}; point CC to a C compiler"
+            ) from None
+        held.callback(_end, process)
+        yield process, said
 
 
-def _started(command: Sequence[str], listened: str) -> _Running:
-    """Start a command and listen to its stdout or its stderr."""
-    system = system_here()
-    try:
-        outlet = system.outlet()
-        process = subprocess.Popen(
-            command,
-            bufsize=0,
-            stdin=subprocess.DEVNULL,
-            stdout=outlet if listened == "stdout" else subprocess.DEVNULL,
-            stderr=outlet if listened == "stderr" else subprocess.DEVNULL,
-            start_new_session=True,
-        )
-    except OSError as error:
-        raise RuntimeError(
-            f"{command[0]} cannot be run: {error.strerror}; point CC to a C compiler"
-        ) from None
-    stream = cast("IO[bytes]", getattr(process, listened) or outlet)
-    system.listen(stream)
-    return _Running(process, stream, bytearray())
+def _passing_file() -> IO[bytes]:
+    """Return a file without a name, in memory where the system can: no disk may be writable."""
+    if hasattr(os, "memfd_create"):
+        return os.fdopen(os.memfd_create("linkwise"), "w+b")
+    return tempfile.TemporaryFile()
 
 
-def _ended(running: Sequence[_Running], patience: float, tell: Tell) -> bool:
-    """Wait until all have ended; return False if that takes longer than `patience` seconds."""
-    start = time.monotonic()
-    while left := [one for one in running if not one.has_ended()]:
-        seconds = time.monotonic() - start
-        if seconds > patience:
-            return False
-        tell(f"{len(running) - len(left)} of {len(running)} parts, {seconds:.0f} s")
-        with suppress(subprocess.TimeoutExpired):
-            left[0].process.wait(STEP)
-    return True
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    if process.poll() is None:
+        system_here().stop(process)
+        process.wait()
+
+
+def _read(said: IO[bytes]) -> bytes:
+    """Return what a program that has ended has written: before, reading would move where it writes."""
+    said.seek(0)
+    return said.read()
 
 
 def _reason(complaint: bytes, code: int) -> str:

@@ -9,12 +9,11 @@ import signal
 import stat
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any, ClassVar
+from typing import Any, ClassVar
 
 STEP = 0.1
 """Seconds between two tries of what the system cannot wait for."""
@@ -63,7 +62,7 @@ class OperatingSystem:
         """Return whether the mode of a file or a folder lets other users change it."""
         return bool(mode & (stat.S_IWGRP | stat.S_IWOTH))
 
-    def lock(self, descriptor: int, wait: bool = False) -> bool:
+    def lock(self, descriptor: int) -> bool:
         """Lock an open file until it is closed; return False where another process has locked it.
 
         Raises OSError, ImportError.
@@ -71,7 +70,7 @@ class OperatingSystem:
         import fcntl
 
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             return False
         return True
@@ -107,18 +106,6 @@ class OperatingSystem:
     def words(self, command: str) -> list[str]:
         """Return the words of a command line; raise ValueError where a quotation mark is missing."""
         return shlex.split(command)
-
-    def outlet(self) -> int | IO[bytes]:
-        """Return what a program is to write to, which `hear` reads. Raises OSError."""
-        return subprocess.PIPE
-
-    def listen(self, stream: IO[bytes]) -> None:
-        """Prepare a stream for `hear`."""
-        os.set_blocking(stream.fileno(), False)
-
-    def hear(self, stream: IO[bytes], said: bytearray, ended: bool) -> None:
-        """Add to `said` what a program, which may have ended, has written to a stream by now."""
-        said.extend(stream.read() or b"")
 
     def stop(self, process: "subprocess.Popen[bytes]") -> None:
         """End a program that was started in a session of its own, and all that it started."""
@@ -178,19 +165,15 @@ class Windows(OperatingSystem):
         """Return False: a mode does not show that here."""
         return False
 
-    def lock(self, descriptor: int, wait: bool = False) -> bool:
+    def lock(self, descriptor: int) -> bool:
         """Lock the first byte of an open file until it is closed; return False where another process did."""
         msvcrt: Any = importlib.import_module("msvcrt")
-        while True:
-            os.lseek(descriptor, 0, os.SEEK_SET)
-            try:
-                msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-            except PermissionError:
-                if not wait:
-                    return False
-            else:
-                return True
-            time.sleep(STEP)
+        os.lseek(descriptor, 0, os.SEEK_SET)
+        try:
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        except PermissionError:
+            return False
+        return True
 
     def flush(self, path: Path) -> None:
         """Force a file, which must be writable, to the disk; folders are left to Windows."""
@@ -200,22 +183,6 @@ class Windows(OperatingSystem):
     def words(self, command: str) -> list[str]:
         """Return the words of a command line in which backslashes belong to paths."""
         return [word.strip('"') for word in shlex.split(command, posix=False)]
-
-    def outlet(self) -> int | IO[bytes]:
-        """Return a temporary file without a name: a pipe could not be read here without waiting."""
-        return tempfile.TemporaryFile()
-
-    def listen(self, stream: IO[bytes]) -> None:
-        """Do nothing: no preparation is needed."""
-
-    def hear(self, stream: IO[bytes], said: bytearray, ended: bool) -> None:
-        """Add to `said` what a program has written, once it has ended.
-
-        Writing and reading share one position in the file.
-        """
-        if ended and not said:
-            stream.seek(0)
-            said.extend(stream.read())
 
     def stop(self, process: "subprocess.Popen[bytes]") -> None:
         """End a program, and all that it started."""

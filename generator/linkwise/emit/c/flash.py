@@ -1,5 +1,6 @@
 """Bytes of flash that a package's C takes on a microcontroller, estimated from its text: no compiler runs.
 
+Whoever chooses a microcontroller has its compiler last, and a manifest must not depend on one that is there.
 They are of Thumb-2 as gcc makes it with -Os and LINKWISE_SMALL, for a processor whose floating-point unit has
 the number type: code and constants of all functions, those of math.h apart. The weights fit what gcc 12 made
 of robots of every kind; tests hold estimates to a fifth of that.

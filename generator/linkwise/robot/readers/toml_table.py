@@ -5,10 +5,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from linkwise_runtime.chosen_names import nearest_first
-
 from linkwise.errors import LinkwiseError, within
-from linkwise.escape import listed
+from linkwise.package.decode import known_keys
 from linkwise.robot.readers.bounded import MIB, check_toml_bounds, content
 from linkwise.robot.readers.formula import parse_formula
 from linkwise.robot.robot import Scalar, Vec3, unusable
@@ -36,13 +34,7 @@ class TomlTable:
     """One table of the file; its getters raise LinkwiseError that names table and key if one is wrong."""
 
     def __init__(self, place: str, data: Any, known: Iterable[str], parameters: Mapping[str, float]) -> None:
-        if not isinstance(data, dict):
-            raise LinkwiseError(f"{place} must be a table")
-        self.place, self.data, self.parameters = place, data, parameters
-        for key in data:
-            if key not in known:
-                near = listed(nearest_first(key, sorted(known)), 20)
-                raise LinkwiseError(f"{place} has the unknown key {key!r}; known are {near}")
+        self.place, self.data, self.parameters = place, known_keys(place, data, known, 20), parameters
 
     def text(self, key: str, default: str | None = None) -> str:
         """Return the string of a key."""
