@@ -7,12 +7,12 @@ import pytest
 from conftest import DATA
 from linkwise import Payload, generate, read_system, write_package
 from linkwise.analysis import Processing, Reading, analyze
+from linkwise.analysis.analysis_choices import carried
 from linkwise.analysis.job import Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.payload import carrying
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import page_data
-from linkwise.analysis.written_choices import carried
 from linkwise.errors import LinkwiseError
 from linkwise.progress import silent
 from motion_logs import smooth, write_csv

@@ -1,6 +1,6 @@
 """Flags of commands: each is what its name says, and none is another."""
 
-from dataclasses import asdict, fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,10 @@ from linkwise import Fitting, Options
 from linkwise.analysis import Lowpass, Processing, Reading
 from linkwise.analysis.analysis_choices import AnalysisChoices
 from linkwise.analysis.job import Wanted
+from linkwise.analysis.phases import Phase
 from linkwise.cli.app import app
+from linkwise.option import chosen, written
+from linkwise.study.trial_entries import AnalysisKeys
 from typer.testing import CliRunner
 
 READING: dict[str, Any] = {
@@ -68,6 +71,20 @@ OPTIONS = Options(
 )
 SMOOTHED = Lowpass(7.0, 4, "even")
 READ = Reading("deg", "t", (("a", "elbow"), ("b", "wrist")), True, 125.0, 0.25, "/arm")
+WRITTEN = AnalysisChoices(
+    READ,
+    Processing("savitzky-golay", 9, 3, SMOOTHED, "trim", "gradient"),
+    Wanted(phases=(Phase("stance", "", "push", None),), power_terms=True, induced=("joints",)),
+    payload=("hand=2",),
+    load=("hand=1,2,3",),
+    loads=("plate.csv",),
+    loads_cutoff=31.0,
+    contact=("foot=held",),
+    contact_while=("foot=on",),
+    contact_loads=("grf.mot",),
+    contact_threshold=42.0,
+    unactuated=("base_x",),
+)
 
 
 class CalledWith(Exception):
@@ -100,26 +117,31 @@ def called(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
     return call
 
 
-def test_every_flag_of_analyze_is_the_choice_of_its_name(called: Any) -> None:
-    assert list(ANALYSIS) == [field.name for field in fields(AnalysisChoices)]
-    usual = asdict(AnalysisChoices())
+def test_every_flag_of_analyze_is_the_choice_of_its_name(
+    called: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("linkwise.cli.analyze.opened_robot", lambda *given: "the robot")
+    monkeypatch.setattr(AnalysisChoices, "payloads", lambda own, _: own)
+    assert called("analyze", "carrying", ANALYSIS | {"qpos": None})[1] == WRITTEN
+    assert called("analyze", "carrying", {"qpos": "mujoco"})[1].reading == Reading(qpos="mujoco")
+
+
+def test_keys_of_a_study_are_the_flags_of_analyze_by_name_and_default() -> None:
+    usual = vars(AnalysisKeys())
+    assert set(usual) == set(ANALYSIS)
+    assert usual == {one.key: one.default for one in written(AnalysisChoices) if one.key in usual}
     assert all(usual[name] != value for name, value in ANALYSIS.items())
-    found = AnalysisChoices(*called("analyze", "AnalysisChoices", ANALYSIS))
-    assert asdict(found) == ANALYSIS
+    assert chosen(AnalysisChoices, usual) == AnalysisChoices()
+    assert chosen(AnalysisChoices, ANALYSIS | {"qpos": None}) == WRITTEN
+    assert chosen(AnalysisChoices, {"qpos": "mujoco"}).reading == Reading(qpos="mujoco")
 
 
-def test_choices_are_read_processed_and_written_as_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
-    chosen = AnalysisChoices(**ANALYSIS | {"qpos": None})
-    assert chosen.reading == READ
-    assert AnalysisChoices(qpos="mujoco").reading == Reading(qpos="mujoco")
-    assert chosen.processing == Processing("savitzky-golay", 9, 3, SMOOTHED, "trim", "gradient")
-    wanted = chosen.wanted("csv", ("shares",), False)
-    assert (wanted.table, wanted.figures, wanted.page) == ("csv", ("shares",), False)
-    assert (wanted.power_terms, wanted.induced) == (True, ("joints",))
-    assert [phase.name for phase in wanted.phases] == ["stance"]
+def test_choices_are_carried_out_as_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    wanted = chosen(Wanted, {"format": "csv", "figure": ["shares"], "page": False})
+    assert wanted == Wanted("csv", ("shares",), False)
     monkeypatch.setattr("linkwise.analysis.analysis_choices.chosen_contacts", lambda *given: given)
     contacts = ("foot=held",), ("foot=on",), [Path("grf.mot")], 42.0, 31.0, ("base_x",), "the robot"
-    assert chosen.contacts("the robot") == contacts  # type: ignore[arg-type, comparison-overlap]
+    assert WRITTEN.contacts("the robot") == contacts  # type: ignore[arg-type, comparison-overlap]
     both = AnalysisChoices(loads=("plate.csv",), contact_loads=("grf.mot",), loads_cutoff=31.0)
     for files, cutoff in (
         (both, 31.0),
@@ -135,7 +157,7 @@ def test_choices_are_read_processed_and_written_as_they_say(monkeypatch: pytest.
         ({}, Wanted()),
         (
             {"format": "csv", "figure": ("shares", "power"), "page": False, "power_terms": True},
-            Wanted("csv", ("shares", "power"), False, True),
+            Wanted("csv", ("shares", "power"), False, power_terms=True),
         ),
     ],
     ids=["usual", "all"],

@@ -14,7 +14,7 @@ import linkwise
 import pytest
 import typer
 from linkwise.cli.app import COMMANDS, REPORTS, readable
-from linkwise.cli.options import robot_options
+from linkwise.option import chosen, written
 from linkwise.robot import DESCRIPTIONS, Options
 from search_path import before
 from typer.core import TyperGroup
@@ -117,9 +117,9 @@ def test_every_command_that_reads_a_robot_takes_every_flag(file: str) -> None:
 
 
 def test_flags_are_the_options_by_name_and_default() -> None:
-    flags = inspect.signature(robot_options).parameters
+    flags = {one.key: one.default for one in written(Options)}
     assert list(flags) == list(inspect.signature(Options).parameters)
-    assert robot_options() == Options()
+    assert chosen(Options, flags) == chosen(Options, {}) == Options()
 
 
 def test_help_of_generate_names_the_back_ends_of_the_registry() -> None:

@@ -40,6 +40,7 @@ ROOMS = (
     "input_file",
     "makers",
     "own_runtime",
+    "option",
     "errors",
     "escape",
     "linkwise_runtime",

@@ -50,6 +50,11 @@ BAD: dict[str, tuple[tuple[str, ...], str]] = {
         (HEAD, '[[trial]]\nname = "a"\nlog = "gone.csv"\nrobot = "planar3"\ncondition = "x"\n'),
         "gone.csv: no such file",
     ),
+    "empty trial": ((HEAD, "[[trial]]\n"), "trial 1: needs 'log'"),
+    "a choice of one trial": (
+        (HEAD, CHOICES, TRIALS + "padding = 'even'\n"),
+        "trial 'S1-fast-1': --filter-order and --padding go with --cutoff; add it",
+    ),
     "no pattern": (
         (HEAD, TRIALS.replace(".csv", ".mot")),
         "no log is called data/{subject}/{condition}_{trial}.mot",

@@ -1,92 +1,75 @@
-"""Choices of an analysis, named as the flags of `linkwise analyze` and as the keys of a study."""
+"""Choices of an analysis, as `linkwise analyze` and the file of a study write them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from linkwise_runtime.file_joints import Order
-
+from linkwise.analysis.body_names import named_body
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.written_contacts import chosen_contacts
 from linkwise.analysis.job import Wanted
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads import Load, Loads
-from linkwise.analysis.phases import Phase
-from linkwise.analysis.settings import (
-    Convention,
-    Derivative,
-    Edges,
-    Padding,
-    Payload,
-    Processing,
-    Reading,
-    Units,
-)
-from linkwise.analysis.tables import Format
-from linkwise.analysis.written_choices import (
-    carried,
-    chosen_lowpass,
-    chosen_processing,
-    constant_loads,
-    pairs,
-)
+from linkwise.analysis.settings import Payload, Processing, Reading
+from linkwise.errors import LinkwiseError
+from linkwise.option import option
 
 
 @dataclass(frozen=True)
 class AnalysisChoices:
-    """Choices of an analysis; fields have the names and the meaning of the flags of `linkwise analyze`.
+    """Choices of an analysis: those of its parts, and what can be read only with the robot at hand.
 
-    Files are given as paths. Properties and methods raise LinkwiseError, which names the flag, for an invalid
-    choice.
+    Files are given as paths. Methods raise LinkwiseError, which names the flag, for an invalid choice.
     """
 
-    units: Units | None = None
-    time: str | None = None
-    topic: str | None = None
-    qpos: Order | None = None
-    map: tuple[str, ...] = ()
-    ignore_extra: bool = False
-    resample: float | None = None
-    loop_tolerance: float = 0.01
-    derivative: Derivative = "five-point"
-    window: int | None = None
-    degree: int | None = None
-    cutoff: float | None = None
-    filter_order: int | None = None
-    padding: Padding | None = None
-    edges: Edges = "one-sided"
-    convention: Convention = "closing"
-    phase: tuple[str, ...] = ()
-    power_terms: bool = False
-    payload: tuple[str, ...] = ()
-    load: tuple[str, ...] = ()
-    loads: tuple[str, ...] = ()
-    loads_cutoff: float | None = None
-    contact: tuple[str, ...] = ()
-    contact_while: tuple[str, ...] = ()
-    contact_loads: tuple[str, ...] = ()
-    contact_threshold: float | None = None
-    unactuated: tuple[str, ...] = ()
-    induced: tuple[str, ...] = ()
-
-    @property
-    def reading(self) -> Reading:
-        """Choices of how the log is read."""
-        mapping = pairs("--map", self.map)
-        how = self.ignore_extra, self.resample, self.loop_tolerance, self.topic
-        return Reading(self.units, self.time, mapping, *how, self.qpos)
-
-    @property
-    def processing(self) -> Processing:
-        """Choices of how velocities and accelerations are computed."""
-        lowpass = chosen_lowpass(self.cutoff, self.filter_order, self.padding)
-        how = self.derivative, self.window, self.degree
-        return chosen_processing(*how, lowpass, self.edges, self.convention)
-
-    def wanted(self, table: Format = "parquet", figures: Sequence[str] = (), page: bool = True) -> Wanted:
-        """Return the choice of outputs to write."""
-        phases = tuple(map(Phase.of, self.phase))
-        return Wanted(table, tuple(figures), page, self.power_terms, self.induced, phases)
+    reading: Reading = field(default_factory=Reading)
+    processing: Processing = field(default_factory=Processing)
+    wanted: Wanted = field(default_factory=Wanted)
+    payload: tuple[str, ...] = option(
+        (),
+        "Point mass on a body, at a point in its axes, m; NAME:BODY=… names it; may be repeated",
+        metavar="BODY=KG,X,Y,Z",
+    )
+    load: tuple[str, ...] = option(
+        (),
+        "Constant force, N, in the world's axes, at a point in the body's, m; ,MX,MY,MZ behind FZ adds a"
+        " moment, N·m; NAME:BODY=… names it; may be repeated",
+        metavar="BODY=FX,FY,FZ@X,Y,Z",
+    )
+    loads: tuple[str, ...] = option(
+        (),
+        "Log of loads, columns BODY/force_x …, or OpenSim's external loads; may be repeated",
+        metavar="FILE",
+        is_file=True,
+    )
+    loads_cutoff: float | None = option(
+        None, "Zero-phase low-pass for these loads, Hz; no filter if not given"
+    )
+    contact: tuple[str, ...] = option(
+        (),
+        "Frame that the ground holds, at a point in its axes, m; KIND is held, point, hinged,AX,AY,AZ"
+        " about an axis, or rolling,RADIUS; NAME:FRAME=… names it; may be repeated",
+        metavar="FRAME=KIND@X,Y,Z",
+    )
+    contact_while: tuple[str, ...] = option(
+        (),
+        "The contact is on while a column of the log is above a value, 0.5 if not given; may be repeated",
+        metavar="NAME=COLUMN>VALUE",
+    )
+    contact_loads: tuple[str, ...] = option(
+        (),
+        "Loads measured at the contacts, read as --loads are: each contact is on while they come to"
+        " more than --contact-threshold, and they load nothing; may be repeated",
+        metavar="FILE",
+        is_file=True,
+    )
+    contact_threshold: float | None = option(None, "Force in N; 20 if not given")
+    unactuated: tuple[str, ...] = option(
+        (),
+        "Joint that nothing drives, by whose equation reactions are found; the floating base's if not"
+        " given; may be repeated",
+        metavar="JOINT",
+    )
 
     def payloads(self, robot: LoadedRobot) -> tuple[Payload, ...]:
         """Return the point masses that a robot carries."""
@@ -102,3 +85,48 @@ class AnalysisChoices:
         measured = [Path(path) for path in self.contact_loads]
         above = self.contact_threshold, self.loads_cutoff
         return chosen_contacts(self.contact, self.contact_while, measured, *above, self.unactuated, robot)
+
+
+def carried(given: Sequence[str], robot: LoadedRobot) -> tuple[Payload, ...]:
+    """Return the payloads of [NAME:]BODY=MASS[,x,y,z].
+
+    Raises LinkwiseError for text of another form.
+    """
+    found = []
+    for text in given:
+        where, sign, numbers = text.rpartition("=")
+        try:
+            mass, *point = map(float, numbers.split(","))
+        except ValueError:
+            sign = ""
+        if not (sign and where) or len(point) not in (0, 3):
+            raise LinkwiseError(f"--payload {text}: write it as BODY=MASS,x,y,z, in kg and m")
+        name, body = named_body(where, robot)
+        x, y, z = point or (0.0, 0.0, 0.0)
+        found.append(Payload(body, mass, (x, y, z), name))
+    return tuple(found)
+
+
+def constant_loads(given: Sequence[str], robot: LoadedRobot) -> tuple[Load, ...]:
+    """Return the loads of [NAME:]BODY=FX,FY,FZ[,MX,MY,MZ][@X,Y,Z].
+
+    Raises LinkwiseError for text of another form.
+    """
+    found = []
+    for text in given:
+        where, sign, numbers = text.rpartition("=")
+        wrench, at, place = numbers.partition("@")
+        try:
+            force_and_moment = list(map(float, wrench.split(",")))
+            point = list(map(float, place.split(","))) if at else [0.0, 0.0, 0.0]
+        except ValueError:
+            sign = ""
+        if not (sign and where) or len(force_and_moment) not in (3, 6) or len(point) != 3:
+            raise LinkwiseError(
+                f"--load {text}: write it as BODY=FX,FY,FZ, or with moments behind them and with the point as"
+                " BODY=FX,FY,FZ,MX,MY,MZ@X,Y,Z, in N, N·m and m"
+            )
+        name, body = named_body(where, robot)
+        moment = force_and_moment[3:] or (0.0, 0.0, 0.0)
+        found.append(Load(name or body, body, force_and_moment[:3], moment, point))
+    return tuple(found)

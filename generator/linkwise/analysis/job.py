@@ -29,6 +29,7 @@ from linkwise.analysis.torques import Decomposer
 from linkwise.analysis.turn_poles import pole_warnings
 from linkwise.errors import within
 from linkwise.extras import extra
+from linkwise.option import option
 from linkwise.package.load import Array
 from linkwise.progress import Progress
 
@@ -78,15 +79,31 @@ class Analysis(AnalysisResult):
 class Wanted:
     """Files to write, and their contents: the table's format, figures by name, whether to write the page."""
 
-    table: Format = "parquet"
-    figures: tuple[str, ...] = ()
-    page: bool = True
-    power_terms: bool = False
+    table: Format = option("parquet", "Format of the table", "--format", is_key=False)
+    figures: tuple[str, ...] = option(
+        (),
+        "paper or causes, alone or with :JOINT, shares, power, induced, induced:POINT or contacts;"
+        " may be repeated",
+        "--figure",
+        is_key=False,
+    )
+    page: bool = option(True, "Write report.html", is_key=False)
+    phases: tuple[Phase, ...] = option(
+        (),
+        "Part of the movement that the figure causes holds against the rest: WHAT is a load or contact,"
+        " a column COLUMN>VALUE of the log, or FROM..TO in s; may be repeated",
+        "--phase",
+        metavar="NAME/REST=WHAT",
+        read=lambda texts: tuple(map(Phase.of, texts)),
+    )
+    power_terms: bool = option(False, "Write power by cause and order too")
     """True to add power by cause and order: as many columns again as torques have."""
-    induced: tuple[str, ...] = ()
-    """Points whose acceleration is split by source: FRAME or FRAME,X,Y,Z, joints, centre-of-mass."""
-    phases: tuple[Phase, ...] = ()
-    """Phases of the movement that the figure of causes compares."""
+    induced: tuple[str, ...] = option(
+        (),
+        "Tell an acceleration by its sources: FRAME or FRAME,X,Y,Z in m, joints, or centre-of-mass; may "
+        "be repeated",
+        metavar="POINT",
+    )
 
 
 @dataclass(frozen=True)

@@ -1,19 +1,35 @@
 """Settings of an analysis: how a log is read and its movement derived, as recorded in every output."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any, Literal
 
 from linkwise_runtime.file_joints import Order
 
 from linkwise.errors import LinkwiseError
+from linkwise.option import REQUIRED, option
 
 Units = Literal["rad", "deg"]
 Derivative = Literal["five-point", "savitzky-golay"]
 Padding = Literal["odd", "even", "constant", "none"]
 Edges = Literal["one-sided", "trim"]
 Convention = Literal["closing", "gradient"]
+
+
+def pairs(flag: str, given: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """Return the columns and joints of a flag's COLUMN=JOINT.
+
+    Raises LinkwiseError for text of another form.
+    """
+    found = []
+    for text in given:
+        column, sign, joint = text.rpartition("=")
+        if not (sign and column and joint):
+            raise LinkwiseError(f"{flag} {text}: write it as COLUMN=JOINT")
+        found.append((column, joint))
+    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -28,18 +44,26 @@ class Reading:
     Raises LinkwiseError for values that are impossible or do not go together.
     """
 
-    units: Units | None = None
-    time: str | None = None
-    mapping: tuple[tuple[str, str], ...] | Mapping[str, str] = ()
-    ignore_extra: bool = False
-    resample: float | None = None
-    """Sampling rate in Hz to bring a log of uneven time to, by cubic splines."""
-    loop_tolerance: float = 0.01
-    """Largest violation of the robot's loops by positions of the log, in m and rad."""
-    topic: str | None = None
-    """Topic of a bag, or group of a file of arrays, that has the joints; None takes the only one."""
-    qpos: Order | None = None
-    """Order of positions and torques in a file of arrays: MuJoCo's, Pinocchio's; None for the robot's own."""
+    units: Units | None = option(
+        None, "Unit of the angles, lengths are metres; the file's own, else rad, if not given"
+    )
+    time: str | None = option(None, "Column of the time, in s")
+    mapping: tuple[tuple[str, str], ...] | Mapping[str, str] = option(
+        (),
+        "Column of a joint; may be repeated",
+        "--map",
+        metavar="COLUMN=JOINT",
+        read=partial(pairs, "--map"),
+    )
+    ignore_extra: bool = option(False, "Leave out columns no joint has")
+    resample: float | None = option(None, "Bring uneven time to this rate, Hz, by splines")
+    loop_tolerance: float = option(0.01, "How far the log may be from closing the robot's loops, m and rad")
+    topic: str | None = option(
+        None, "Topic of a bag, group of an HDF5 file: where the joints are, if several have some"
+    )
+    qpos: Order | None = option(
+        None, "Take the array of positions, and of torques, as this simulator has them"
+    )
 
     def __post_init__(self) -> None:
         if self.qpos is not None and self.units is not None:
@@ -66,9 +90,13 @@ class Lowpass:
     values.
     """
 
-    cutoff: float
-    order: int = 2
-    padding: Padding = "odd"
+    cutoff: float = option(REQUIRED, "Zero-phase Butterworth low-pass, Hz; no filter if not given")
+    order: int = option(
+        2, "The filter's order, of one pass; 2 if not given", "--filter-order", needs="--cutoff"
+    )
+    padding: Padding = option(
+        "odd", "How the filter continues the log past its ends; odd if not given", needs="--cutoff"
+    )
 
     def __post_init__(self) -> None:
         if not 0 < self.cutoff < float("inf"):
@@ -88,12 +116,18 @@ class Processing:
     that. Raises LinkwiseError for impossible values.
     """
 
-    derivative: Derivative = "five-point"
-    window: int = 11
-    degree: int = 4
+    derivative: Derivative = option("five-point", "How velocities and accelerations are made")
+    window: int = option(
+        11, "Savitzky-Golay: samples a window; 11 if not given", needs="--derivative savitzky-golay"
+    )
+    degree: int = option(
+        4, "Savitzky-Golay: degree of the fit; 4 if not given", needs="--derivative savitzky-golay"
+    )
     lowpass: Lowpass | None = None
-    edges: Edges = "one-sided"
-    convention: Convention = "closing"
+    edges: Edges = option("one-sided", "First and last samples: one-sided formulas, or cut off")
+    convention: Convention = option(
+        "closing", "Velocity terms: closing sums to the torque, gradient is Eq. 1"
+    )
 
     def __post_init__(self) -> None:
         if self.derivative == "savitzky-golay":

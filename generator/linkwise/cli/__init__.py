@@ -1,6 +1,7 @@
 """The command line: `app` starts it, and imports a command's file when the command is called.
 
-Here are the flags that several commands share; those that read a robot are in `options`.
+Here is what several commands share. Options that fill a dataclass are declared on its fields, and `flags`
+makes of them what typer reads.
 """
 
 import sys
@@ -15,9 +16,8 @@ BUDGET = 2_000_000
 """Most terms of one expansion; a polynomial of this size takes about 0.5 GB."""
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON")]
-Details = Annotated[
-    bool, typer.Option("--details", help="Name every joint and link that a remark is about, one by one")
-]
+GeneratedPackage = Annotated[Path, typer.Argument(help="Directory of a generated package")]
+LinkName = Annotated[str, typer.Option(help="Link j: its name, its number from 1, or all")]
 Budget = Annotated[int, typer.Option(min=1, help="Terms that one expansion may hold")]
 ReportOut = Annotated[Path | None, typer.Option(help="Directory that gets the report's files")]
 

@@ -4,14 +4,13 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from linkwise.check.checks import SAMPLES, results_of
 from linkwise.check.compare import Result
-from linkwise.cli import Json, counted, tell
+from linkwise.cli import GeneratedPackage, Json, counted, tell
 from linkwise.escape import json_text
 
 app = typer.Typer(add_completion=False)
@@ -22,7 +21,7 @@ WIDTH = 64
 
 @app.command()
 def check(
-    package: Annotated[Path, typer.Argument(help="Directory of a generated package")],
+    package: GeneratedPackage,
     samples: Annotated[int, typer.Option(min=1, help="Random states")] = SAMPLES,
     as_json: Json = False,
 ) -> None:

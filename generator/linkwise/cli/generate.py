@@ -9,20 +9,21 @@ from collections.abc import Collection, Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import typer
 
 from linkwise import pipeline
-from linkwise.cli import Details, counted, tell
+from linkwise.cli import counted, tell
 from linkwise.cli.depfile import depfile_text, own_modules
-from linkwise.cli.options import RobotNames, reads_robot, tell_run
+from linkwise.cli.flags import RobotNames, takes, tell_run
 from linkwise.dynamics.derive import Method
 from linkwise.emit.backend import BACKENDS
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.input_file import is_inside, is_same
 from linkwise.makers import generator_files
+from linkwise.option import REQUIRED, flag_of, option
 from linkwise.output import require_writable, sweep, write_files
 from linkwise.package.manifest import FILE
 from linkwise.package.write import check_target, differences, refuse_inside_package, write_package
@@ -32,21 +33,72 @@ from linkwise.symbolic.system import RigidSystem
 
 app = typer.Typer(add_completion=False)
 STALE = 1
-PANEL = "For build tools"
 
 
 @dataclass(frozen=True)
-class Choices:
-    """Choices for every robot of one call."""
+class PackageChoices:
+    """Choices for the packages of one call."""
 
-    options: Options
-    out: Path
-    name: str | None
-    backends: tuple[str, ...]
-    kernel: str
-    derivation: Method
-    vendor_runtime: bool
-    replace: bool
+    out: Path = option(REQUIRED, "Directory that gets the packages")
+    name: str | None = option(None, "Name of the package; the robot's if not given")
+    backend: tuple[str, ...] = option(
+        (), f"{', '.join(BACKENDS)}; may be repeated; all that the robot can have if not given"
+    )
+    kernel: Literal["auto", "straight", "loops"] = option(
+        "auto",
+        "straight: closed forms; loops: nothing is derived, C in loops over links and joints; "
+        "auto: by what closed forms would cost",
+    )
+    derivation: Method = option(
+        "rule",
+        "How closed forms of rigid links are found: by the rigid-link rule, or from their energies "
+        "in SymPy by Euler-Lagrange, which costs more",
+    )
+    vendor_runtime: bool = option(
+        False, "Copy what the package imports of linkwise_runtime into it, so that it stands alone"
+    )
+    details: bool = option(False, "Name every joint and link that a remark is about, one by one")
+    verbose: bool = option(False, "Say what was written, as on a terminal, elsewhere too")
+    replace: bool = option(False, "Take the place of another robot's package too")
+
+
+@dataclass(frozen=True)
+class BuildStep:
+    """What a build tool asks for beside the packages, or in their place."""
+
+    PANEL = "For build tools"
+    list_outputs: bool = option(False, "Print the paths that would be written; write none")
+    check: bool = option(
+        False, "Say which files differ from what would be written; write none; exit status 1 if any does"
+    )
+    depfile: Path | None = option(None, "File that gets, as a rule of make, what the packages depend on")
+    stamp: Path | None = option(
+        None,
+        "Empty file that is made anew at the end: the target of --depfile's rule, by default the "
+        "manifests, which keep their time where nothing differs",
+    )
+
+    @property
+    def writes(self) -> bool:
+        """Whether packages are written."""
+        return not (self.list_outputs or self.check)
+
+    def check_flags(self) -> None:
+        """Raise LinkwiseError for a flag that writes nothing together with another one."""
+        given = [flag_of(name) for name, value in vars(self).items() if value]
+        if len(given) > 1 and not self.writes:
+            raise LinkwiseError(f"{given[0]} writes nothing and stands alone; leave {given[1]} out")
+
+    def finish(self, rule: str) -> None:
+        """Write the depfile with its rule, and make the stamp anew.
+
+        The stamp is the last of all: an interrupted build has none, or an older one.
+        """
+        if self.depfile is not None:
+            write_files(self.depfile.parent, {self.depfile.name: rule.encode()})
+        if self.stamp is not None:
+            self.stamp.parent.mkdir(parents=True, exist_ok=True)
+            self.stamp.touch()
 
 
 @dataclass(frozen=True)
@@ -58,132 +110,54 @@ class Order:
     directory: Path
 
 
+Packages = Sequence[tuple[Order, dict[str, str]]]
+"""Packages that were asked for, each with its files."""
+
+
 @app.command()
-@reads_robot()
-def generate(
-    robot: RobotNames,
-    options: Options,
-    out: Annotated[Path, typer.Option(help="Directory that gets the packages")],
-    name: Annotated[str | None, typer.Option(help="Name of the package; the robot's if not given")] = None,
-    backend: Annotated[
-        list[str] | None,
-        typer.Option(
-            help=f"{', '.join(BACKENDS)}; may be repeated; all that the robot can have if not given"
-        ),
-    ] = None,
-    kernel: Annotated[
-        Literal["auto", "straight", "loops"],
-        typer.Option(
-            help="straight: closed forms; loops: nothing is derived, C in loops over links and joints; "
-            "auto: by what closed forms would cost"
-        ),
-    ] = "auto",
-    derivation: Annotated[
-        Literal["rule", "energy"],
-        typer.Option(
-            help="How closed forms of rigid links are found: by the rigid-link rule, or from their energies "
-            "in SymPy by Euler-Lagrange, which costs more"
-        ),
-    ] = "rule",
-    vendor_runtime: Annotated[
-        bool,
-        typer.Option(
-            "--vendor-runtime",
-            help="Copy what the package imports of linkwise_runtime into it, so that it stands alone",
-        ),
-    ] = False,
-    details: Details = False,
-    verbose: Annotated[
-        bool, typer.Option("--verbose", help="Say what was written, as on a terminal, elsewhere too")
-    ] = False,
-    replace: Annotated[
-        bool, typer.Option("--replace", help="Take the place of another robot's package too")
-    ] = False,
-    list_outputs: Annotated[
-        bool,
-        typer.Option(
-            "--list-outputs", help="Print the paths that would be written; write none", rich_help_panel=PANEL
-        ),
-    ] = False,
-    check: Annotated[
-        bool,
-        typer.Option(
-            "--check",
-            help="Say which files differ from what would be written; write none; exit status 1 if any does",
-            rich_help_panel=PANEL,
-        ),
-    ] = False,
-    depfile: Annotated[
-        Path | None,
-        typer.Option(
-            help="File that gets, as a rule of make, what the packages depend on", rich_help_panel=PANEL
-        ),
-    ] = None,
-    stamp: Annotated[
-        Path | None,
-        typer.Option(
-            help="Empty file that is made anew at the end: the target of --depfile's rule, by default the "
-            "manifests, which keep their time where nothing differs",
-            rich_help_panel=PANEL,
-        ),
-    ] = None,
-) -> None:
+@takes()
+def generate(robot: RobotNames, asked: PackageChoices, step: BuildStep, options: Options) -> None:
     """Write the packages of robots."""
     before = set(sys.modules)
-    _check_flags(list_outputs, check, depfile, stamp)
-    if name is not None and len(robot) > 1:
+    step.check_flags()
+    if asked.name is not None and len(robot) > 1:
         raise LinkwiseError("--name is for one robot; generate each with a name of its own in its own call")
-    if not (check or list_outputs):
-        sweep(out)  # also where this one is refused: an earlier one may have died in its exchange
-    asked = Choices(options, out, name, tuple(backend or ()), kernel, derivation, vendor_runtime, replace)
-    orders = [_order(spec, asked) for spec in robot]
-    tell_run(*robot)
+    if step.writes:
+        sweep(asked.out)  # also where this one is refused: an earlier one may have died in its exchange
+    orders = _orders(robot, asked, step, options)
+    with progress() if asked.verbose or sys.stderr.isatty() else nullcontext(silent) as report:
+        packages = [(order, order.plan.files(report)) for order in orders]
+    watched = asked.verbose or sys.stdout.isatty()
+    if step.list_outputs:
+        tell(*((order.directory / path).as_posix() for order, files in packages for path in sorted(files)))
+    elif step.check:
+        raise typer.Exit(_compare(packages, watched))
+    else:
+        rule = "" if step.depfile is None else _rule(packages, options, step.stamp, before)
+        _write(packages, asked, watched)
+        step.finish(rule)
+
+
+def _orders(robots: Sequence[str], asked: PackageChoices, step: BuildStep, options: Options) -> list[Order]:
+    """Return the orders for all robots; raise LinkwiseError where they cannot be carried out."""
+    orders = [_order(spec, asked, options) for spec in robots]
+    tell_run(*robots)
     _check_places(orders)
-    if depfile is not None or stamp is not None:
-        _check_side_files(orders, [place for place in (depfile, stamp) if place is not None], options)
-    if not (check or list_outputs):
+    _check_side_files(orders, [place for place in (step.depfile, step.stamp) if place is not None], options)
+    if step.writes:
         for order in orders:
             require_writable(order.directory)
-    watched = verbose or sys.stdout.isatty()
-    with progress() if verbose or sys.stderr.isatty() else nullcontext(silent) as report:
-        packages = [(order, order.plan.files(report)) for order in orders]
-    if list_outputs:
-        tell(
-            *(f"{(order.directory / path).as_posix()}" for order, files in packages for path in sorted(files))
-        )
-        return
-    if check:
-        raise typer.Exit(_told_differences(packages, watched))
-    rule = "" if depfile is None else _rule(packages, options, stamp, before)
-    for order, files in packages:
-        written = write_package(files, order.directory, replace)
-        for effect in effects(order.plan.system.notes, details):
-            tell(f"warning: {order.robot}: {effect}", err=True)
-        if watched:
-            _tell_written(order, len(files), written)
-    if depfile is not None:
-        write_files(depfile.parent, {depfile.name: rule.encode()})
-    if stamp is not None:
-        stamp.parent.mkdir(parents=True, exist_ok=True)
-        stamp.touch()  # the last of all: an interrupted build has none, or an older one
+    return orders
 
 
-def _check_flags(list_outputs: bool, check: bool, depfile: Path | None, stamp: Path | None) -> None:
-    """Raise LinkwiseError for a flag that writes nothing together with another one."""
-    flags = {"--list-outputs": list_outputs, "--check": check, "--depfile": depfile, "--stamp": stamp}
-    given = [flag for flag, value in flags.items() if value]
-    if len(given) > 1 and (list_outputs or check):
-        raise LinkwiseError(f"{given[0]} writes nothing and stands alone; leave {given[1]} out")
-
-
-def _order(robot: str, asked: Choices) -> Order:
+def _order(robot: str, asked: PackageChoices, options: Options) -> Order:
     """Return the order for a robot's package.
 
     Raises LinkwiseError, before anything is derived, where the package cannot be made.
     """
-    system = pipeline.read_system(robot, asked.options)
+    system = pipeline.read_system(robot, options)
     made = pipeline.plan(
-        system, asked.backends or None, asked.name, asked.kernel, asked.derivation, asked.vendor_runtime
+        system, asked.backend or None, asked.name, asked.kernel, asked.derivation, asked.vendor_runtime
     )
     directory = asked.out / made.name
     check_target(directory, None if asked.replace else system.name)
@@ -220,7 +194,7 @@ def _check_side_files(orders: Sequence[Order], places: Iterable[Path], options: 
                 )
 
 
-def _told_differences(packages: Iterable[tuple[Order, dict[str, str]]], watched: bool) -> int:
+def _compare(packages: Packages, watched: bool) -> int:
     """Print how each package on disk differs from its files; return the exit status for any difference."""
     status = 0
     for order, files in packages:
@@ -245,12 +219,7 @@ def _tell_stale(directory: Path, files: Collection[str], found: dict[str, str]) 
     tell(*(f"  {fault}: {listed(paths)}" for fault, paths in kinds.items()))
 
 
-def _rule(
-    packages: Iterable[tuple[Order, dict[str, str]]],
-    options: Options,
-    stamp: Path | None,
-    before: Iterable[str],
-) -> str:
+def _rule(packages: Packages, options: Options, stamp: Path | None, before: Iterable[str]) -> str:
     """Return the text of the depfile.
 
     A stamp stands for the packages: it is older than none of their files, and without one of them it is void.
@@ -264,6 +233,16 @@ def _rule(
         (path.as_posix() for path in targets),
         (*inputs, *imported, *(path.as_posix() for path in own), *generator_files()),
     )
+
+
+def _write(packages: Packages, asked: PackageChoices, watched: bool) -> None:
+    """Write the packages, and say what their torques leave out."""
+    for order, files in packages:
+        written = write_package(files, order.directory, asked.replace)
+        for effect in effects(order.plan.system.notes, asked.details):
+            tell(f"warning: {order.robot}: {effect}", err=True)
+        if watched:
+            _tell_written(order, len(files), written)
 
 
 def _tell_written(order: Order, files: int, written: bool) -> None:

@@ -5,14 +5,14 @@ from typing import Annotated, Any
 
 import typer
 
-from linkwise.cli import Json, tell
+from linkwise.cli import GeneratedPackage, Json, LinkName, tell
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text
 from linkwise.extras import extra
 from linkwise.graphs import FOLDS, FORMATS, Overlay, graph_files, graph_json, graph_summary, overlay
-from linkwise.output import require_writable, write_files
+from linkwise.output import write_files
 from linkwise.package.load import open_package, staying
-from linkwise.package.write import refuse_inside_package
+from linkwise.package.write import require_free
 from linkwise.progress import progress
 from linkwise.report import position
 
@@ -21,9 +21,9 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def graph(
-    package: Annotated[Path, typer.Argument(help="Directory of a generated package")],
+    package: GeneratedPackage,
     joint: Annotated[str, typer.Option(help="Joint i: its name or its number from 1")] = "1",
-    link: Annotated[str, typer.Option(help="Link j: its name, its number from 1, or all")] = "all",
+    link: LinkName = "all",
     coordinate: Annotated[str, typer.Option(help="Joint k, whose motion is followed, or all")] = "all",
     order: Annotated[
         str,
@@ -45,8 +45,7 @@ def graph(
     for name in wanted:
         _check("--format", name, FORMATS)
     if out is not None:
-        refuse_inside_package(out)
-        require_writable(out)
+        require_free(out)
     robot = _robot(package)
     i = position(joint, robot.joint_names, "--joint")
     j = None if link == "all" else position(link, robot.link_names, "--link")

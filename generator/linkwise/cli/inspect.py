@@ -8,8 +8,8 @@ import typer
 
 from linkwise import pipeline
 from linkwise.cli import Json, counted
+from linkwise.cli.flags import RobotName, takes, tell_run
 from linkwise.cli.inspect_page import SUBJECTS, page
-from linkwise.cli.options import RobotName, reads_robot, tell_run
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, listed, printable
 from linkwise.package.entries import RigidTree
@@ -27,7 +27,7 @@ app = typer.Typer(add_completion=False)
 
 
 @app.command()
-@reads_robot(parameters="symbolic")
+@takes(parameters="symbolic")
 def inspect(
     robot: RobotName,
     options: Options,

@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 
 from linkwise.cli import BUDGET, Budget, Json, ReportOut
-from linkwise.cli.options import reads_robot, tell_run
+from linkwise.cli.flags import takes, tell_run
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
-from linkwise.output import require_writable, write_files
-from linkwise.package.write import refuse_inside_package
+from linkwise.output import write_files
+from linkwise.package.write import require_free
 from linkwise.pipeline import read_system
 from linkwise.progress import progress
 from linkwise.report import (
@@ -41,7 +41,7 @@ app = typer.Typer(add_completion=False)
 
 
 @app.command()
-@reads_robot(parameters="nonzero")
+@takes(parameters="nonzero")
 def reduction(
     options: Options,
     robot: Annotated[
@@ -70,8 +70,7 @@ def reduction(
         last = min(last, len(system.links))
     found = None if seconds is None else read_seconds(seconds)
     if out is not None:
-        refuse_inside_package(out)
-        require_writable(out)
+        require_free(out)
     with progress() as advance:
         result = study(name, system, first, last, beyond, budget, advance, graphs)
         if measured and found is None:

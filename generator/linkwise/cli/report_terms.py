@@ -4,11 +4,11 @@ from typing import Annotated
 
 import typer
 
-from linkwise.cli import BUDGET, Budget, Json, ReportOut, tell
-from linkwise.cli.options import RobotName, reads_robot, tell_run
+from linkwise.cli import BUDGET, Budget, Json, LinkName, ReportOut, tell
+from linkwise.cli.flags import RobotName, takes, tell_run
 from linkwise.errors import LinkwiseError
-from linkwise.output import require_writable, write_files
-from linkwise.package.write import refuse_inside_package
+from linkwise.output import write_files
+from linkwise.package.write import require_free
 from linkwise.pipeline import read_system
 from linkwise.progress import progress
 from linkwise.report import (
@@ -27,12 +27,12 @@ app = typer.Typer(add_completion=False)
 
 
 @app.command()
-@reads_robot(parameters="nonzero")
+@takes(parameters="nonzero")
 def terms(
     robot: RobotName,
     options: Options,
     joint: Annotated[str, typer.Option(help="Joint i: its name, its number from 1, or all")] = "1",
-    link: Annotated[str, typer.Option(help="Link j: its name, its number from 1, or all")] = "all",
+    link: LinkName = "all",
     coordinate: Annotated[str, typer.Option(help="Joint k, whose motion is kept")] = "1",
     order: Annotated[int, typer.Option(help="Kept: 2 acceleration, 1 velocity, 0 potential energy")] = 2,
     budget: Budget = BUDGET,
@@ -57,8 +57,7 @@ def terms(
         order,
     )
     if out is not None:
-        refuse_inside_package(out)
-        require_writable(out)
+        require_free(out)
     with progress() as advance:
         result = terms_report(system, query, budget, partial, advance)
     if out is not None:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from linkwise.cli import tell
-from linkwise.cli.options import tell_run
+from linkwise.cli.flags import tell_run
 from linkwise.progress import progress as shown_progress
 from linkwise.study import ProcessPool, RayCluster, run_study
 

@@ -1,6 +1,7 @@
 """`identify`: the parameters of a robot's links, from a log."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from linkwise_runtime.rule.joint_tree import Bodies
 from linkwise_runtime.rule.regressors import inertial_parameters
 
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
-from linkwise.analysis.settings import Processing, Reading
+from linkwise.analysis.settings import Processing, Reading, pairs
 from linkwise.errors import LinkwiseError, within
 from linkwise.identification.base_parameters import BaseParameters, base_parameters, samples_needed
 from linkwise.identification.bearings import Bearings
@@ -20,6 +21,7 @@ from linkwise.identification.normal_factors import JointEquations, joint_equatio
 from linkwise.identification.physical_fit import physical_fit
 from linkwise.identification.random_motions import Motion, random_closed_motion, random_motion
 from linkwise.identification.torque_log import TorqueLog, read_torque_log
+from linkwise.option import option
 from linkwise.package.load import Array
 from linkwise.progress import Progress, silent
 
@@ -36,11 +38,19 @@ class Fitting:
     Raises LinkwiseError for values that are not possible.
     """
 
-    torques: tuple[tuple[str, str], ...] = ()
-    factor: float = 1.0
-    friction: bool = True
-    unseen: float = 0.2
-    unmeasured: tuple[str, ...] = ()
+    torques: tuple[tuple[str, str], ...] = option(
+        (),
+        "Column of a joint's torque; may be repeated",
+        "--torque",
+        metavar="COLUMN=JOINT",
+        read=partial(pairs, "--torque"),
+    )
+    factor: float = option(
+        1.0, "What brings torques to N m and forces to N: 0.001 for N mm", "--torque-factor"
+    )
+    friction: bool = option(True, "Viscous and Coulomb friction")
+    unseen: float = option(0.2, "Share of the log, its end, to predict and not to fit")
+    unmeasured: tuple[str, ...] = option((), "Joint without a torque; may be repeated", metavar="JOINT")
 
     def __post_init__(self) -> None:
         if not 0 <= self.unseen <= 0.9:

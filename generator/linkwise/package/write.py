@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.errors import LinkwiseError
-from linkwise.output import whole_directory
+from linkwise.output import require_writable, whole_directory
 from linkwise.package.contents import added, entries, faults
 from linkwise.package.manifest import FILE, is_too_large
 
@@ -63,6 +63,12 @@ def refuse_inside_package(place: Path) -> None:
             raise LinkwiseError(
                 f"{place} is in the generated package {parent}, which it would spoil; choose another --out"
             )
+
+
+def require_free(place: Path) -> None:
+    """Raise LinkwiseError for a place inside a generated package, and for one that cannot be written."""
+    refuse_inside_package(place)
+    require_writable(place)
 
 
 def earlier_package(directory: Path) -> dict[str, Any]:

@@ -1,9 +1,6 @@
 """Building a Robot from the description of a file: expand, cut, substitute, merge, and check."""
 
-from dataclasses import asdict, dataclass, field, fields, replace
-from hashlib import sha256
-from pathlib import Path
-from typing import Any, Literal
+from dataclasses import replace
 
 import sympy as sp
 
@@ -20,41 +17,13 @@ from linkwise.robot.mass_matrix import check_mass_matrix
 from linkwise.robot.moving_joints import moving_joints
 from linkwise.robot.naming import Named, Naming
 from linkwise.robot.notes import FREE, Note
+from linkwise.robot.options import Options
 from linkwise.robot.parameters import numeric
 from linkwise.robot.passive import checked_passive, passive_axes, passive_notes
 from linkwise.robot.robot import Frame, Link, Parameter, Robot, Scalar, unusable
 from linkwise.robot.size import check_joints
 from linkwise.robot.ties import anchor_frames, tied_places
 from linkwise.robot.tree import check_loops, cut, depth_first
-
-
-@dataclass(frozen=True)
-class Options:
-    """Options for building a robot from a description; the command line's flags of the same names."""
-
-    parameters: Literal["numeric", "nonzero", "symbolic"] = "numeric"
-    lock: dict[str, float] = field(default_factory=dict)
-    base: Literal["fixed", "floating"] | None = None
-    root: str | None = None
-    tip: str | None = None
-    allow_unphysical: bool = False
-    free_mimic: bool = False
-    constraints: str | None = None
-    independent: tuple[str, ...] = ()
-
-    @property
-    def given(self) -> tuple[str, ...]:
-        """Names of the options that differ from their defaults."""
-        usual = Options()
-        return tuple(f.name for f in fields(self) if getattr(self, f.name) != getattr(usual, f.name))
-
-    def request(self) -> dict[str, Any]:
-        """Return the options as a manifest keeps them: of a file its name and the SHA-256 of its content."""
-        told = asdict(self) | {"independent": list(self.independent)}
-        if self.constraints is not None:
-            path = Path(self.constraints)
-            told["constraints"] = {"file": path.name, "sha256": sha256(path.read_bytes()).hexdigest()}
-        return told
 
 
 def build(description: Description, options: Options) -> Robot:

@@ -9,10 +9,11 @@ from typing import TypeAlias
 
 from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import is_file, require_file
-from linkwise.robot.build import Options, build
+from linkwise.robot.build import build
 from linkwise.robot.builtin.planar import planar
 from linkwise.robot.constrained import check_constraints
 from linkwise.robot.description import Description
+from linkwise.robot.options import Options
 from linkwise.robot.parameters import numeric
 from linkwise.robot.readers import osim_document, toml_table
 from linkwise.robot.readers.mjcf import read_mjcf

@@ -2,13 +2,12 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from linkwise_runtime.chosen_names import nearest_first
 
-from linkwise.analysis.analysis_choices import AnalysisChoices
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
@@ -19,7 +18,7 @@ from linkwise.study.cycles import written_cycles
 from linkwise.study.running_moments import STATISTICS
 from linkwise.study.study_paths import require_there, resolved
 from linkwise.study.study_plan import SUBJECT, Comparison, Cycles, PaperFigure, StudyPlan
-from linkwise.study.trial_entries import OWN, given_text, trials_of
+from linkwise.study.trial_entries import OWN, AnalysisKeys, given_text, trials_of
 
 COLUMNS = (
     *("trial", "cycle", "percent", "time", "column", "unit", "statistic", "subjects", "trials"),
@@ -50,9 +49,9 @@ def read_study(path: Path, trust_python: bool = False) -> StudyPlan:
         require_file(path)
         data = known_keys("the file", toml_data(path), TOP)
         factors = _factors(data.get("factors", []))
-        chosen = filled(AnalysisChoices, "[analysis]", data.get("analysis", {}))
+        usual = vars(filled(AnalysisKeys, "[analysis]", data.get("analysis", {})))
         folder = path.parent.absolute()  # workers may run in other folders
-        trials = tuple(trials_of(data, factors, chosen, folder))
+        trials = tuple(trials_of(data, factors, usual, folder))
         plan = StudyPlan(
             given_text(data, "name", path.stem),
             path,
@@ -77,7 +76,7 @@ def _factors(given: Any) -> tuple[str, ...]:
         raise LinkwiseError(
             f"'factors' is {given!r}; give names such as \"condition\", letters, digits and _"
         )
-    taken = {name for name in (*OWN, *asdict(AnalysisChoices()), *COLUMNS) if name != SUBJECT}
+    taken = {name for name in (*OWN, *vars(AnalysisKeys()), *COLUMNS) if name != SUBJECT}
     lower = [name.lower() for name in given]  # DuckDB ignores the case of columns
     for name in given:
         is_another = name.lower() == SUBJECT and name != SUBJECT
@@ -120,7 +119,6 @@ def _check(plan: StudyPlan) -> None:
             require_there(trial.log, or_folder=True)
             for path in (*trial.choices.loads, *trial.choices.contact_loads):
                 require_there(path)
-            trial.choices.reading, trial.choices.processing, trial.choices.wanted()
     if plan.cycles is not None and plan.cycles.table:
         _check_table(plan, plan.cycles.table)
     for comparison in plan.comparisons:

@@ -8,11 +8,12 @@ from typing import Literal
 from linkwise.analysis.analysis_choices import AnalysisChoices
 from linkwise.analysis.phases import Phase
 from linkwise.errors import LinkwiseError
+from linkwise.option import written
 from linkwise.robot import Options
 
 SUBJECT = "subject"
 """Factor that every study has, and the first."""
-OF_FILES = ("loads", "contact_loads")
+OF_FILES = tuple(one.key for one in written(AnalysisChoices) if one.option.is_file)
 """Choices that are paths of files."""
 POINTS = 101
 """Number of points of a cycle, 0 to 100 %."""
@@ -92,7 +93,7 @@ class Trial:
     """Label of every factor, the subject first."""
     log: str
     robot: str
-    choices: AnalysisChoices
+    choices: AnalysisChoices = field(default_factory=AnalysisChoices)
     """Choices of the analysis, with the paths of its loads as they are opened."""
 
     def label(self, factor: str) -> str:

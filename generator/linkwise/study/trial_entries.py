@@ -1,12 +1,13 @@
 """Trials of a study's file: each with its labels, files and the choices for it alone."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import make_dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from linkwise.analysis.analysis_choices import AnalysisChoices
 from linkwise.errors import LinkwiseError, within
+from linkwise.option import chosen, written
 from linkwise.package.decode import filled, known_keys, toml_value
 from linkwise.robot.readers.toml_table import tables
 from linkwise.study.study_paths import is_address, resolved
@@ -15,28 +16,44 @@ from linkwise.study.trial_patterns import expanded
 
 OWN = ("name", "subject", "log", "robot")
 """Keys of a trial besides factors and choices."""
+AnalysisKeys = make_dataclass(
+    "AnalysisKeys",
+    [(one.key, one.kind, one.default) for one in written(AnalysisChoices) if one.option.is_key],
+)
+"""Choices of an analysis as a study's file writes them."""
 
 
 def trials_of(
-    data: dict[str, Any], factors: Sequence[str], chosen: AnalysisChoices, folder: Path
+    data: dict[str, Any], factors: Sequence[str], usual: Mapping[str, Any], folder: Path
 ) -> Iterator[Trial]:
-    """Yield the trials of a study's file; raise LinkwiseError that names an invalid one."""
+    """Yield the trials of a study's file; raise LinkwiseError that names an invalid one.
+
+    usual: the choices for all trials, by key
+    """
     for number, entry in enumerate(tables(data, "trial"), 1):
         place = f"trial {entry.get('name', number)!r}"
-        known = tuple(dict.fromkeys((*OWN, *factors, *asdict(chosen))))
+        known = tuple(dict.fromkeys((*OWN, *factors, *usual)))
         with within(place):
-            for one in expanded(entry, folder):
-                fields = {key: value for key, value in one.items() if key in known or key in entry}
-                yield _trial(place, known_keys("the entry", fields, known), factors, chosen, folder)
+            entries = [
+                {key: value for key, value in one.items() if key in known or key in entry}
+                for one in expanded(entry, folder)
+            ]
+            several = [
+                _trial(place, known_keys("the entry", one, known), factors, usual, folder) for one in entries
+            ]
+        for trial, keys in several:
+            with within(f"trial {trial.name!r}"):
+                yield replace(trial, choices=chosen(AnalysisChoices, keys))
 
 
 def _trial(
     place: str,
     entry: Mapping[str, Any],
     factors: Sequence[str],
-    chosen: AnalysisChoices,
+    usual: Mapping[str, Any],
     folder: Path,
-) -> Trial:
+) -> tuple[Trial, dict[str, Any]]:
+    """Return a trial without its choices, and these as they are written."""
     log, robot = given_text(entry, "log"), given_text(entry, "robot")
     labels = [
         (factor, _label(entry, factor, place)) for factor in factors if factor in entry or factor != SUBJECT
@@ -44,12 +61,10 @@ def _trial(
     name = given_text(entry, "name", Path(log).stem)
     if SUBJECT not in entry:
         labels = [(SUBJECT, name), *labels]
-    own = {key: value for key, value in entry.items() if key in asdict(chosen)}
-    choices = filled(AnalysisChoices, place, own, vars(chosen))
-    files: dict[str, Any] = {
-        key: tuple(resolved(path, folder) for path in getattr(choices, key)) for key in OF_FILES
-    }
-    return Trial(name, tuple(labels), resolved(log, folder), _robot(robot, folder), replace(choices, **files))
+    own = {key: value for key, value in entry.items() if key in usual}
+    keys = vars(filled(AnalysisKeys, place, own, usual))
+    files = {key: tuple(resolved(path, folder) for path in keys[key]) for key in OF_FILES}
+    return Trial(name, tuple(labels), resolved(log, folder), _robot(robot, folder)), keys | files
 
 
 def _robot(given: str, folder: Path) -> str:

@@ -136,7 +136,7 @@ def prepared_trial(plan: StudyPlan, trial: Trial, buffer: Path) -> Job:
     """
     loaded, choices = loaded_robot(trial.robot, plan), trial.choices
     robot = standing_on(carrying(loaded, choices.payloads(loaded)), choices.contacts(loaded))
-    wanted = choices.wanted(page=plan.pages)
+    wanted = replace(choices.wanted, page=plan.pages)
     if plan.cycles is not None and plan.cycles.what:
         wanted = replace(wanted, phases=(*wanted.phases, Phase.of(f"cycle={plan.cycles.what}")))
     put = choices.borne(robot), choices.contacts(robot)
