@@ -18,10 +18,9 @@ from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.payload import carrying
 from linkwise.analysis.result import Totals
-from linkwise.analysis.result_columns import Column, columns_of
+from linkwise.analysis.result_rows import Column, ResultRows, torque_places
 from linkwise.analysis.run import analyze_to
-from linkwise.analysis.show.page import report
-from linkwise.analysis.show.poses import poses
+from linkwise.analysis.show.page import poses, report
 from linkwise.analysis.term_rows import term_rows
 from linkwise.analysis.work import Work
 from linkwise.progress import silent
@@ -284,16 +283,19 @@ def crowd(place, count=14):
         f"spine_joint_{i}" if i != 4 else f"{'name_from_a_drawing_' * 4}"[:79] + "4" for i in range(14)
     )
     robot = replace(analysis.robot, joints=names, links=names, units=("rad",) * count, bodies=None)
-    columns = [Column("time", "time", "s")] + [
-        Column("tau_qdd", f"tau_qdd/{i}/{k}/{k}", "N·m", i, k, k) for i in range(count) for k in range(count)
+    pairs = [(i, k) for i in range(count) for k in range(count)]
+    places = [
+        ("time", ()),
+        *(("tau_qdd", (i, k, k)) for i, k in pairs),
+        *(("power_link", at) for at in pairs),
     ]
-    columns += [Column("power_link", f"power/{i}/{k}", "W", i, k) for i in range(count) for k in range(count)]
     torques = np.sin(np.arange(count * count)[:, None] + np.arange(40) / 9)
     values = np.vstack([analysis.values[0], torques, torques])
     totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1))
     given = np.arange(1.0, count * count + 1).reshape(count, count)
     work = Work(given, given.T)
-    made = replace(analysis, robot=robot, columns=tuple(columns), values=values, totals=totals, work=work)
+    rows = ResultRows.of(robot, places)
+    made = replace(analysis, robot=robot, rows=rows, values=values, totals=totals, work=work)
     (place / "report.html").write_text(report(made), encoding="utf-8")
     return names, (place / "report.html").as_uri()
 
@@ -471,9 +473,8 @@ def test_names_are_shown_and_not_obeyed(driver, tmp_path):
     names = ("%{x} %{customdata}", "</script><script>document.title=1</script>", "<b>$x^\n\u202e&lt;")
     analysis = analyze(write_csv(tmp_path / "a.csv", smooth(40, 3)), PLANAR3)
     robot = replace(analysis.robot, name=names[1], joints=names, links=names)
-    made = replace(
-        analysis, robot=robot, columns=columns_of(robot, term_rows(robot.model.layout)), source=names[2]
-    )
+    rows = ResultRows.of(robot, torque_places(robot, term_rows(robot.model.layout)))
+    made = replace(analysis, robot=robot, rows=rows, source=names[2])
     (tmp_path / "report.html").write_text(report(made), encoding="utf-8")
     opened(driver, (tmp_path / "report.html").as_uri())
     shown = [*names[:2], "<b>$x^\\n\\u202e&lt;"]

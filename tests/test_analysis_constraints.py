@@ -134,6 +134,19 @@ def test_the_gradient_convention_counts_what_changes_the_cranks_inertia_twice(fo
         np.testing.assert_allclose(result.velocity[:, 0, j, 0], 2 * velocity, rtol=0, atol=1e-8)
 
 
+def test_a_payload_counts_in_the_gradient_convention_as_links_do(folder: Path) -> None:
+    bag = Payload("coupler", 0.7, (0.4, 0.0, 0.0), "bag")
+    made = [
+        analyze(
+            folder / "crank.csv", folder / "robot", processing=replace(ALL, convention=one), payloads=[bag]
+        )
+        for one in ("closing", "gradient")
+    ]
+    closing, gradient = (result["tau_qd/turn/bag/turn"] for result in made)
+    np.testing.assert_allclose(gradient, 2.0 * closing, rtol=1e-12, atol=1e-12)
+    assert np.abs(gradient).max() > 0.1
+
+
 def test_springs_losses_loads_and_payloads_anywhere_are_borne_by_the_crank(folder: Path) -> None:
     pull = Load("pull", "rocker", force=(3.0, -2.0, 0.0), point=(0.1, 0.0, 0.0))
     bag = Payload("coupler", 0.7, (0.4, 0.0, 0.0), "bag")

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from linkwise.analysis.derivatives import FIRST, SECOND, derivatives
-from linkwise.analysis.filtering import lowpass, padding_length
+from linkwise.analysis.filtering import FIRST, SECOND, derivatives, lowpass, padding_length
 from linkwise.analysis.settings import Lowpass, Processing
 from linkwise.errors import LinkwiseError
 from motion_logs import smooth

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from linkwise import progress
-from linkwise.analysis import analyze, tables
+from linkwise.analysis import analyze
 from linkwise.analysis import run as run_module
 from linkwise.analysis.settings import Lowpass, Processing
 from linkwise.cli.app import app
@@ -148,10 +148,10 @@ def test_a_fault_on_the_way_leaves_nothing(call, log, tmp_path, monkeypatch):
 
 
 def test_a_full_disk_is_told(call, log, tmp_path, monkeypatch):
-    def fill(*_):
+    def fill(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(tables.ParquetTable, "__call__", fill)
+    monkeypatch.setattr(pq.ParquetWriter, "write_batch", fill)
     with pytest.raises(LinkwiseError, match=r"nothing was written: .*No space left on device"):
         call("analyze", log, *ROBOT, "--out", tmp_path / "out")
     assert [file.name for file in tmp_path.iterdir()] == ["log.csv"]

@@ -96,6 +96,27 @@ def test_shares_of_a_point_sum_to_its_acceleration_and_others_are_not_there(leg:
     assert there.sel(point="foot", component="angular_x").all()
 
 
+def test_springs_and_losses_stand_alike_in_torques_and_in_accelerations(tmp_path: Path) -> None:
+    """An armature is inertia, so that it accelerates nothing."""
+    own = 'name = "knee_angle_r"\nstiffness = 3\ndamping = 20\narmature = 0.02\n'
+    (tmp_path / "leg.toml").write_text(LEG.read_text().replace('name = "knee_angle_r"\n', own, 1))
+    write_package(generate(read_system(tmp_path / "leg.toml"), ["numpy"]), tmp_path / "leg")
+    log = write_csv(tmp_path / "walk.csv", smooth(40, 6) * [1, *[0.2] * 6], COORDINATES)
+    result = analyze(log, tmp_path / "leg", induced=["joints", "foot"])
+    found = result.to_xarray()
+    assert list(found.source.values) == ["spring", "damping", "friction", "armature"]
+    at = {"point": "joints", "component": "hip_flexion_r", "cause": "knee_angle_r"}
+    for source in ("spring", "damping"):
+        np.testing.assert_array_equal(
+            found.induced_passive.sel(**at, source=source),
+            result[f"acc_{source}/joints/hip_flexion_r/knee_angle_r"],
+        )
+    assert not found.induced_passive.sel(**at, source="armature").any()
+    np.testing.assert_array_equal(
+        found.passive_torque.sel(joint="knee_angle_r", source="armature"), result["tau_armature/knee_angle_r"]
+    )
+
+
 @pytest.fixture(scope="module")
 def hostile(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """An analysis of a robot whose names are any text."""

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from linkwise.analysis import Load, Reading, analyze
 from linkwise.analysis.loaded_robot import load_robot
-from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.show import figure_png
-from linkwise.analysis.show.largest_few import largest_few
-from linkwise.analysis.show.page import page_data
-from linkwise.analysis.show.poses import poses
+from linkwise.analysis.show.drawn_curves import largest_few
+from linkwise.analysis.show.page import page_data, poses
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
 from linkwise.package.manifest import BodyEntry
@@ -64,7 +63,7 @@ def test_shares_fill_the_bars(analysis):
 
 def test_shares_of_many_joints_are_their_own_the_largest_other_ones_and_the_rest(analysis, monkeypatch):
     monkeypatch.setattr("linkwise.analysis.joint_causes.FEW", 2)
-    monkeypatch.setattr("linkwise.analysis.show.share_parts.MANY", 2)
+    monkeypatch.setattr("linkwise.analysis.show.shares_figure.MANY", 2)
     figure = analysis.figure("shares")
     assert [axis.get_title(loc="left") for axis in figure.axes[:2]] == [
         "everything, gravity too",
@@ -205,7 +204,7 @@ def test_figures_are_shown_in_a_notebook(analysis, monkeypatch):
 
 
 def test_many_causes_are_named_by_size_and_the_rest_is_one(analysis, monkeypatch):
-    monkeypatch.setattr("linkwise.analysis.show.cause_curves.MOST", 1)
+    monkeypatch.setattr("linkwise.analysis.show.causes_figure.MOST", 1)
     rows, shown = bars(analysis.figure("causes:joint1"))
     assert rows[-1] == "motion of 2 others"
     means, _ = shown["the whole movement"]
@@ -316,8 +315,8 @@ def many(analysis, count=14):
     """The same numbers with as many names as asked for, one of 80 letters."""
     joints = tuple(f"joint{i}" if i != 4 else f"{'a_name_from_a_drawing_' * 4}4" for i in range(count))
     robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * count, bodies=None)
-    columns = tuple(Column("q", f"q/{i}", "rad", i) for i in range(count))
-    return replace(analysis, robot=robot, columns=columns, values=analysis.values[1 + np.arange(count) % 9])
+    rows = ResultRows.of(robot, [("q", (i,)) for i in range(count)])
+    return replace(analysis, robot=robot, rows=rows, values=analysis.values[1 + np.arange(count) % 9])
 
 
 def test_many_joints_get_a_legend_that_fits(analysis):

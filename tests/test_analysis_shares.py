@@ -18,7 +18,7 @@ from linkwise.analysis import Analysis, Processing, Reading, analyze
 from linkwise.analysis.job import Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.result import Totals
-from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show import figure_png
 from linkwise.analysis.show.page import report
@@ -111,18 +111,18 @@ def crowd_of(joints: tuple[str, ...], analysis: Analysis) -> Analysis:
     draw, count = np.random.default_rng(4), range(len(joints))
     pairs: list[tuple[Any, int, int | None]] = [("tau_gravity", i, None) for i in count]
     pairs += [(quantity, i, k) for quantity in ("tau_qdd", "tau_qd") for i in count for k in count]
-    made, values = [Column("time", "time", "s")], [np.arange(400) / 100]
+    places: list[Place] = [("time", ())]
+    values = [np.arange(400) / 100]
     for quantity, i, k in pairs:
         first = draw.uniform(0.1, 1.0) * draw.normal(size=400)
         for j, size in ((0, 1.0), (1, draw.uniform(-1.0, 0.5))):
-            parts = [quantity, joints[i], joints[j], *([] if k is None else [joints[k]])]
-            made.append(Column(quantity, "/".join(parts), "N·m", i, j, k))
+            places.append((quantity, (i, j) if k is None else (i, j, k)))
             values.append(size * first)
     robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * len(joints), bodies=None)
     none = np.zeros((len(joints), len(joints)))
     totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1))
     about: Any = {"robot": robot, "totals": totals, "work": Work(none, none), "total": 400}
-    return replace(analysis, columns=tuple(made), values=np.array(values), **about)
+    return replace(analysis, rows=ResultRows.of(robot, places), values=np.array(values), **about)
 
 
 def test_links_cancel_here_so_that_their_sizes_would_tell_another_cause(columns: Columns) -> None:

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from linkwise import generate, read_system, write_package
 from linkwise.analysis import Analysis, analyze
-from linkwise.analysis.show.page import report
-from linkwise.analysis.show.poses import poses
+from linkwise.analysis.show.page import poses, report
 from motion_logs import smooth, write_csv
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.support.wait import WebDriverWait

@@ -15,7 +15,7 @@ from linkwise import (
     read_system,
     write_package,
 )
-from linkwise.analysis.show.poses import poses
+from linkwise.analysis.show.page import poses
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 from linkwise.robot.curve import Curve

@@ -21,7 +21,7 @@ from conftest import needs_compiler
 from linkwise import Options, generate, read_system, write_package
 from linkwise import escape as to
 from linkwise.analysis import analyze
-from linkwise.analysis.result_columns import columns_of
+from linkwise.analysis.result_rows import ResultRows, torque_places
 from linkwise.analysis.show import figure_png
 from linkwise.analysis.show.page import report
 from linkwise.analysis.term_rows import term_rows
@@ -187,8 +187,8 @@ def analysis(tmp_path_factory):
 
 def renamed(analysis, names, source="a.csv"):
     robot = replace(analysis.robot, name=names[0], joints=names, links=names)
-    columns = columns_of(robot, term_rows(robot.model.layout))
-    return replace(analysis, robot=robot, columns=columns, source=source)
+    rows = ResultRows.of(robot, torque_places(robot, term_rows(robot.model.layout)))
+    return replace(analysis, robot=robot, rows=rows, source=source)
 
 
 @pytest.mark.parametrize("start", range(0, len(EVIL) - 2, 3))

@@ -4,7 +4,6 @@ Contacts take their part first, by the equations of the joints that nothing driv
 including what the contacts put on the dependent joints.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,8 +13,8 @@ from linkwise.analysis.contacts.contact_times import ContactTimes
 from linkwise.analysis.contacts.ground_contacts import Standing
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
-from linkwise.analysis.result_columns import Column
 from linkwise.analysis.result_quantities import FORCE_OF, PASSIVE
+from linkwise.analysis.result_rows import ResultRows
 from linkwise.package.load import Array
 
 Motion = tuple[Array, Array, Array]
@@ -33,13 +32,13 @@ class BorneForces:
     def fill(
         self,
         out: Array,
-        columns: Sequence[Column],
+        rows: ResultRows,
         standing: Standing | None,
         time: Array,
         motion: Motion,
         partial: Array,
     ) -> None:
-        """Fill the force columns of `out` (columns, S).
+        """Fill the rows of forces in `out` (rows, S).
 
         partial: tau_ij (S, n, N), of which contacts carry a part
         """
@@ -47,22 +46,13 @@ class BorneForces:
             return
         by_link = self._by_link(standing, motion, partial)
         beside = self._beside(standing, time, motion)
-        own, loads = beside[..., : len(PASSIVE)], beside[..., len(PASSIVE) :]
-        whole = by_link.sum(-1) + beside.sum(-1)
-        place = {FORCE_OF[share]: at for at, share in enumerate(PASSIVE)}
-        for column, values in zip(columns, out, strict=True):
-            match column.quantity:
-                case "force":
-                    values[:] = whole[:, column.cause]
-                case "force_link":
-                    values[:] = by_link[:, column.cause, column.link]
-                case "force_load":
-                    values[:] = loads[:, column.cause, column.load]
-                case quantity if quantity in place:
-                    values[:] = own[:, column.cause, place[quantity]]
+        rows.put(out, "force", by_link.sum(-1) + beside.sum(-1))
+        rows.put(out, "force_link", np.swapaxes(by_link, 1, 2))
+        for at, share in enumerate(PASSIVE):
+            rows.put(out, FORCE_OF[share], beside[..., at])
+        rows.put(out, "force_load", beside[..., len(PASSIVE) :])
         if standing is not None:
-            self._fill_ground(out, columns, standing, time, motion)
-            self._fill_fed(out, columns, standing, motion[1], by_link)
+            self._fill_ground(out, rows, standing, time, motion, by_link)
 
     def _by_link(self, standing: Standing | None, motion: Motion, partial: Array) -> Array:
         """Return the constraint forces due to each link, (S, C, N)."""
@@ -106,40 +96,34 @@ class BorneForces:
         own = [np.asarray(a) + 0.0 * q for a in model.passive_torque(*motion)]
         return np.stack([*own, *(borne.torque(model, time, q) for borne in self.loads)], axis=-1)
 
-    def _fill_fed(
-        self, out: Array, columns: Sequence[Column], standing: Standing, qd: Array, by_link: Array
-    ) -> None:
-        """Fill the power that contacts feed into links as they slip."""
-        ground = self.robot.contacts
-        assert ground is not None
-        own = by_link[:, len(self.robot.constraint_rows) - len(ground.rows) :]
-        fed = standing.fed(qd, own, ground.owners, len(ground.names))
-        for column, values in zip(columns, out, strict=True):
-            if column.quantity == "power_contact":
-                values[:] = fed[:, column.cause, column.link]
-
     def _fill_ground(
-        self, out: Array, columns: Sequence[Column], standing: Standing, time: Array, motion: Motion
+        self,
+        out: Array,
+        rows: ResultRows,
+        standing: Standing,
+        time: Array,
+        motion: Motion,
+        by_link: Array,
     ) -> None:
-        """Fill shares, slip velocities and measured forces of contacts, and joint torques by these forces."""
-        times, ground = self.times, self.robot.contacts
+        """Fill the rows of contacts: shares, power fed into links by slip, slip velocities, measured forces.
+
+        Joint torques by the measured forces are filled, too.
+        """
+        times, ground, own = self.times, self.robot.ground, self.robot.contact_rows
         assert times is not None
-        assert ground is not None
         (q, qd, _), model = motion, self.robot.model
-        first = len(self.robot.constraint_rows) - len(ground.rows)
-        slip, shares = standing.slip(qd), times.shares(model, time, q)
-        places = ground.places(model, q)
-        measured = [times.wrench(c, model, time, q, place) for c, place in enumerate(places)]
+        rows.put(out, "contact", times.shares(model, time, q))
+        fed = standing.fed(qd, by_link[:, own], ground.owners, len(ground.names))
+        rows.put(out, "power_contact", np.swapaxes(fed, 1, 2))
+        slip, measured = np.zeros((2, len(q), own.stop))
+        slip[:, own] = standing.slip(qd)
+        wrenches = [times.wrench(c, model, time, q, place) for c, place in enumerate(ground.places(model, q))]
+        for row, owner, part in zip(
+            range(own.start, own.stop), ground.owners, ground.wrench_rows, strict=True
+        ):
+            if part is not None:
+                measured[:, row] = wrenches[owner][:, part]
+        rows.put(out, "slip", slip)
+        rows.put(out, "force_measured", measured)
         asked = np.asarray(model.inverse_dynamics(*motion)) + times.torque(model, time, q)
-        asked = asked + self._torques(model, time, motion).sum(-1)
-        for column, values in zip(columns, out, strict=True):
-            match column.quantity:
-                case "contact":
-                    values[:] = shares[:, column.cause]
-                case "slip":
-                    values[:] = slip[:, (column.cause or 0) - first]
-                case "force_measured":
-                    row = (column.cause or 0) - first
-                    values[:] = measured[ground.owners[row]][:, ground.wrench_rows[row]]
-                case "tau_as_loads":
-                    values[:] = asked[:, column.joint]
+        rows.put(out, "tau_as_loads", asked + self._torques(model, time, motion).sum(-1))

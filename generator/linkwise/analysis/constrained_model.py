@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 
-from linkwise.analysis.model_side import Rows, Side
+from linkwise.analysis.term_rows import Rows, TermArrays
 from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array
 
@@ -37,7 +37,7 @@ class ConstrainedModel:
     constraints: Any
     """The package's `Constraints`."""
     following: Following
-    layout: Side
+    layout: TermArrays
 
     @classmethod
     def of(cls, model: Dynamics, tree: RigidTree) -> "ConstrainedModel":
@@ -66,7 +66,7 @@ class ConstrainedModel:
         qd = _array(self.constraints.velocity(q, qd[..., own]))
         return q, qd, _array(self.constraints.acceleration(q, qd, qdd[..., own]))
 
-    def packed(self, q: Array, qd: Array, qdd: Array) -> Side:
+    def packed(self, q: Array, qd: Array, qdd: Array) -> TermArrays:
         """Return all coefficients and tau^_aj, packed in the order of `layout`."""
         cubes = (_array(a) for a in self.constraints.coefficients(q, qd))
         torque = _array(self.constraints.partial_torque(q, qd, qdd))
@@ -79,7 +79,7 @@ class ConstrainedModel:
             found: Array = cube[(..., place[i], j, *(place[other] for other in k))]
             return found
 
-        return Side(
+        return TermArrays(
             taken(acceleration, self.layout.acceleration),
             taken(velocity, self.layout.velocity),
             taken(gravity, self.layout.gravity),
@@ -90,7 +90,7 @@ class ConstrainedModel:
         """Return tau^_a summed over all links, (S, n)."""
         return self._spread(_array(self.constraints.inverse_dynamics(q, qd, qdd)))
 
-    def propagation(self, q: Array, qd: Array, qdd: Array, convention: str = "closing") -> Side:
+    def propagation(self, q: Array, qd: Array, qdd: Array, convention: str = "closing") -> TermArrays:
         """Return the parts of tau^_aj by q̈_k and by q̇_k, (S, n, N, n) each, and g^_aj, (S, n, N).
 
         In the gradient convention, of rigid links, the parts by velocity are twice those of the closing one.
@@ -98,7 +98,7 @@ class ConstrainedModel:
         acceleration, velocity, gravity = map(_array, self.constraints.propagation(q, qd, qdd))
         share = 2.0 if convention == "gradient" else 1.0
         cubes = (self._spread(self._spread(a, 1), -1) for a in (acceleration, share * velocity))
-        return Side(next(cubes), next(cubes), self._spread(gravity, 1), torque=None)
+        return TermArrays(next(cubes), next(cubes), self._spread(gravity, 1), torque=None)
 
     def passive_torque(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, ...]:
         """Return the passive torques of all joints, projected on the independent ones, (S, n) each.
@@ -179,7 +179,7 @@ def movers(tree: RigidTree, n: int, independent: Sequence[int]) -> tuple[frozens
     return tuple(frozenset({k}) if k in own else found.get(k, frozenset()) for k in range(n))
 
 
-def _layout(own: Any, following: Following) -> Side:
+def _layout(own: Any, following: Following) -> TermArrays:
     """Return the rows of the values that are not zero for all motion.
 
     c2^ comes from c2; c1^ comes from c1, and from c2 where k is dependent, since its part of G changes.
@@ -197,7 +197,7 @@ def _layout(own: Any, following: Following) -> Side:
     changing = inertia[[k not in independent for k in inertia[:, 2]]]
     acceleration = _rows({row for row in moved(inertia) if row[0] <= row[2]}, 3)
     velocity = _rows(moved(own.velocity) | moved(changing), 3)
-    return Side(acceleration, velocity, _rows(moved(own.gravity), 2), _rows(moved(own.torque), 2))
+    return TermArrays(acceleration, velocity, _rows(moved(own.gravity), 2), _rows(moved(own.torque), 2))
 
 
 def _mirrored(rows: Rows) -> Rows:

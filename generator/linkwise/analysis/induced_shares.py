@@ -1,6 +1,10 @@
 """Shares of accelerations by source, from the torques that a result has: M q̈_x = F_x, point by point.
 
-Where joints are tied, A q̇ = 0, each source x solves
+    M q̈ = Σ_i u_i − Σ_js c1_ijs q̇_s − Σ_j g_ij − spring, damping, friction − Σ_e τ_ie + Aᵀ λ
+
+with u_i = τ_i, the torque of the joint, and with the armatures in M. M, c1, g and passive torques are those
+of the open tree. Where joints are tied, τ_i and τ_ie are torques of the independent joints: on these alone,
+they move the robot as do any other forces with the same Gᵀ F. With A q̇ = 0, each source x then solves
 
     [M −Aᵀ; A 0] [q̈_x; λ_x] = [F_x; b_x]      b = −Ȧ q̇ for the constraints' own source, else 0
 
@@ -15,66 +19,138 @@ A point accelerates by J q̈_x, and by J̇ q̇ itself.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
 from linkwise_runtime.motion.induced_accelerations import Response, response_of
 
-from linkwise.analysis.contacts.ground_contacts import Standing
-from linkwise.analysis.contacts.standing_response import StandingResponse
+from linkwise.analysis.contacts.ground_contacts import Standing, StandingResponse
 from linkwise.analysis.induced_points import InducedPoint
-from linkwise.analysis.induced_sources import InducedSources, opened
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.model_side import NAMES, Side
-from linkwise.analysis.result_columns import Column
-from linkwise.analysis.result_quantities import Quantity
+from linkwise.analysis.result_quantities import LOSSES, PASSIVE
+from linkwise.analysis.result_rows import Place, ResultRows
+from linkwise.analysis.term_rows import NAMES, TermArrays, mirrored
 from linkwise.analysis.verify import Closure, worst_of
 from linkwise.errors import LinkwiseError
-from linkwise.escape import column_part
 from linkwise.package.load import Array
 
 AT_ONCE = 1 << 21
 """Force values of the sources that are computed at once."""
+Source = tuple[str, tuple[int, ...]]
+"""Quantity of a source's shares, and the index along each axis behind those of points: link, cause, load."""
+
+
+@dataclass(frozen=True)
+class InducedSources:
+    """The sources of a robot, and their forces."""
+
+    robot: LoadedRobot
+    every: dict[Source, list[tuple[int, int]]]
+    """Pairs of a coordinate and the place of its torque, by source: a row of the result, a packed value, a
+    joint."""
+
+    @classmethod
+    def of(cls, robot: LoadedRobot, rows: ResultRows) -> "InducedSources":
+        """Collect the sources of a robot; rows: those of torques."""
+        found: dict[Source, list[tuple[int, int]]] = {}
+        for quantity, at, i, place in _parts(robot, rows):
+            found.setdefault((quantity, at), []).append((i, place))
+        return cls(robot, found)
+
+    def mass_and_forces(
+        self, out: Array, packed: TermArrays, q: Array, qd: Array, qdd: Array
+    ) -> tuple[Array, Array]:
+        """Return M (S, n, n) and F_x (S, n, X).
+
+        out: the torques (rows, S); packed: values of the robot's model
+        """
+        model = opened(self.robot)
+        if self.robot.constrained is not None:
+            packed = model.packed(q, qd, qdd)
+        own = model.passive_torque(q, qd, qdd)[:3] if self.robot.passive else ()
+        torques: dict[str, Array] = dict(zip(LOSSES, own, strict=False))
+        torques |= {"acc_qd": packed.velocity, "acc_gravity": packed.gravity}
+        forces = np.zeros((*q.shape, len(self.every)))
+        for x, ((quantity, at), places) in enumerate(self.every.items()):
+            there = torques.get(quantity, out.T)
+            moved = qd[:, at[-1]] if quantity == "acc_qd" else 1.0
+            for i, place in places:
+                torque = there[:, place] * moved
+                forces[:, i, x] += torque if quantity == "acc_tau" else -torque
+        return self._mass(packed.acceleration, q.shape[1]), forces
+
+    def _mass(self, packed: Array, n: int) -> Array:
+        """Return M (S, n, n) of links, payloads and the armatures behind gears."""
+        mass = np.zeros((len(packed), n, n))
+        for i, _, k, source in mirrored(opened(self.robot).layout):
+            mass[:, i, k] += packed[:, source]
+        for own in self.robot.passive:
+            mass[:, own.coordinate, own.coordinate] += own.ratio**2 * own.armature
+        return mass
+
+
+def opened(robot: LoadedRobot) -> Any:
+    """Return the model of links and payloads without ties."""
+    model: Any = robot.model
+    return model if robot.constrained is None else model.open
+
+
+def _parts(robot: LoadedRobot, rows: ResultRows) -> Iterator[tuple[str, tuple[int, ...], int, int]]:
+    """Yield the quantity and the indices of a source, with a coordinate and the place of its torque."""
+    layout = opened(robot).layout
+    for row, (i,) in rows["tau"].listed():
+        yield "acc_tau", (i,), i, row
+    for i, j, k, at in sorted((*ijk, at) for at, ijk in enumerate(layout.velocity.tolist())):
+        yield "acc_qd", (j, k), i, at
+    for i, j, at in sorted((*ij, at) for at, ij in enumerate(layout.gravity.tolist())):
+        yield "acc_gravity", (j,), i, at
+    for quantity, field in zip(LOSSES, PASSIVE.values(), strict=False):
+        for i in robot.with_own(field):
+            yield quantity, (i,), i, i
+    for row, (i, e) in rows["tau_load"].listed():
+        yield "acc_load", (e,), i, row
 
 
 @dataclass(frozen=True)
 class InducedShares:
-    """Plans and fills the columns of induced accelerations, which follow all others."""
+    """Plans and fills the rows of induced accelerations, which follow all others."""
 
     robot: LoadedRobot
     points: tuple[InducedPoint, ...]
     sources: InducedSources
-    columns: tuple[Column, ...]
     first: int
-    """Row of the result at which these columns begin."""
+    """Row of the result at which these begin."""
 
     @classmethod
-    def of(
-        cls,
-        robot: LoadedRobot,
-        points: Sequence[InducedPoint],
-        others: Sequence[Column],
-        loads: Sequence[str],
-    ) -> "InducedShares":
-        """Plan the columns of the points.
+    def of(cls, robot: LoadedRobot, points: Sequence[InducedPoint], others: ResultRows) -> "InducedShares":
+        """Plan the rows of the points; others: all rows of torques and motion."""
+        sources = InducedSources.of(robot, others) if points else InducedSources(robot, {})
+        return cls(robot, tuple(points), sources, len(others))
 
-        others: all columns of torques and motion; loads: names of the loads
+    @property
+    def places(self) -> Iterator[Place]:
+        """Places of the rows, for each component of a point.
+
+        They are its acceleration, the shares of the sources, those of ties and contacts, and J̇ q̇ by cause.
         """
-        sources = InducedSources.of(robot, others if points else ())
-        columns = tuple(
-            column
-            for number, point in enumerate(points)
-            for row in range(len(point.rows))
-            for column in _columns(sources, loads, point, number, row)
-        )
-        return cls(robot, tuple(points), sources, columns, len(others))
+        joints = [(s,) for s in range(len(self.robot.joints))]
+        shares: list[Place] = [("acc", ()), *self.sources.every]
+        if self.robot.constrained is not None:
+            shares += [("acc_constraint", at) for at in joints]
+        if self.robot.contacts is not None:
+            shares += [("acc_contact", (c,)) for c in range(len(self.robot.contacts.names))]
+        shares += [("acc_kinematic", at) for at in joints]
+        components = list(dict.fromkeys(row for point in self.points for row in point.rows))
+        for number, point in enumerate(self.points):
+            for row in point.rows:
+                yield from ((name, (number, components.index(row), *at)) for name, at in shares)
 
     def fill(
         self, out: Array, packed: Any, standing: Standing | None, q: Array, qd: Array, qdd: Array
     ) -> Closure:
-        """Fill the induced accelerations in `out` (columns, S); return the largest errors of their sums.
+        """Fill the induced accelerations in `out` (rows, S); return the largest errors of their sums.
 
         The torques of `out` must be filled already. packed: values of the robot's model
         """
@@ -83,12 +159,14 @@ class InducedShares:
         step = max(1, AT_ONCE // numbers)
         for at in range(0, len(q), step) if self.points else ():
             some = slice(at, at + step)
-            part = Side(*(getattr(packed, name)[some] for name in NAMES))
+            part = TermArrays(*(getattr(packed, name)[some] for name in NAMES))
             rows = None if standing is None else standing.every[some]
             worst |= self._fill(out[:, some], part, rows, q[some], qd[some], qdd[some])
         return worst
 
-    def _fill(self, out: Array, packed: Side, rows: Array | None, q: Array, qd: Array, qdd: Array) -> Closure:
+    def _fill(
+        self, out: Array, packed: TermArrays, rows: Array | None, q: Array, qd: Array, qdd: Array
+    ) -> Closure:
         mass, forces = self.sources.mass_and_forces(out, packed, q, qd, qdd)
         try:
             moved = self._moved(self._response(mass, q, qd), forces, rows, qdd)
@@ -138,30 +216,3 @@ def _timed(text: str, time: Array) -> str:
         return text
     told = text.replace(found[0], f" at {time[int(found[1])]:.6g} s", 1)
     return f"{told}; cut the log there, or leave --induced out"
-
-
-def _columns(
-    sources: InducedSources, loads: Sequence[str], point: InducedPoint, number: int, row: int
-) -> list[Column]:
-    """Return the columns of one component of a point.
-
-    They are its acceleration, the shares of the sources, and J̇ q̇ by its causes.
-    """
-    unit, robot = point.units[row], sources.robot
-
-    def column(quantity: Quantity, link: int | None, cause: int | None, names: Sequence[str]) -> Column:
-        name = "/".join([quantity, *map(column_part, (point.name, point.rows[row], *names))])
-        return Column(quantity, name, unit, None, link, cause, number, row)
-
-    made = [column("acc", None, None, ())]
-    for source in sources.every:
-        causes = loads if source.quantity == "acc_load" else robot.joints
-        names = [] if source.link is None else [robot.links[source.link]]
-        names += [] if source.cause is None else [causes[source.cause]]
-        made.append(column(source.quantity, source.link, source.cause, names))
-    if robot.constrained is not None:
-        made += [column("acc_constraint", None, s, [joint]) for s, joint in enumerate(robot.joints)]
-    if robot.contacts is not None:
-        made += [column("acc_contact", None, c, [name]) for c, name in enumerate(robot.contacts.names)]
-    made += [column("acc_kinematic", None, s, [joint]) for s, joint in enumerate(robot.joints)]
-    return made

@@ -15,18 +15,16 @@ from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads import Loads
 from linkwise.analysis.loads.read_loads import placed_loads
 from linkwise.analysis.logs import Log, open_log
-from linkwise.analysis.named_result import named_result
+from linkwise.analysis.named_result import named_result, result_table
 from linkwise.analysis.phases import Phase, PlacedPhase, phase_columns, placed_phases
-from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_record import record
-from linkwise.analysis.result_table import result_table
-from linkwise.analysis.samples import Samples, read_samples
+from linkwise.analysis.result import AnalysisResult, WholeMovement
+from linkwise.analysis.result_rows import Column
+from linkwise.analysis.samples import Samples, pole_warnings, read_samples
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import draw
-from linkwise.analysis.stream import Sink, Streamed, span_of, stream
-from linkwise.analysis.tables import Format
+from linkwise.analysis.stream import Sink, span_of, stream
+from linkwise.analysis.tables import Format, record
 from linkwise.analysis.torques import Decomposer
-from linkwise.analysis.turn_poles import pole_warnings
 from linkwise.errors import within
 from linkwise.extras import extra
 from linkwise.option import option
@@ -119,7 +117,7 @@ class Job:
     """Largest violation of a constraint by positions of the log, where joints are tied."""
     phases: tuple[PlacedPhase, ...] = ()
 
-    def run(self, sink: Sink, progress: Progress) -> Streamed:
+    def run(self, sink: Sink, progress: Progress) -> WholeMovement:
         """Analyse every sample, handing the blocks to `sink`."""
         with within(self.source):
             return stream(self.samples, self.decomposer, self.processing, sink, progress)
@@ -138,38 +136,38 @@ class Job:
         }
 
     @property
+    def columns(self) -> tuple[Column, ...]:
+        """Columns of the result, with names and units."""
+        return self.decomposer.rows.columns
+
+    @property
     def count(self) -> int:
         """Number of samples that will be analysed."""
         start, stop = span_of(self.samples, self.processing)
         return stop - start
 
-    def analysis(self, done: Streamed, values: Array) -> Analysis:
+    def analysis(self, done: WholeMovement, values: Array) -> Analysis:
         """Return the analysis, with what is known of the samples.
 
-        values: all samples, (columns, S)
+        values: all samples, (rows, S)
         """
+        warnings = (*self.samples.warnings, *self._twice_borne(), *self._near_poles(), *self._never_on(done))
         return Analysis(
-            self.decomposer.robot,
-            self.reading,
-            self.processing,
-            self.source,
-            self.samples.rate,
-            self.decomposer.columns,
-            values,
-            done.totals,
-            done.work,
-            done.joint_work,
-            done.load_work,
-            done.contact_work,
-            self.decomposer.loads,
-            tuple(point.name for point in self.decomposer.induced.points),
-            done.closure,
-            self.samples.ignored,
-            (*self.samples.warnings, *self._twice_borne(), *self._near_poles(), *self._never_on(done)),
-            done.samples,
-            self.closed,
-            self.decomposer.times,
-            self.phases,
+            **vars(done),
+            robot=self.decomposer.robot,
+            reading=self.reading,
+            processing=self.processing,
+            source=self.source,
+            rate=self.samples.rate,
+            rows=self.decomposer.rows,
+            values=values,
+            loads=self.decomposer.loads,
+            induced=tuple(point.name for point in self.decomposer.rows.points),
+            ignored=self.samples.ignored,
+            warnings=warnings,
+            closed=self.closed,
+            times=self.decomposer.times,
+            phases=self.phases,
         )
 
     def _near_poles(self) -> Iterator[str]:
@@ -177,12 +175,12 @@ class Job:
         robot = self.decomposer.robot
         return pole_warnings(robot.bodies, robot.joints, self.samples)
 
-    def _never_on(self, done: Streamed) -> Iterator[str]:
+    def _never_on(self, done: WholeMovement) -> Iterator[str]:
         """Yield warnings about contacts that are off throughout."""
         ground, times = self.decomposer.robot.contacts, self.decomposer.times
-        for column, peak in zip(self.decomposer.columns, done.totals.peak, strict=True):
-            c = column.cause
-            if column.quantity == "contact" and not peak and ground and times and c is not None:
+        peaks = done.totals.peak[self.decomposer.rows["contact"].rows].tolist()
+        for c, peak in enumerate(peaks):
+            if not peak and ground and times:
                 yield f"contact {ground.names[c]!r} is never on: {times.largest(c)}"
 
     def _twice_borne(self) -> Iterator[str]:
@@ -191,13 +189,10 @@ class Job:
         Such a load may be what was measured at the contact.
         """
         robot = self.decomposer.robot
-        tree, ground = robot.package.manifest.tree, robot.contacts
-        if tree is None or ground is None:
-            return
-        body = {frame.name: frame.joint for frame in tree.frames}
-        for name, contact in zip(ground.names, ground.contacts, strict=True):
+        held = () if robot.contacts is None else zip(robot.ground.names, robot.ground.contacts, strict=True)
+        for name, contact in held:
             for load in self.decomposer.loads:
-                if load.seat.frame.joint == body[str(contact.frame)]:
+                if load.seat.frame.joint == robot.body_of(contact.frame):
                     yield (
                         f"load {load.name!r} and contact {name!r} act on one body; what was measured at the"
                         " contact is given with --contact-loads"

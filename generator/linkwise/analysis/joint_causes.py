@@ -1,16 +1,17 @@
 """Causes of joint torques, the same in every figure and in the notebook."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_quantities import PASSIVE, Quantity
+from linkwise.analysis.result_quantities import PASSIVE
+from linkwise.analysis.result_rows import Indices
 from linkwise.package.load import Array
 
-MOTIONS: dict[str, tuple[Quantity, ...]] = {
+MOTIONS: dict[str, tuple[str, ...]] = {
     "acceleration": ("tau_qdd",),
     "velocity": ("tau_qd",),
     "motion": ("tau_qdd", "tau_qd"),
@@ -21,11 +22,11 @@ FEW = 7
 
 @dataclass(frozen=True)
 class Cause:
-    """One cause of joint torques, and the quantities of its columns."""
+    """One cause of joint torques, and its quantities."""
 
     kind: Literal["gravity", "load", "own", "acceleration", "velocity", "motion"]
     label: str
-    quantities: tuple[Quantity, ...]
+    quantities: tuple[str, ...]
     number: int | None = None
     """Number of the load, or of the joint that moves."""
 
@@ -33,6 +34,11 @@ class Cause:
     def is_motion(self) -> bool:
         """True if the cause is a joint's motion, or a part of that."""
         return self.kind in MOTIONS
+
+    def rows(self, result: AnalysisResult, i: int) -> Indices:
+        """Return the numbers of the rows of the cause's torques on joint i."""
+        where = {} if self.number is None else {"load" if self.kind == "load" else "cause": self.number}
+        return result.rows.numbers(*self.quantities, joint=i, **where)
 
 
 def causes_of(
@@ -46,10 +52,11 @@ def causes_of(
     joints: names of the joints, (n,); shown: function that formats a name. together: a motion is one cause,
     otherwise its acceleration and its velocity are two.
     """
-    there = {column.quantity for column in result.columns}
     found = [Cause("gravity", result.robot.potential, ("tau_gravity",))]
     found += [Cause("load", shown(name), ("tau_load",), e) for e, name in enumerate(result.load_labels)]
-    found += [Cause("own", f"own {name.removeprefix('tau_')}", (name,)) for name in PASSIVE if name in there]
+    found += [
+        Cause("own", f"own {name.removeprefix('tau_')}", (name,)) for name in PASSIVE if name in result.rows
+    ]
     kinds: tuple[Any, ...] = ("motion",) if together else ("acceleration", "velocity")
     for k in result.robot.driven:
         found += [Cause(kind, f"{shown(joints[k])} {kind}", MOTIONS[kind], k) for kind in kinds]
@@ -70,24 +77,13 @@ def sizes(result: AnalysisResult, causes: Sequence[Cause]) -> Array:
     The mean is over all samples. Links are summed first: where links pull against each other, or an
     acceleration and a velocity do, the difference counts.
     """
-    place: dict[int | None, int] = {i: at for at, i in enumerate(result.robot.driven)}
-    total = np.zeros((len(causes), len(place)))
+    rows = [[cause.rows(result, i) for i in result.robot.driven] for cause in causes]
+    total = np.zeros((len(causes), len(result.robot.driven)))
     for part in result.parts():
-        total += np.abs(_summed(part, causes, place)).sum(axis=-1)
+        total += [[np.abs(part.values[own].sum(axis=0)).sum() for own in some] for some in rows]
     return total / result.total
 
 
 def curves(result: AnalysisResult, causes: Sequence[Cause], i: int) -> Array:
     """Return the torque of each cause on joint i, (causes, S), in the joint's unit."""
-    return _summed(result, causes, {i: 0})[:, 0]
-
-
-def _summed(result: AnalysisResult, causes: Sequence[Cause], place: Mapping[int | None, int]) -> Array:
-    """Return the torque of each cause on each joint that has a place, (causes, joints, S)."""
-    rows = {(name, one.number): row for row, one in enumerate(causes) for name in one.quantities}
-    out = np.zeros((len(causes), len(place), result.values.shape[1]))
-    for column, number in zip(result.columns, result.values, strict=True):
-        row = rows.get((column.quantity, column.cause))
-        if row is not None and column.joint in place:
-            out[row, place[column.joint]] += number
-    return out
+    return np.array([result.values[cause.rows(result, i)].sum(axis=0) for cause in causes])

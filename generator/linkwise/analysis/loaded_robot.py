@@ -142,6 +142,28 @@ class LoadedRobot:
         tied = () if self.constrained is None else self.constrained.constraints.rows
         return (*tied, *(() if self.contacts is None else self.contacts.rows))
 
+    @property
+    def ground(self) -> GroundContacts:
+        """Contacts of a robot that stands on some."""
+        assert self.contacts is not None
+        return self.contacts
+
+    def body_of(self, frame: object) -> int | None:
+        """Return the number of the body that carries a frame, None for one on the ground."""
+        tree = self.package.manifest.tree
+        assert tree is not None
+        return next(one.joint for one in tree.frames if one.name == frame)
+
+    @property
+    def contact_rows(self) -> slice:
+        """Places of the rows of contacts among `constraint_rows`, behind those of ties."""
+        count = 0 if self.contacts is None else len(self.contacts.rows)
+        return slice(len(self.constraint_rows) - count, len(self.constraint_rows))
+
+    def with_own(self, field: str) -> tuple[int, ...]:
+        """Return the numbers of the joints that have a passive element, by the name of its number."""
+        return tuple(sorted({own.coordinate for own in self.passive if getattr(own, field)}))
+
 
 def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
     """Import the package in `directory`, with `backend` or the fastest that works here.

@@ -1,34 +1,28 @@
-"""A result as xarray's Dataset, each quantity with names along its axes."""
+"""A result as xarray's Dataset, each quantity with names along its axes, and as the table of a notebook."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
+from linkwise_runtime.html_tables import page_part, remark, table
 from linkwise_runtime.named_arrays import Part, dataset
-from linkwise_runtime.robot_axes import NamedAxis, axes_of
 from linkwise_runtime.version import VERSION
 
-from linkwise.analysis.named_quantities import COLUMNS, WORKS
+from linkwise.analysis.joint_causes import are_motions_whole, causes_of, sizes
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import Column, force_unit
+from linkwise.analysis.result_quantities import QUANTITIES, WORKS
+from linkwise.analysis.result_rows import load_unit
+from linkwise.analysis.work import Work
 from linkwise.extras import extra
 from linkwise.package.load import Array
-
-BASE = {"N·m": "rad", "N": "m"}
-"""Unit of the violation of a constraint's row, by the unit of its force; no unit for a coupling."""
 
 
 def named_result(result: AnalysisResult) -> Any:
     """Return the Dataset of `Analysis.to_xarray`."""
     extra("xarray")
-    axes = _axes(result)
-    there = {column.quantity for column in result.columns}
-    names = {COLUMNS[kind].name for kind in there if kind in COLUMNS}
+    arrays = {one.array.name for name, one in QUANTITIES.items() if name in result.rows and name != "time"}
     parts: list[Part] = [
-        (quantity, _values(result, kind, [axes[axis] for axis in quantity.axes]))
-        for kind, quantity in COLUMNS.items()
-        if quantity.name in names
+        (one.array, _values(result, name)) for name, one in QUANTITIES.items() if one.array.name in arrays
     ]
     about = {
         "robot": result.robot.name,
@@ -39,8 +33,8 @@ def named_result(result: AnalysisResult) -> Any:
         "provenance": result.provenance,
         "linkwise": VERSION,
     }
-    found = dataset(parts, axes, ["time"], {"time": ("time", result.time, {"units": "s"})}, about)
-    return found.merge(dataset(list(_works(result)), axes, [], {}, {}))
+    found = dataset(parts, result.rows.axes, ["time"], {"time": ("time", result.time, {"units": "s"})}, about)
+    return found.merge(dataset(list(_works(result)), result.rows.axes, [], {}, {}))
 
 
 def _works(result: AnalysisResult) -> Iterator[Part]:
@@ -53,52 +47,46 @@ def _works(result: AnalysisResult) -> Iterator[Part]:
             yield WORKS[name]._replace(beside=("way", way)), values
 
 
-def _axes(result: AnalysisResult) -> dict[str, NamedAxis]:
-    robot = result.robot
-    rows = robot.constraint_rows
-    contacts = () if robot.contacts is None else robot.contacts.names
-    components = {_component(column): column.unit.partition("/")[0] for column in _accelerations(result)}
-    return axes_of(robot.joints, robot.units, robot.links) | {
-        "load": NamedAxis("load", tuple(borne.name for borne in result.loads)),
-        "constraint": NamedAxis("constraint", rows, tuple(BASE.get(force_unit(row), "") for row in rows)),
-        "contact": NamedAxis("contact", contacts),
-        "point": NamedAxis("point", result.induced),
-        "component": NamedAxis("component", tuple(components), tuple(components.values())),
-    }
-
-
-def _accelerations(result: AnalysisResult) -> Sequence[Column]:
-    return [column for column in result.columns if column.quantity == "acc"]
-
-
-def _component(column: Column) -> str:
-    """Return the name of the component that a column of an acceleration has."""
-    return unquote(column.name.split("/")[2])
-
-
-def _values(result: AnalysisResult, kind: str, axes: Sequence[NamedAxis]) -> Array:
-    """Return a quantity's columns as one array, zeros without a column, NaN for rows that a point lacks."""
-    out = np.zeros((len(result.time), *(len(axis.names) for axis in axes)))
-    dimensions = [axis.dimension for axis in axes]
-    if "point" in dimensions:
-        rows = axes[1].names
-        out[:] = np.nan
-        for column in _accelerations(result):
-            out[:, column.point, rows.index(_component(column))] = 0.0
-    for column, values in zip(result.columns, result.values, strict=True):
-        if column.quantity == kind:
-            out[:, *(_place(column, axis) for axis in axes)] = values
+def _values(result: AnalysisResult, name: str) -> Array:
+    """Return a quantity as one array, zeros where it has no row, NaN for components that a point lacks."""
+    out = result.dense(name)
+    if "point" in QUANTITIES[name].axes:
+        components = result.rows.axes["component"].names
+        for number, point in enumerate(result.rows.points):
+            out[:, number, [at for at, row in enumerate(components) if row not in point.rows]] = np.nan
     return out
 
 
-def _place(column: Column, axis: NamedAxis) -> Any:
-    """Return the position of a column along an axis."""
-    match axis.dimension:
-        case "joint" | "link" | "point":
-            return getattr(column, axis.dimension)
-        case "component":
-            return axis.names.index(_component(column))
-        case "load" if column.load is not None:
-            return column.load
-        case _:
-            return column.cause
+HEAD = ("joint", "peak |τ|", "mean |τ|", "largest cause", "its share", "gave", "took back")
+
+
+def result_table(result: AnalysisResult) -> str:
+    """Return the HTML of a result; peaks, means, shares and work are over all samples of the movement.
+
+    Causes and shares are those of `--figure shares`.
+    """
+    joints, torques = result.robot.joints, result.rows["tau"].rows
+    mean, peak = result.totals.mean[torques], result.totals.peak[torques]
+    causes = causes_of(result, joints, together=are_motions_whole(result))
+    rows = []
+    for at, (i, loading) in enumerate(zip(result.robot.driven, sizes(result, causes).T, strict=True)):
+        unit = load_unit(result.robot.units[i])
+        most, whole = int(loading.argmax()), float(loading.sum())
+        rows.append(
+            (
+                joints[i],
+                f"{peak[at]:.4g} {unit}",
+                f"{mean[at]:.4g} {unit}",
+                causes[most].label if whole else "",
+                f"{100 * loading[most] / whole:.0f} %" if whole else "",
+                *_work(result.joint_work, i),
+            )
+        )
+    title = f"{result.robot.name}: who loads whom in {result.source}"
+    warnings = (*result.warnings, *result.load_warnings)
+    return page_part(title, table(HEAD, rows)) + remark(result.provenance, *warnings)
+
+
+def _work(work: Work, joint: int) -> tuple[str, str]:
+    """Return the work that a joint gave and the work that it took back, as text in J."""
+    return f"{float(np.asarray(work.given)[joint]):.4g} J", f"{float(np.asarray(work.taken)[joint]):.4g} J"

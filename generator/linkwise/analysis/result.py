@@ -13,8 +13,7 @@ from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.phases import PlacedPhase
-from linkwise.analysis.result_columns import Column
-from linkwise.analysis.result_quantities import Quantity
+from linkwise.analysis.result_rows import Column, ResultRows
 from linkwise.analysis.settings import Processing, Reading
 from linkwise.analysis.verify import Closure
 from linkwise.analysis.work import Work
@@ -28,18 +27,36 @@ PART_BYTES, LEAST = 4 << 20, 256
 
 @dataclass(frozen=True, eq=False)
 class Totals:
-    """Mean and largest magnitude of each column, (columns,), over every sample of the movement."""
+    """Mean and largest magnitude of each row, (rows,), over every sample of the movement."""
 
     mean: Array
     peak: Array
 
 
 @dataclass(frozen=True, eq=False)
-class AnalysisResult:
+class WholeMovement:
+    """Totals, work and errors over all samples of a movement; n joints, N links."""
+
+    totals: Totals
+    work: Work
+    """Work that each joint gave to each link and took back, (n, N) in J."""
+    joint_work: Work
+    """Work that each joint gave in all and took back, (n,) in J: ∫ τ_i q̇_i dt where positive, negative."""
+    load_work: Work
+    """Work that each joint gave against each load and took back, (n, loads) in J."""
+    contact_work: Work
+    """Work that each contact fed into each link as its frame slipped, and took back, (N, contacts) in J."""
+    closure: Closure
+    total: int
+    """Number of samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class AnalysisResult(WholeMovement):
     """Result of an analysis: S samples of every torque term, SI units; index order joint, link, cause.
 
-    `values` (columns, S) holds what `columns` names, of every sample, in memory or in a file behind it;
-    terms that are identically 0 have no column. n joints, N links.
+    `values` (rows, S) holds every sample of what `rows` lists quantity by quantity, and `columns` by name, in
+    memory or in a file behind it; terms that are identically 0 have no row. n joints, N links.
     """
 
     robot: LoadedRobot
@@ -49,25 +66,14 @@ class AnalysisResult:
     """Name of the log."""
     rate: float
     """Sampling rate in Hz."""
-    columns: tuple[Column, ...]
+    rows: ResultRows
     values: Array
-    totals: Totals
-    work: Work
-    """Work that each joint gave to each link and took back, (n, N) in J, over all samples."""
-    joint_work: Work
-    """Work that each joint gave in all and took back, (n,) in J: ∫ τ_i q̇_i dt where positive, negative."""
-    load_work: Work
-    """Work that each joint gave against each load and took back, (n, loads) in J."""
-    contact_work: Work
-    """Work that each contact fed into each link as its frame slipped, and took back, (N, contacts) in J."""
     loads: tuple[PlacedLoad, ...]
     induced: tuple[str, ...]
     """Points whose acceleration is split by source, in the columns that begin with acc."""
-    closure: Closure
     ignored: tuple[str, ...]
     """Columns of the log that belong to no joint."""
     warnings: tuple[str, ...]
-    total: int
     closed: ClosedLog | None = None
     """Largest violation of a constraint by positions of the log; None where no joints are tied."""
     times: ContactTimes | None = None
@@ -80,12 +86,16 @@ class AnalysisResult:
 
         Raises LinkwiseError for a name that no column has.
         """
-        for column, values in zip(self.columns, self.values, strict=True):
-            if column.name == name:
-                found: Array = values
-                return found
-        near = nearest_first(name, (c.name for c in self.columns))
-        raise LinkwiseError(f"no column {name!r}; nearest are {listed(map(repr, near))}")
+        table = self.table
+        if name not in table:
+            near = listed(map(repr, nearest_first(name, table)))
+            raise LinkwiseError(f"no column {name!r}; nearest are {near}")
+        return table[name]
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Rows of `values` with names, units and indices, as the Parquet file has them."""
+        return self.rows.columns
 
     @property
     def table(self) -> dict[str, Array]:
@@ -98,7 +108,7 @@ class AnalysisResult:
         Memory holds few samples at a time. Totals, work and closure of each result are those of the whole
         movement.
         """
-        most = max(LEAST, PART_BYTES // (8 * len(self.columns)))
+        most = max(LEAST, PART_BYTES // (8 * len(self.rows)))
         for at in range(0, self.values.shape[1], most):
             yield replace(self, values=self.values[:, at : at + most])
             let_go(self.values)
@@ -112,32 +122,32 @@ class AnalysisResult:
     @property
     def q(self) -> Array:
         """Joint coordinates (S, n) in rad or m, after the filter."""
-        return self._dense("q", 1)
+        return self.dense("q")
 
     @property
     def qd(self) -> Array:
         """Joint velocities (S, n) in rad/s or m/s."""
-        return self._dense("qd", 1)
+        return self.dense("qd")
 
     @property
     def qdd(self) -> Array:
         """Joint accelerations (S, n) in rad/s² or m/s²."""
-        return self._dense("qdd", 1)
+        return self.dense("qdd")
 
     @property
     def torque(self) -> Array:
         """Joint torques τ_i (S, n) in N·m or N."""
-        return self._dense("tau", 1)
+        return self.dense("tau")
 
     @property
     def partial_torque(self) -> Array:
         """Partial torques τ_ij (S, n, N), on joint i through link j, in N·m or N."""
-        return self._dense("tau_link", 2)
+        return self.dense("tau_link")
 
     @property
     def acceleration(self) -> Array:
         """τp_ij(q̈_k) (S, n, N, n), the part of τ_ij by the acceleration of coordinate k."""
-        return self._dense("tau_qdd", 3)
+        return self.dense("tau_qdd")
 
     @property
     def velocity(self) -> Array:
@@ -145,17 +155,17 @@ class AnalysisResult:
 
         It is in the convention of `processing`.
         """
-        return self._dense("tau_qd", 3)
+        return self.dense("tau_qd")
 
     @property
     def gravity(self) -> Array:
         """g_ij (S, n, N), the part of τ_ij by gravity and other potentials."""
-        return self._dense("tau_gravity", 2)
+        return self.dense("tau_gravity")
 
     @property
     def load_torque(self) -> Array:
         """τ_ie (S, n, loads), the torque of joint i that carries load e, in N·m or N."""
-        return self._filled("tau_load", len(self.robot.joints), len(self.loads))
+        return self.dense("tau_load")
 
     @property
     def load_labels(self) -> tuple[str, ...]:
@@ -168,12 +178,12 @@ class AnalysisResult:
 
         Σ_i P_ij = d(K_j + P_j)/dt, less what contacts feed into link j where they slip.
         """
-        return self._dense("power_link", 2)
+        return self.dense("power_link")
 
     @property
     def joint_power(self) -> Array:
         """Power P_i = τ_i q̇_i (S, n) in W of each joint."""
-        return self._dense("power", 1)
+        return self.dense("power")
 
     @property
     def load_warnings(self) -> tuple[str, ...]:
@@ -207,12 +217,12 @@ class AnalysisResult:
     @property
     def constraint_force(self) -> Array:
         """Force in each row of the constraints, (S, C), in N or N·m; no column without constraints."""
-        return self._filled("force", self._rows)
+        return self.dense("force")
 
     @property
     def constraint_force_by_link(self) -> Array:
         """Part of the constraint forces that each link causes, (S, N, C)."""
-        return self._filled("force_link", len(self.robot.links), self._rows)
+        return self.dense("force_link")
 
     @property
     def contact_wrench(self) -> Array:
@@ -223,40 +233,24 @@ class AnalysisResult:
         ground = self.robot.contacts
         if ground is None:
             return np.zeros((len(self.time), 0, 6))
-        forces = self.constraint_force[:, self._rows - len(ground.rows) :]
+        forces = self.constraint_force[:, self.robot.contact_rows]
         each = range(len(ground.names))
         return np.stack([ground.wrench(c, self.robot.model, self.q, forces) for c in each], axis=1)
 
-    @property
-    def _rows(self) -> int:
-        return len(self.robot.constraint_rows)
+    def dense(self, quantity: str) -> Array:
+        """Return a quantity over its axes, (S, *axes), zero where it has no row."""
+        return self.rows.dense(quantity, self.values)
 
     def is_ever_on(self, contact: int) -> bool:
         """Return whether a contact is on at any sample."""
-        peaks = zip(self.columns, self.totals.peak, strict=True)
-        return any(c.quantity == "contact" and c.cause == contact and peak > 0.0 for c, peak in peaks)
+        return bool(self.totals.peak[self.rows.numbers("contact", contact=contact)].any())
 
     def largest_slip(self, contact: int) -> tuple[float, float]:
         """Return a contact's largest slip velocities while it is on, in m/s and rad/s, over all samples."""
-        ground = self.robot.contacts
-        found = {"m/s": 0.0, "rad/s": 0.0}
-        for column, peak in zip(self.columns, self.totals.peak, strict=True):
-            if ground is None or column.quantity != "slip" or column.cause is None:
-                continue
-            if ground.owners[column.cause - self._rows + len(ground.rows)] == contact:
-                found[column.unit] = max(found[column.unit], float(peak))
-        return found["m/s"], found["rad/s"]
-
-    def _dense(self, quantity: Quantity, rank: int) -> Array:
-        """Return a quantity's columns as one array (S, n, N, n)[: rank + 1], zeros where none is."""
-        n, links = len(self.robot.joints), len(self.robot.links)
-        return self._filled(quantity, *(n, links, n)[:rank])
-
-    def _filled(self, quantity: Quantity, *shape: int) -> Array:
-        out = np.zeros((len(self.time), *shape))
-        for column, values in zip(self.columns, self.values, strict=True):
-            if column.quantity == quantity:
-                found = [x for x in (column.joint, column.link, column.cause) if x is not None]
-                index: tuple[slice | int, ...] = (slice(None), *found)
-                out[index] = values
-        return out
+        ground, (rows, _, at) = self.robot.contacts, self.rows["slip"]
+        found = {"m": 0.0, "rad": 0.0}
+        for peak, (row,) in zip(self.totals.peak[rows].tolist(), at.tolist(), strict=True):
+            if ground is not None and ground.owners[row - self.robot.contact_rows.start] == contact:
+                unit = self.rows.axes["constraint"].units[row]
+                found[unit] = max(found[unit], peak)
+        return found["m"], found["rad"]

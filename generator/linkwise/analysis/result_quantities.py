@@ -1,57 +1,37 @@
-"""Quantities of a result, what they mean, and which are made of which."""
+"""Quantities of a result: axes, unit and meaning of each, and which are made of which."""
 
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass
 
-Quantity = Literal[
-    "time",
-    "q",
-    "qd",
-    "qdd",
-    "tau",
-    "tau_link",
-    "tau_qdd",
-    "tau_qd",
-    "tau_gravity",
-    "tau_spring",
-    "tau_damping",
-    "tau_friction",
-    "tau_armature",
-    "tau_load",
-    "force",
-    "force_link",
-    "force_spring",
-    "force_damping",
-    "force_friction",
-    "force_armature",
-    "force_load",
-    "force_measured",
-    "tau_as_loads",
-    "contact",
-    "slip",
-    "power",
-    "power_link",
-    "power_load",
-    "power_contact",
-    "power_qdd",
-    "power_qd",
-    "power_gravity",
-    "power_spring",
-    "power_damping",
-    "power_friction",
-    "power_armature",
-    "acc",
-    "acc_tau",
-    "acc_qd",
-    "acc_gravity",
-    "acc_spring",
-    "acc_damping",
-    "acc_friction",
-    "acc_load",
-    "acc_constraint",
-    "acc_contact",
-    "acc_kinematic",
-]
-MEANING: dict[Quantity, str] = {
+from linkwise_runtime import call_table
+from linkwise_runtime.call_table import CALLS, PASSIVE_KINDS, PROPAGATION, TORQUE, Quantity
+
+TERMS = ("tau_qdd", "tau_qd", "tau_gravity")
+"""The parts that sum to a partial torque."""
+PASSIVE = {
+    "tau_spring": "stiffness",
+    "tau_damping": "damping",
+    "tau_friction": "friction",
+    "tau_armature": "armature",
+}
+"""Parts of a joint's torque beside those of the links, in the order of `passive_torque`, each with the field
+of a `PassiveEntry` that is zero where there is no such part."""
+TORQUE_OF = {
+    torque.replace("tau", "power", 1): torque for torque in ("tau", "tau_link", "tau_load", *TERMS, *PASSIVE)
+}
+"""The torque that a power is made of: P = τ q̇_i, term by term."""
+POWER, POWER_TERMS = tuple(TORQUE_OF)[:3], tuple(TORQUE_OF)[3:]
+"""Power of joints, and parts of it that are in a result only on request; contacts have power of their own, as
+they slip."""
+FORCE_OF = {torque: torque.replace("tau", "force", 1) for torque in (*PASSIVE, "tau_load")}
+"""Constraint forces due to the torques that stand beside those of the links, by torque."""
+FORCES = ("force", "force_link", *FORCE_OF.values())
+GROUND = ("contact", "slip", "force_measured", "tau_as_loads", "power_contact")
+"""Quantities of contacts beside the constraint forces."""
+LOSSES = ("acc_spring", "acc_damping", "acc_friction")
+"""Shares of passive torques in an acceleration, in the order of `passive_torque`."""
+
+MEANING = {
     "time": "time",
     "q": "joint coordinate",
     "qd": "joint velocity",
@@ -66,21 +46,21 @@ MEANING: dict[Quantity, str] = {
     "tau_friction": "what the joint takes for its own Coulomb friction",
     "tau_armature": "what the joint takes for its own armature, the inertia behind its gear",
     "tau_load": "what the joint takes to bear the load",
+    "tau_as_loads": "joint torque with what was measured in place of what contacts bear",
     "force": "what the constraint bears: all links together, what joints have of their own, and loads",
     "force_link": "what the constraint bears of the link",
+    "force_load": "what the constraint bears of the load",
     "force_spring": "what the constraint bears of joints' own springs",
     "force_damping": "what the constraint bears of joints' own damping",
     "force_friction": "what the constraint bears of joints' own Coulomb friction",
     "force_armature": "what the constraint bears of joints' own armatures",
-    "force_load": "what the constraint bears of the load",
     "force_measured": "what was measured of the contact",
-    "tau_as_loads": "joint torque with what was measured in place of what contacts bear",
     "contact": "share of the contact in what several could bear; 0 while it is off",
     "slip": "velocity of what the contact holds, while it is on",
     "power": "power of the joint: what it sends into all links together, what it has of its own, and loads",
     "power_link": "power that the joint sends into the link",
-    "power_contact": "power that the contact feeds into the link as what it holds slips",
     "power_load": "power that the joint sends out against the load",
+    "power_contact": "power that the contact feeds into the link as what it holds slips",
     "power_qdd": "power that the joint sends into the link, by the cause's acceleration",
     "power_qd": "power that the joint sends into the link, by the cause's velocity",
     "power_gravity": "power that the joint sends into the link, by gravity and other potentials",
@@ -95,60 +75,112 @@ MEANING: dict[Quantity, str] = {
     "acc_spring": "acceleration by the spring of the cause's joint alone",
     "acc_damping": "acceleration by the damping of the cause's joint alone",
     "acc_friction": "acceleration by the Coulomb friction of the cause's joint alone",
+    "acc_armature": "none, as an armature is inertia; it is an entry of the array with the other three",
     "acc_load": "acceleration by the load alone",
     "acc_constraint": "acceleration by constraints that turn with the cause's velocity",
     "acc_contact": "acceleration by what the contact itself does, as what it holds turns and slips",
     "acc_kinematic": "acceleration of the point by the cause's velocity, without any of a joint",
 }
-INDUCED: tuple[Quantity, ...] = (
-    "acc",
-    "acc_tau",
-    "acc_qd",
-    "acc_gravity",
-    "acc_spring",
-    "acc_damping",
-    "acc_friction",
-    "acc_load",
-    "acc_constraint",
-    "acc_contact",
-    "acc_kinematic",
-)
-"""An acceleration, and its shares by source."""
-TERMS: tuple[Quantity, ...] = ("tau_qdd", "tau_qd", "tau_gravity")
-"""The parts that sum to a partial torque."""
-PASSIVE: dict[Quantity, str] = {
-    "tau_spring": "stiffness",
-    "tau_damping": "damping",
-    "tau_friction": "friction",
-    "tau_armature": "armature",
+ARRAYS = {
+    "time": "time",
+    "q": "q joint",
+    "qd": "qd joint",
+    "qdd": "qdd joint",
+    "tau": "torque joint",
+    "tau_load": "load_torque joint load",
+    "tau_as_loads": "torque_as_loads joint",
+    "force": "constraint_force constraint",
+    "force_link": "constraint_force_by_link link constraint",
+    "force_load": "constraint_force_by_load constraint load",
+    "force_measured": "measured_force constraint",
+    "contact": "contact_share contact",
+    "slip": "slip constraint",
+    "power": "joint_power joint",
+    "power_link": "power joint link",
+    "power_load": "load_power joint load",
+    "power_contact": "contact_power link contact",
+    "acc": "induced point component",
+    "acc_tau": "induced_actuators point component cause",
+    "acc_qd": "induced_velocity point component link cause",
+    "acc_gravity": "induced_gravity point component link",
+    "acc_load": "induced_loads point component load",
+    "acc_constraint": "induced_constraints point component cause",
+    "acc_contact": "induced_contacts point component contact",
+    "acc_kinematic": "induced_kinematic point component cause",
 }
-"""Parts of a joint's torque beside those of the links, in the order of `passive_torque`, each with the field
-of a `PassiveEntry` that is zero where there is no such part."""
-POWER: tuple[Quantity, ...] = ("power", "power_link", "power_load")
-"""Power of joints, torque times velocity; contacts have power of their own, as they slip."""
-POWER_TERMS: tuple[Quantity, ...] = (
-    "power_qdd",
-    "power_qd",
-    "power_gravity",
-    "power_spring",
-    "power_damping",
-    "power_friction",
-    "power_armature",
-)
-"""Parts of the power that a joint sends into a link or its passive elements; in a result only on request."""
-TORQUE_OF: dict[Quantity, Quantity] = dict(
-    zip((*POWER, *POWER_TERMS), ("tau", "tau_link", "tau_load", *TERMS, *PASSIVE), strict=True)
-)
-"""The torque that a power is made of: P = τ q̇_i, term by term."""
+"""Name and axes of the array that a quantity is, among the arrays of a Dataset."""
+BY_SOURCE = {
+    "force": (
+        "constraint_force_by_source constraint",
+        "what the constraint bears of what joints have of their own",
+    ),
+    "power": ("passive_power joint", "power that the joint sends into what it has of its own"),
+    "acc": (
+        "induced_passive point component cause",
+        "acceleration by spring, damping and friction of the cause's joint alone",
+    ),
+}
+"""Name with axes, and meaning, of arrays in which springs, damping and so on stand side by side."""
+UNITS = {"tau": TORQUE, "force": "torque:constraint", "power": "W", "acc": "acceleration:component"}
+UNITS |= {"time": "s", "q": "position:joint", "qd": "velocity:joint", "qdd": "acceleration:joint"}
+UNITS |= {"contact": "", "slip": "velocity:constraint"}
+"""Unit by the first part of a name, as the runtime writes it: torque:joint depends on the joint."""
+OF_PACKAGES = {
+    "tau_link": CALLS["partial_torque"].answers[0],
+    **dict(zip(TERMS, PROPAGATION, strict=True)),
+    **dict(zip(PASSIVE, call_table.PASSIVE, strict=True)),
+    **dict(zip(POWER_TERMS, call_table.POWER, strict=False)),
+}
+"""Arrays that are called as those of `robot.labelled` in a package."""
+LINK_LAST = ("constraint", "contact", "link")
+"""Order of these axes in names of columns; an array has the link first."""
 
-FORCE_OF: dict[Quantity, Quantity] = {
-    "tau_spring": "force_spring",
-    "tau_damping": "force_damping",
-    "tau_friction": "force_friction",
-    "tau_armature": "force_armature",
-    "tau_load": "force_load",
+
+@dataclass(frozen=True)
+class ResultQuantity:
+    """A quantity of a result: an array over time and along its axes, whose entries are columns."""
+
+    name: str
+    """Name, which those of its columns begin with; shares by link begin as their sum does."""
+    meaning: str
+    array: Quantity
+    """Array of a Dataset that this is, or of which it is an entry along a further axis."""
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Axes after that of time: joint, link, cause, load, constraint, contact, point, component."""
+        return self.array.axes
+
+    @property
+    def written_axes(self) -> tuple[str, ...]:
+        """Axes in their order in names of columns."""
+        moved = iter(sorted(set(LINK_LAST).intersection(self.axes), key=LINK_LAST.index))
+        return tuple(next(moved) if axis in LINK_LAST else axis for axis in self.axes)
+
+
+def _array(name: str) -> Quantity:
+    if name in OF_PACKAGES:
+        return OF_PACKAGES[name]
+    first, _, source = name.partition("_")
+    beside = ("source", source) if source in PASSIVE_KINDS else None
+    text, meaning = (ARRAYS[name], MEANING[name]) if beside is None else BY_SOURCE[first]
+    array, *axes = text.split()
+    return Quantity(array, tuple(axes), UNITS[first], meaning, beside)
+
+
+QUANTITIES: Mapping[str, ResultQuantity] = {
+    name: ResultQuantity(name, meaning, _array(name)) for name, meaning in MEANING.items()
 }
-"""Constraint forces due to the torques that stand beside those of the links, by torque."""
-FORCES: tuple[Quantity, ...] = ("force", "force_link", *FORCE_OF.values())
-GROUND: tuple[Quantity, ...] = ("contact", "slip", "force_measured", "tau_as_loads", "power_contact")
-"""Quantities of contacts beside the constraint forces."""
+"""All quantities by name, in the order of a Dataset."""
+INDUCED = tuple(name for name in QUANTITIES if name.partition("_")[0] == "acc")
+"""An acceleration, and its shares by source."""
+WORKS: Mapping[str, Quantity] = {
+    name: Quantity(name, axes, "J", meaning)
+    for name, axes, meaning in (
+        ("work", ("joint", "link"), "what the joint gave to the link, and took back"),
+        ("joint_work", ("joint",), "what the joint gave to all links together, and took back"),
+        ("load_work", ("joint", "load"), "what the joint gave against the load, and took back"),
+        ("contact_work", ("link", "contact"), "what the contact fed into the link, and took back"),
+    )
+}
+"""Work over the whole movement, by the result's own names."""

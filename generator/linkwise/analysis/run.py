@@ -66,7 +66,7 @@ def analyze(
         (reading or Reading(), processing or Processing()),
     )
     job = prepared(Path(log), loaded, *made, borne, held, progress, wanted)
-    with EverySample(len(job.decomposer.columns), job.count) as kept:
+    with EverySample(len(job.columns), job.count) as kept:
         return job.analysis(job.run(kept, progress), kept.values)
 
 
@@ -96,12 +96,11 @@ def analyze_to(
             raise LinkwiseError(f"--out {out} is to be replaced and holds the log {file}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:
         job = prepared(log, robot, reading, processing, loads, contacts, progress, wanted, draft)
-        columns = job.decomposer.columns
         note = json_text(job.note())
         keep = (job.count, draft) if wanted.page or wanted.figures else (0, None)
         with (
-            open_table(draft / f"analysis.{wanted.table}", columns, note) as table,
-            EverySample(len(columns), *keep) as kept,
+            open_table(draft / f"analysis.{wanted.table}", job.columns, note) as table,
+            EverySample(len(job.columns), *keep) as kept,
         ):
 
             def sink(block: Array) -> None:

@@ -11,10 +11,11 @@ from linkwise.analysis.disk_rows import collected, first_column
 from linkwise.analysis.even_time import TOLERANCE, even_rate, resampled
 from linkwise.analysis.follower_columns import FollowerColumns, FollowingJoint
 from linkwise.analysis.logs import Log
-from linkwise.analysis.logs.finite import require_finite
+from linkwise.analysis.logs.log_checks import require_finite
 from linkwise.analysis.settings import Reading
 from linkwise.errors import within
 from linkwise.package.load import Array
+from linkwise.package.manifest import BodyEntry
 from linkwise.progress import Progress
 
 SLOW = 5.0
@@ -124,3 +125,68 @@ def _thinned(rate: float, wanted: float | None) -> tuple[str, ...]:
         f"--resample {wanted:g} of {rate:.6g} samples a second: what moves faster than {wanted / 2:g} Hz"
         f" comes out as something slower; resample at {rate:.6g} or more",
     )
+
+
+NEAR = 10.0
+"""Least factor by which the outer turns magnify errors of a log's angles, near a pole, to be reported."""
+AT_ONCE = 1 << 16
+
+
+def pole_warnings(
+    bodies: Sequence[BodyEntry] | None, joints: Sequence[str], samples: Samples
+) -> Iterator[str]:
+    """Yield a warning for three successive turns about one point that a log brings near their pole.
+
+    With z1, z2, z3 their axes, |z1 . z2 x z3| is largest where the middle turn is a right angle away from
+    the pole. Nearer, an error of an orientation is an error of the outer angles by the inverse of that
+    number, as a fraction of its largest.
+    """
+    for first, middle, last in _triples(bodies or ()):
+        angles = samples.q[:, middle.coordinate]
+        places = range(0, len(angles), AT_ONCE)
+        sizes = [_apart(middle, last, np.asarray(angles[at : at + AT_ONCE])) for at in places]
+        least = [(float(part.min()), at + int(part.argmin())) for at, part in zip(places, sizes, strict=True)]
+        size, row = min(least, default=(1.0, 0))
+        if size * NEAR < 1.0:
+            turns = [repr(joints[body.coordinate]) for body in (first, middle, last)]
+            yield _near(turns, size, float(samples.time[row]))
+
+
+def _near(turns: Sequence[str], size: float, time: float) -> str:
+    first, middle, last = turns
+    return (
+        f"{middle} is {np.degrees(np.arcsin(size)):.2g} degrees from where {first} and {last} turn about one "
+        f"axis, at {time:.6g} s: what is wrong with the orientation there is wrong with these two by "
+        f"{1.0 / max(size, 1e-16):.3g} times as much, and with their rates and accelerations by more; do not "
+        "rest on them there, or write the turns in another order"
+    )
+
+
+def _triples(bodies: Sequence[BodyEntry]) -> Iterator[tuple[BodyEntry, BodyEntry, BodyEntry]]:
+    """Yield three turns that follow each other at one point, with no mass between."""
+    for last in bodies:
+        middle = None if last.parent is None else bodies[last.parent]
+        if middle is None or middle.parent is None:
+            continue
+        first = bodies[middle.parent]
+        alike = all(body.kind == "revolute" and body.curve is None for body in (first, middle, last))
+        together = not any((*middle.translation, *last.translation, first.mass, middle.mass))
+        if alike and together:
+            yield first, middle, last
+
+
+def _apart(middle: BodyEntry, last: BodyEntry, angles: Array) -> Array:
+    """Return |z1 . z2 x z3| (S,) at angles (S,) of the middle turn, as a fraction of its largest value.
+
+    Axes are those of the first turn.
+    """
+    z2 = np.array(middle.rotation)[:, 2]
+    x, y, z = np.array(last.rotation)[:, 2]
+    cosine, sine = np.cos(middle.ratio * angles), np.sin(middle.ratio * angles)
+    turned = np.stack([cosine * x - sine * y, sine * x + cosine * y, np.full_like(cosine, z)])
+    z3 = np.array(middle.rotation) @ turned
+    largest = np.hypot(z2[0], z2[1]) * np.hypot(x, y)
+    if largest == 0.0:
+        return np.ones_like(angles)  # two of the axes coincide at every angle, which no angle changes
+    found: Array = np.abs(z2[0] * z3[1] - z2[1] * z3[0]) / largest
+    return found

@@ -2,43 +2,29 @@
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.analysis.derivatives import derivatives
 from linkwise.analysis.disk_rows import let_go
-from linkwise.analysis.result import Totals
+from linkwise.analysis.filtering import derivatives
+from linkwise.analysis.result import Totals, WholeMovement
 from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import Processing
 from linkwise.analysis.torques import Decomposer
 from linkwise.analysis.verify import Closure, against_recursion
-from linkwise.analysis.work import Work, WorkSum
+from linkwise.analysis.work import WorkSum
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 Sink = Callable[[Array], None]
-"""A sink is given one block (columns, samples) after the other; the block is the sink's own."""
+"""A sink is given one block (rows, samples) after the other; the block is the sink's own."""
 
 INNER, LEAST = 4096, 1024
 """Most and fewest samples computed at once: intermediate values stay in the cache; fewer for wide results."""
 
 BLOCK_BYTES = 48 << 20
 """Approximate size in bytes of a block handed on: some three of them are in memory at any time."""
-
-
-@dataclass(frozen=True)
-class Streamed:
-    """Totals, work, closure and number of samples, known once every block is done."""
-
-    totals: Totals
-    work: Work
-    joint_work: Work
-    load_work: Work
-    contact_work: Work
-    closure: Closure
-    samples: int
 
 
 def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
@@ -58,21 +44,21 @@ def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
 
 def stream(
     samples: Samples, decomposer: Decomposer, processing: Processing, sink: Sink, progress: Progress
-) -> Streamed:
+) -> WholeMovement:
     """Send every block to `sink`, which works in a thread beside the computation.
 
     Raises LinkwiseError for too few samples, results that overflow, and a robot whose torques do not add up.
     """
     start, stop = span_of(samples, processing)
-    total = np.zeros(len(decomposer.columns))
-    peak = np.zeros(len(decomposer.columns))
-    work = WorkSum(decomposer.columns)
+    total = np.zeros(len(decomposer.rows))
+    peak = np.zeros(len(decomposer.rows))
+    work = WorkSum(decomposer.rows)
     closure = Closure()
-    inner = _at_once(len(decomposer.columns))
+    inner = _at_once(len(decomposer.rows))
     with ThreadPoolExecutor(1) as writer, np.errstate(over="ignore", invalid="ignore"):
         pending: Future[None] | None = None
-        for first, last in _blocks(start, stop, len(decomposer.columns)):
-            block = np.empty((len(decomposer.columns), last - first))
+        for first, last in _blocks(start, stop, len(decomposer.rows)):
+            block = np.empty((len(decomposer.rows), last - first))
             for at in range(first, last, inner):
                 end = min(at + inner, last)
                 q, qd, qdd = derivatives(samples.q, samples.rate, at, end, processing)
@@ -85,7 +71,7 @@ def stream(
                 total += added
                 np.maximum(peak, magnitude.max(axis=1), out=peak)
                 work(out)
-            closure |= against_recursion(decomposer.robot, decomposer.loads, decomposer.columns, block)
+            closure |= against_recursion(decomposer.robot, decomposer.loads, decomposer.rows, block)
             closure.check()
             if pending is not None:
                 pending.result()
@@ -94,24 +80,22 @@ def stream(
             progress("analysing", last - start, stop - start)
         if pending is not None:
             pending.result()
-    robot = decomposer.robot
-    contacts = 0 if robot.contacts is None else len(robot.contacts.names)
-    sizes = len(robot.joints), len(robot.links), len(decomposer.loads), contacts
-    works = work.work(1 / samples.rate, *sizes)
-    return Streamed(Totals(total / (stop - start), peak), *works, closure, stop - start)
+    totals, works = Totals(total / (stop - start), peak), work.work(1 / samples.rate)
+    return WholeMovement(totals, *works, closure, stop - start)
 
 
 def _overflow(samples: Samples, decomposer: Decomposer, out: Array, start: int) -> LinkwiseError:
     """Return an error that says where the first result that is not finite stands, by time.
 
-    Columns come cause before effect.
+    Rows come cause before effect.
     """
     bad = ~np.isfinite(out)
     at = int(bad.any(axis=0).argmax())
     column = int(bad[:, at].argmax()) if bad.any() else int(np.abs(out).max(axis=1).argmax())
     row = "" if samples.first_row is None else f"row {samples.first_row + start + at}, "
+    name = decomposer.rows.columns[column].name
     return LinkwiseError(
-        f"{row}time {samples.time[start + at]:.6g} s: result column {decomposer.columns[column].name!r} is"
+        f"{row}time {samples.time[start + at]:.6g} s: result column {name!r} is"
         f" {out[column, at]:.3g}; the log's values are too large{_largest(samples, decomposer, start + at)}"
     )
 

@@ -1,85 +1,48 @@
-"""Result tables on disk, written block by block: Parquet, or CSV."""
+"""Results on disk: tables written block by block, Parquet or CSV, and the record of all else."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Literal, Protocol, Self
+from typing import Any, Literal
 
-from linkwise.analysis.result_columns import Column
+from linkwise.analysis.closed_motion import ClosedLog
+from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import MEANING
+from linkwise.analysis.result_rows import Column
+from linkwise.analysis.settings import choices
+from linkwise.analysis.work import Work
 from linkwise.extras import extra
 from linkwise.package.load import Array
 
 Format = Literal["parquet", "csv"]
 
 
-class ResultTable(Protocol):
-    """A sink that is closed at the end."""
+@contextmanager
+def open_table(path: Path, columns: Sequence[Column], note: str) -> Iterator[Callable[[Array], None]]:
+    """Open `path`, .parquet or .csv, and give the function that writes a block (columns, samples) to it.
 
-    def __enter__(self) -> Self:
-        """Open the table; the file exists from now on."""
+    note: JSON that is kept in a Parquet file's schema
+    """
+    if path.suffix == ".csv":
+        with path.open("w", encoding="utf-8", newline="") as file:
+            rows = csv.writer(file)
+            rows.writerow(column.name for column in columns)
+            yield lambda block: rows.writerows(block.T.tolist())  # numbers that read back exactly
+        return
+    arrow = extra("pyarrow")
+    fields = [arrow.field(c.name, arrow.float64(), False, _metadata(c)) for c in columns]
+    schema = arrow.schema(fields, {"linkwise": note})
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the table."""
+    def write(block: Array) -> None:
+        batch = arrow.record_batch(list(map(arrow.array, block)), schema=schema)
+        writer.write_batch(batch, row_group_size=block.shape[1])
 
-    def __call__(self, block: Array) -> None:
-        """Write a block (columns, samples)."""
-
-
-def open_table(path: Path, columns: Sequence[Column], note: str) -> ResultTable:
-    """Open `path`, .parquet or .csv, to write; `note`, JSON, is kept in a Parquet file's schema."""
-    return CsvTable(path, columns) if path.suffix == ".csv" else ParquetTable(path, columns, note)
-
-
-class ParquetTable:
-    """Parquet with float64 columns; unit, meaning and indices are in each field's metadata."""
-
-    def __init__(self, path: Path, columns: Sequence[Column], note: str) -> None:
-        self._arrow = arrow = extra("pyarrow")
-        fields = [arrow.field(c.name, arrow.float64(), False, _metadata(c)) for c in columns]
-        self._schema = arrow.schema(fields, {"linkwise": note})
-        # Torques hardly repeat, so that a dictionary would only cost time; long rests do compress.
-        self._writer: Any = extra("pyarrow.parquet").ParquetWriter(
-            path, self._schema, compression="snappy", use_dictionary=False, write_statistics=False
-        )
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._writer.close()
-
-    def __call__(self, block: Array) -> None:
-        """Write a block (columns, samples) as one row group."""
-        arrow = self._arrow
-        arrays = [arrow.array(values) for values in block]
-        batch = arrow.record_batch(arrays, schema=self._schema)
-        self._writer.write_batch(batch, row_group_size=block.shape[1])
-
-
-class CsvTable:
-    """CSV with a header; numbers are written so that they read back exactly."""
-
-    def __init__(self, path: Path, columns: Sequence[Column]) -> None:
-        self._file = path.open("w", encoding="utf-8", newline="")
-        self._writer = csv.writer(self._file)
-        self._writer.writerow(column.name for column in columns)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._file.close()
-
-    def __call__(self, block: Array) -> None:
-        """Write a block (columns, samples)."""
-        self._writer.writerows(block.T.tolist())
+    # Torques hardly repeat, so that a dictionary would only cost time; long rests do compress.
+    how = {"compression": "snappy", "use_dictionary": False, "write_statistics": False}
+    with extra("pyarrow.parquet").ParquetWriter(path, schema, **how) as writer:
+        yield write
 
 
 def _metadata(column: Column) -> dict[str, str]:
@@ -89,3 +52,97 @@ def _metadata(column: Column) -> dict[str, str]:
         "meaning": MEANING[column.quantity],
         **{name: str(at) for name, at in indices.items() if at is not None},
     }
+
+
+SCHEMA = 2
+"""Version of the record's fields."""
+
+
+def record(result: AnalysisResult) -> dict[str, Any]:
+    """Return everything but the samples as plain data: choices, closure, columns and their totals."""
+    robot = result.robot
+    return {
+        "schema": SCHEMA,
+        "log": result.source,
+        "robot": {
+            "name": robot.name,
+            "joints": list(robot.joints),
+            "links": list(robot.links),
+            "backend": robot.backend,
+            "manifest_sha256": robot.manifest_sha256,
+        },
+        **choices(result.reading, result.processing),
+        "payloads": [payload.record() for payload in robot.payloads],
+        "rate_hz": result.rate,
+        "samples": result.total,
+        "loads": [borne.record() for borne in result.loads],
+        "induced": list(result.induced),
+        "phases": [phase.told for phase in result.phases],
+        "closure": asdict(result.closure),
+        **({} if result.closed is None else {"constraints": _constraints(result, result.closed)}),
+        **({} if robot.contacts is None else {"contacts": _contacts(result)}),
+        "work": _work(result),
+        "ignored_columns": list(result.ignored),
+        "warnings": [*result.warnings, *result.load_warnings],
+        "columns": [
+            {
+                "name": column.name,
+                "unit": column.unit,
+                "meaning": MEANING[column.quantity],
+                "mean_magnitude": float(mean),
+                "peak_magnitude": float(peak),
+            }
+            for column, mean, peak in zip(result.columns, result.totals.mean, result.totals.peak, strict=True)
+        ],
+    }
+
+
+def _constraints(result: AnalysisResult, closed: ClosedLog) -> dict[str, Any]:
+    tied = result.robot.constrained
+    names = () if tied is None else tied.constraints.independent
+    return {"independent": list(names), **closed.record()}
+
+
+def _contacts(result: AnalysisResult) -> dict[str, Any]:
+    record = result.robot.ground.record(result.robot.joints)
+    for number, one in enumerate(record["held"]):
+        one |= {} if result.times is None else result.times.record(number)
+        one["largest_slip"] = dict(zip(("m/s", "rad/s"), result.largest_slip(number), strict=True))
+    return record
+
+
+def _work(result: AnalysisResult) -> dict[str, Any]:
+    """Return the work in J of each joint in all, into each link that it moves, and against each load.
+
+    Work of contacts is added where there are any.
+    """
+    joints, links = result.robot.joints, result.robot.links
+
+    def entry(work: Work, *at: int) -> dict[str, float]:
+        given, taken = float(work.given[at]), float(work.taken[at])
+        return {"given": given, "taken_back": taken, "net": given - taken}
+
+    borne, pairs = (result.rows[name].at.tolist() for name in ("power_load", "power_link"))
+    return {
+        "unit": "J",
+        "of_joints": [{"joint": name, **entry(result.joint_work, i)} for i, name in enumerate(joints)],
+        "into_links": [{"joint": joints[i], "link": links[j], **entry(result.work, i, j)} for i, j in pairs],
+        "against_loads": [
+            {"joint": joints[i], "load": result.loads[e].name, **entry(result.load_work, i, e)}
+            for i, e in borne
+        ],
+        **_fed(result, entry),
+    }
+
+
+def _fed(result: AnalysisResult, entry: Callable[..., dict[str, float]]) -> dict[str, Any]:
+    """Return the work of contacts that slip, where there are any."""
+    ground, links = result.robot.contacts, result.robot.links
+    if ground is None:
+        return {}
+    fed = [
+        {"contact": name, "link": link, **entry(result.contact_work, j, c)}
+        for c, name in enumerate(ground.names)
+        for j, link in enumerate(links)
+    ]
+    return {"of_contacts": fed}

@@ -1,29 +1,36 @@
 """Torque terms that a model has values of, and their places among its packed values."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
 from linkwise_runtime.structure import Layout
+from numpy.typing import NDArray
+
+Rows = NDArray[np.intp]
 
 
-class TermRows(NamedTuple):
-    """Rows (i, j, source), or (i, j, k, source), of each kind of term, sorted.
+class TermArrays(NamedTuple):
+    """Something of each kind of term, by the names that `Layout` and packed values have for these."""
+
+    acceleration: Any
+    velocity: Any
+    gravity: Any
+    torque: Any
+
+
+NAMES = TermArrays._fields
+
+
+def term_rows(layout: Layout) -> TermArrays:
+    """Return rows (i, j, source), or (i, j, k, source), of each kind of term of a layout, sorted.
 
     The source is the term's place among the packed values.
     """
 
-    acceleration: tuple[tuple[int, ...], ...]
-    velocity: tuple[tuple[int, ...], ...]
-    gravity: tuple[tuple[int, ...], ...]
-    torque: tuple[tuple[int, ...], ...]
-
-
-def term_rows(layout: Layout) -> TermRows:
-    """Return the rows of all terms of a layout."""
-
     def numbered(rows: list[list[int]]) -> tuple[tuple[int, ...], ...]:
         return tuple(sorted((*row, at) for at, row in enumerate(rows)))
 
-    return TermRows(
+    return TermArrays(
         tuple(mirrored(layout)),
         numbered(layout.velocity.tolist()),
         numbered(layout.gravity.tolist()),

@@ -15,22 +15,22 @@ from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.induced_shares import InducedShares
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
-from linkwise.analysis.result_columns import Column, Key, columns_of, load_unit
-from linkwise.analysis.result_quantities import PASSIVE, TERMS, TORQUE_OF, Quantity
+from linkwise.analysis.result_quantities import PASSIVE, POWER, POWER_TERMS, QUANTITIES, TERMS, TORQUE_OF
+from linkwise.analysis.result_rows import QuantityRows, ResultRows, torque_places
 from linkwise.analysis.settings import Convention
-from linkwise.analysis.term_rows import TermRows, term_rows
+from linkwise.analysis.term_rows import TermArrays, term_rows
 from linkwise.analysis.verify import Closure, residual, worst_of
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.package.load import Array
 
-Source = tuple[int, int, int]
-"""Row of the result, column of the packed values, the coordinate that multiplies (-1: none)."""
+Sum = tuple[int, int, list[int]]
+"""Joint and row of a torque, and the rows of what it is the sum of."""
 
 
 @dataclass(frozen=True)
 class Decomposer:
-    """Computes blocks of the result, stored by column: (columns, samples).
+    """Computes blocks of the result, stored row by row: (rows, samples).
 
     With q̈_k and q̇_k the coordinates' motion, and index order joint i, link j, coordinate k:
     τ_i = Σ_j τ_ij + passive torques of the joint + Σ_e τ_ie, with τ_ie = −J_iᵀ (n, f) of load e
@@ -43,14 +43,13 @@ class Decomposer:
     robot: LoadedRobot
     loads: tuple[PlacedLoad, ...]
     convention: Convention
-    columns: tuple[Column, ...]
-    sources: dict[Quantity, tuple[Source, ...]]
-    parts: tuple[tuple[int, tuple[int, ...]], ...]
-    """Row of each τ_ij, and the rows of its terms."""
-    wholes: tuple[tuple[int, tuple[int, ...]], ...]
-    """Row of each τ_i, and the rows of its parts: τ_ij, passive torques of the joint, τ_ie."""
-    powers: tuple[tuple[int, int, int], ...]
-    """Row of each power, the row of its torque, and the joint whose velocity multiplies."""
+    rows: ResultRows
+    sources: TermArrays
+    """Places of the rows of τ_ij and its terms among packed values, for each kind in the order of rows."""
+    parts: tuple[Sum, ...]
+    """Terms of each τ_ij."""
+    wholes: tuple[Sum, ...]
+    """Parts of each τ_i: τ_ij, passive torques of the joint, τ_ie."""
     induced: InducedShares
     forces: BorneForces
     times: ContactTimes | None
@@ -68,42 +67,24 @@ class Decomposer:
         times: ContactTimes | None = None,
     ) -> "Decomposer":
         """Plan where each packed value of the robot goes."""
-        rows, terms = term_rows(robot.model.layout), None
+        of_robot, terms = term_rows(robot.model.layout), None
         if robot.contacts is not None:
-            terms = ContactTerms.of(rows, robot.contacts)
-            rows = terms.rows
+            terms = ContactTerms.of(of_robot, robot.contacts)
+            of_robot = terms.rows
         measured = [] if times is None else [at for at, loads in enumerate(times.measured) if loads]
-        columns = columns_of(robot, rows, loads, power_terms, measured)
-        row = {column.key: at for at, column in enumerate(columns)}
-        parts = [
-            (at, _rows(columns, TERMS, joint=c.joint, link=c.link))
-            for at, c in enumerate(columns)
-            if c.quantity == "tau_link"
-        ]
-        wholes = [
-            (at, _rows(columns, ("tau_link", *PASSIVE, "tau_load"), joint=c.joint))
-            for at, c in enumerate(columns)
-            if c.quantity == "tau"
-        ]
-        powers = [
-            (at, row[TORQUE_OF[c.quantity], c.joint, c.link, c.cause], c.joint)
-            for at, c in enumerate(columns)
-            if c.quantity in TORQUE_OF and c.joint is not None
-        ]
-        sources = _sources(rows, row)
-        induced = InducedShares.of(robot, points, columns, [borne.name for borne in loads])
-        planned = tuple(parts), tuple(wholes), tuple(powers)
-        every = (*columns, *induced.columns)
+        places = torque_places(robot, of_robot, loads, power_terms, measured)
+        induced = InducedShares.of(robot, points, ResultRows.of(robot, places, loads))
+        rows = ResultRows.of(robot, [*places, *induced.places], loads, points)
+        sources = TermArrays(*([row[-1] for row in some] for some in of_robot))
+        parts = _sums(rows, "tau_link", *TERMS)
+        wholes = _sums(rows, "tau", "tau_link", *PASSIVE, "tau_load")
         forces = BorneForces(robot, tuple(loads), times)
-        return cls(robot, tuple(loads), convention, every, sources, *planned, induced, forces, times, terms)
-
-    def rows(self, quantity: Quantity) -> slice:
-        """Return the slice of a quantity's columns, which stand together."""
-        found = [at for at, column in enumerate(self.columns) if column.quantity == quantity]
-        return slice(found[0], found[-1] + 1) if found else slice(0, 0)
+        return cls(
+            robot, tuple(loads), convention, rows, sources, parts, wholes, induced, forces, times, terms
+        )
 
     def fill(self, out: Array, time: Array, q: Array, qd: Array, qdd: Array) -> Closure:
-        """Fill `out` (columns, S) from time (S,) and q, qd, qdd (S, n); return how well it closes.
+        """Fill `out` (rows, S) from time (S,) and q, qd, qdd (S, n); return how well it closes.
 
         Where joints are tied, the motion of the independent ones counts. Raises LinkwiseError, with the time,
         where ties cannot be closed or joints do not follow.
@@ -123,28 +104,26 @@ class Decomposer:
         if standing is not None and self.terms is not None:
             packed = self.terms.left(packed, standing, q.shape[1])
         out[0] = time
-        out[self.rows("q")], out[self.rows("qd")], out[self.rows("qdd")] = q.T, qd.T, qdd.T
-        out[self.rows("tau")] = _left(standing, free).T[list(self.robot.driven)]
+        rows, sources = self.rows, self.sources
+        for name, motion in zip(("q", "qd", "qdd"), (q, qd, qdd), strict=True):
+            rows.put(out, name, motion)
+        rows.put(out, "tau", _left(standing, free))
         self._add_passive(out, standing, q, qd, qdd)
         self._add_loads(out, standing, time, q)
-        for row, source, _ in self.sources["tau_link"]:
-            out[row] = packed.torque[..., source]
-        for row, source, k in self.sources["tau_qdd"]:
-            np.multiply(packed.acceleration[..., source], qdd[:, k], out=out[row])
-        for row, source, k in self.sources["tau_qd"]:
-            np.multiply(packed.velocity[..., source], qd[:, k], out=out[row])
-        for row, source, _ in self.sources["tau_gravity"]:
-            out[row] = packed.gravity[..., source]
-        self.forces.fill(out, self.columns, standing, time, (q, qd, qdd), partial)
+        _spread(out, rows["tau_link"], packed.torque, sources.torque)
+        _spread(out, rows["tau_qdd"], packed.acceleration, sources.acceleration, qdd)
+        _spread(out, rows["tau_qd"], packed.velocity, sources.velocity, qd)
+        _spread(out, rows["tau_gravity"], packed.gravity, sources.gravity)
+        self.forces.fill(out, rows, standing, time, (q, qd, qdd), partial)
         closure = self._closure(out, partial) | self.induced.fill(out, unborne, standing, q, qd, qdd)
         if self.convention == "gradient":
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
-            velocity = _left(standing, velocity)
-            for column, values in zip(self.columns, out, strict=True):
-                if column.quantity == "tau_qd":
-                    values[:] = velocity[:, column.joint, column.link, column.cause]
-        for power, torque, i in self.powers:
-            np.multiply(out[torque], qd[:, i], out=out[power])
+            rows.put(out, "tau_qd", _left(standing, velocity))
+        for name in (*POWER, *POWER_TERMS):
+            powers, torques = rows[name], rows[TORQUE_OF[name] if name in rows else name]
+            joints = powers.at[:, 0].tolist()
+            for power, torque, i in zip(out[powers.rows], out[torques.rows], joints, strict=True):
+                np.multiply(torque, qd[:, i], out=power)
         return closure
 
     def _dense(self, torque: Array, n: int) -> Array:
@@ -152,8 +131,8 @@ class Decomposer:
         if self.terms is None:
             return np.zeros((0, n, 0))
         out = np.zeros((len(torque), n, len(self.robot.links)))
-        for i, j, source in term_rows(self.robot.model.layout).torque:
-            out[:, i, j] = torque[:, source]
+        i, j = self.robot.model.layout.torque.T
+        out[:, i, j] = torque
         return out
 
     def _standing(self, time: Array, q: Array) -> Standing | None:
@@ -180,27 +159,22 @@ class Decomposer:
         if not self.robot.passive:
             return
         every = self.robot.model.passive_torque(q, qd, qdd)
-        found = {share: _left(standing, torque) for share, torque in zip(PASSIVE, every, strict=True)}
-        whole = self._wholes()
-        for column, values in zip(self.columns, out, strict=True):
-            if column.quantity in PASSIVE and column.joint is not None:
-                values[:] = found[column.quantity][:, column.joint]
-                out[whole[column.joint]] += values
+        for name, torque in zip(PASSIVE, every, strict=True):
+            self._add(out, name, _left(standing, torque))
 
     def _add_loads(self, out: Array, standing: Standing | None, time: Array, q: Array) -> None:
         """Fill the torques by which joints carry loads, and add them to the joint torques."""
-        asked = [_left(standing, borne.torque(self.robot.model, time, q)) for borne in self.loads]
-        whole = self._wholes()
-        for column, values in zip(self.columns, out, strict=True):
-            if column.quantity == "tau_load" and column.joint is not None and column.cause is not None:
-                values[:] = asked[column.cause][:, column.joint]
-                out[whole[column.joint]] += values
+        if self.loads:
+            asked = [_left(standing, borne.torque(self.robot.model, time, q)) for borne in self.loads]
+            self._add(out, "tau_load", np.stack(asked, axis=-1))
 
-    def _wholes(self) -> dict[int, int]:
-        """Return the row of each joint's whole torque, by joint."""
-        return {
-            c.joint: at for at, c in enumerate(self.columns) if c.quantity == "tau" and c.joint is not None
-        }
+    def _add(self, out: Array, name: str, torque: Array) -> None:
+        """Fill the rows of a quantity from torques (S, n, ...), and add them to the joint torques."""
+        self.rows.put(out, name, torque)
+        wholes = {i: row for i, row, _ in self.wholes}
+        rows, _, at = self.rows[name]
+        for own, (i, *_) in zip(out[rows], at.tolist(), strict=True):
+            out[wholes[i]] += own
 
     def _closure(self, out: Array, partial: Array) -> Closure:
         """Return the largest errors of the closing sums, by unit.
@@ -211,45 +185,41 @@ class Decomposer:
         """
         worst, units = Closure(), self.robot.units
         before = np.abs(partial).sum(axis=-1).max(axis=0, initial=0.0)
-        for unit in dict.fromkeys(self.columns[whole].unit for whole, _ in self.wholes):
-            alike = [(whole, links) for whole, links in self.wholes if self.columns[whole].unit == unit]
-            parts = [(link, rows) for link, rows in self.parts if self.columns[link].unit == unit]
-            size = max(size for size, other in zip(before, units, strict=True) if load_unit(other) == unit)
-            terms = [residual([out[row] for row in rows], out[link]) for link, rows in parts]
-            sums = [residual([out[row] for row in links], out[whole]) for whole, links in alike]
+        for unit in dict.fromkeys(units[i] for i, *_ in self.wholes):
+            size = max(size for size, other in zip(before, units, strict=True) if other == unit)
+            terms, sums = (
+                [residual([out[r] for r in rows], out[whole]) for i, whole, rows in of if units[i] == unit]
+                for of in (self.parts, self.wholes)
+            )
             least = (0.0, float(size))
             worst |= Closure(*worst_of([*terms, least]), *worst_of([*sums, least]))
         return worst
 
 
-def _rows(
-    columns: tuple[Column, ...],
-    quantities: tuple[Quantity, ...],
-    joint: int | None,
-    link: int | None = None,
-) -> tuple[int, ...]:
+def _sums(rows: ResultRows, whole: str, *parts: str) -> tuple[Sum, ...]:
+    """Return the sums of all entries of a quantity, of parts with the same indices along its axes."""
+    axes = QUANTITIES[whole].axes
     return tuple(
-        at
-        for at, c in enumerate(columns)
-        if c.quantity in quantities and c.joint == joint and link in (None, c.link)
+        (index[0], row, rows.numbers(*parts, **dict(zip(axes, index, strict=True))).tolist())
+        for row, index in rows[whole].listed()
     )
+
+
+def _spread(
+    out: Array, entries: QuantityRows, values: Array, places: list[int], motion: Array | None = None
+) -> None:
+    """Fill rows with the packed values (S, values) at these places, times the cause's motion (S, n) if given.
+
+    It goes row by row, which is faster than at once: no array is made in between.
+    """
+    if motion is None:
+        for row, place in zip(out[entries.rows], places, strict=True):
+            row[:] = values[:, place]
+        return
+    for row, place, k in zip(out[entries.rows], places, entries.at[:, 2].tolist(), strict=True):
+        np.multiply(values[:, place], motion[:, k], out=row)
 
 
 def _left(standing: Standing | None, torque: Array) -> Array:
     """Return what contacts leave to the joints of torques (S, n, ...)."""
     return np.asarray(torque) if standing is None else standing.left(np.asarray(torque))
-
-
-def _sources(terms: TermRows, row: dict[Key, int]) -> dict[Quantity, tuple[Source, ...]]:
-    def plain(quantity: Quantity, rows: Sequence[tuple[int, ...]]) -> tuple[Source, ...]:
-        return tuple((row[quantity, i, j, None], at, -1) for i, j, at in rows)
-
-    def moved(quantity: Quantity, rows: Sequence[tuple[int, ...]]) -> tuple[Source, ...]:
-        return tuple((row[quantity, i, j, k], at, k) for i, j, k, at in rows)
-
-    return {
-        "tau_link": plain("tau_link", terms.torque),
-        "tau_gravity": plain("tau_gravity", terms.gravity),
-        "tau_qdd": moved("tau_qdd", terms.acceleration),
-        "tau_qd": moved("tau_qd", terms.velocity),
-    }

@@ -3,20 +3,21 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import reduce
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from linkwise_runtime.rule.joint_tree import TreeFrame
 
-from linkwise.analysis.contacts.contact_reference import ContactReference
+from linkwise.analysis.contacts.ground_contacts import GroundContacts
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
-from linkwise.analysis.result_columns import Column
-from linkwise.analysis.result_quantities import Quantity
+from linkwise.analysis.result_rows import ResultRows
 from linkwise.errors import LinkwiseError
+from linkwise.oracle.contacts import contact_rows
 from linkwise.oracle.loop_equations import LoopEquations
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import Array
+from linkwise.package.manifest import RigidTree
 
 LIMIT = 1e-9
 """A relative error above this is not rounding: the package does not compute what it says."""
@@ -110,25 +111,21 @@ def worst_of(pairs: list[tuple[float, float]]) -> tuple[float, float]:
 
 
 def against_recursion(
-    robot: LoadedRobot, loads: Sequence[PlacedLoad], columns: tuple[Column, ...], block: Array
+    robot: LoadedRobot, loads: Sequence[PlacedLoad], rows: ResultRows, block: Array
 ) -> Closure:
-    """Return the errors of τ_ij, P_ij, τ_ie of some samples of a block (columns, S) against Newton–Euler.
+    """Return the errors of τ_ij, P_ij, τ_ie of some samples of a block (rows, S) against Newton–Euler.
 
     There are none for robots of energies. Contacts at which a motion slips feed energy to links, beside the
     joints. Relative errors are by unit: a joint that carries nothing but rounding is measured by its peers.
     """
     if robot.recursion is None:
         return Closure()
-    at = np.unique(np.linspace(0, block.shape[1] - 1, SAMPLES).astype(int))
-
-    def dense(quantity: Quantity) -> Array:
-        return np.array([block[row, at] for row, c in enumerate(columns) if c.quantity == quantity]).T
-
-    if np.abs(dense("q")).max(initial=0.0) > LARGEST:
+    block = block[:, np.unique(np.linspace(0, block.shape[1] - 1, SAMPLES).astype(int))]
+    q, qd, qdd = (rows.dense(name, block) for name in ("q", "qd", "qdd"))
+    if np.abs(q).max(initial=0.0) > LARGEST:
         return Closure()
-    q, qd, qdd = dense("q"), dense("qd"), dense("qdd")
     partial = robot.recursion.partial_torque(q, qd, qdd)
-    asked = [load_torque(robot.recursion, borne, block[0, at], q) for borne in loads]
+    asked = [load_torque(robot.recursion, borne, block[0], q) for borne in loads]
     expected = np.concatenate([partial, *(torque[:, :, None] for torque in asked)], axis=2)
     tree, mapped = robot.package.manifest.tree, None
     if robot.constrained is not None and tree is not None:
@@ -139,18 +136,9 @@ def against_recursion(
     free = expected
     if robot.contacts is not None and tree is not None:
         reference = ContactReference(robot.recursion, tree, robot.contacts)
-        expected = reference.left(expected, q, dense("contact"), mapped)
-    ours, power = np.zeros_like(expected), np.zeros_like(partial)
-    fed = np.zeros((len(q), len(robot.links)))
-    for row, column in enumerate(columns):
-        if column.quantity == "tau_link":
-            ours[:, column.joint, column.link] = block[row, at]
-        elif column.quantity == "tau_load" and column.cause is not None:
-            ours[:, column.joint, len(robot.links) + column.cause] = block[row, at]
-        elif column.quantity == "power_contact":
-            fed[:, column.link] += block[row, at]
-        elif column.quantity == "power_link":
-            power[:, column.joint, column.link] = block[row, at]
+        expected = reference.left(expected, q, rows.dense("contact", block), mapped)
+    ours = np.concatenate([rows.dense(name, block) for name in ("tau_link", "tau_load")], axis=2)
+    fed = rows.dense("power_link", block).sum(axis=1) + rows.dense("power_contact", block).sum(axis=2)
     absolute, relative, watts = 0.0, 0.0, 0.0
     for unit in set(robot.units):
         alike = [i for i, other in enumerate(robot.units) if other == unit]
@@ -162,7 +150,7 @@ def against_recursion(
         # Power that is only rounding is measured by the torques and speeds that it is made of.
         carried = float(np.abs(partial).sum(axis=2)[:, alike].max(initial=0.0))
         watts += carried * float(np.abs(qd[:, alike]).max(initial=0.0))
-    apart = float(np.abs(power.sum(axis=1) + fed - _gain(robot.recursion, q, qd, qdd)).max(initial=0.0))
+    apart = float(np.abs(fed - _gain(robot.recursion, q, qd, qdd)).max(initial=0.0))
     return Closure(
         recursion_absolute=absolute,
         recursion_relative=relative,
@@ -196,3 +184,51 @@ def _gain(recursion: NewtonEuler, q: Array, qd: Array, qdd: Array) -> Array:
     kinetic, potential = recursion.energies(q + 1j * STEP * qd, qd + 1j * STEP * qdd)
     gain: Array = (kinetic + potential).imag / STEP
     return gain
+
+
+RANK = 1e-11
+"""Eigenvalues of B w B^T below this part of the largest are zero."""
+
+
+class ContactReference(NamedTuple):
+    """Contacts of a tree whose frames move as the recursion computes."""
+
+    recursion: NewtonEuler
+    tree: RigidTree
+    contacts: GroundContacts
+
+    def left(self, torque: Array, q: Array, shares: Array, mapped: Array | None) -> Array:
+        """Return what contacts with shares (S, contacts) leave of torques (S, n, X), of that shape.
+
+        mapped: G (S, n, m) from the m joints that do not follow others, at whose indices the torques stand to
+        all joints; None if no joint follows
+        """
+        frames = {frame.name: frame for frame in self.tree.frames}
+        each = [
+            contact_rows(self.recursion, frames[str(contact.frame)], contact, q)
+            for contact in self.contacts.contacts
+        ]
+        weights = np.concatenate(
+            [np.repeat(shares[:, [c]], one.shape[1], 1) for c, one in enumerate(each)], 1
+        )
+        rows = np.concatenate(each, axis=1) * (weights > 0.0)[..., None]
+        if mapped is not None:
+            assert self.contacts.tied is not None
+            own = list(self.contacts.tied.following.independent)
+            projected = np.zeros_like(rows)
+            projected[..., own] = rows @ mapped
+            rows = projected
+        base = list(self.contacts.unactuated)
+        forces = _least(np.swapaxes(rows[..., base], 1, 2), weights, torque[:, base])
+        left: Array = torque - np.swapaxes(rows, 1, 2) @ forces
+        return left
+
+
+def _least(equations: Array, weights: Array, torque: Array) -> Array:
+    """Return lambda (S, C, X) with B lambda = tau and the least sum of lambda^2 / w.
+
+    It is found from lambda = w B^T mu and (B w B^T) mu = tau.
+    """
+    scaled = weights[..., None] * np.swapaxes(equations, 1, 2)
+    found: Array = scaled @ np.linalg.pinv(equations @ scaled, rcond=RANK, hermitian=True) @ torque
+    return found

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from linkwise.analysis.derivatives import derivatives
+from linkwise.analysis.filtering import derivatives
 from linkwise.analysis.settings import Processing
 from linkwise.escape import listed
 from linkwise.identification.fit import POOR

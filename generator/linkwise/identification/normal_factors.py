@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.analysis.derivatives import derivatives
+from linkwise.analysis.filtering import derivatives
 from linkwise.analysis.settings import Processing
 from linkwise.identification.base_parameters import BaseParameters
 from linkwise.identification.bearings import Bearings

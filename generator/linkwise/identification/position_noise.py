@@ -10,8 +10,7 @@ import math
 
 import numpy as np
 
-from linkwise.analysis.derivatives import derivatives
-from linkwise.analysis.filtering import lowpass
+from linkwise.analysis.filtering import derivatives, lowpass
 from linkwise.analysis.settings import Processing
 from linkwise.package.load import Array
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 
-from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_rows import Column
 from linkwise.errors import LinkwiseError, within
 from linkwise.output import passing_folder
 from linkwise.study.band_figure import figure_columns
@@ -38,7 +38,7 @@ def _columns(plan: StudyPlan, before: Collection[str]) -> tuple[Column, ...]:
             continue
         try:
             with within(f"trial {trial.name!r}"), trial_here(trial) as here, passing_folder() as buffer:
-                return prepared_trial(plan, here, buffer).decomposer.columns
+                return prepared_trial(plan, here, buffer).columns
         except LinkwiseError as reason:
             reasons.append(reason)
     if reasons and not before:

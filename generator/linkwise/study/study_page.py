@@ -6,7 +6,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from linkwise.analysis.show.packed_page import encoded, packed, plotly_parts
+from linkwise.analysis.show.page_curves import encoded, packed, plotly_parts
 from linkwise.escape import printable, script_data
 from linkwise.package.load import Array
 from linkwise.plotstyle import COLOURS, ON_DARK

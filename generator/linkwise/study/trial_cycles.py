@@ -18,7 +18,7 @@ class TrialCycles:
     """Receiver of samples that passes each cycle to `write`, with its number; none without cycles."""
 
     def __init__(self, plan: StudyPlan, job: Job, write: Callable[[int, Array], None]) -> None:
-        self._write, self._names = write, [column.name for column in job.decomposer.columns]
+        self._write, self._names = write, [column.name for column in job.columns]
         self._points = 0 if plan.cycles is None else plan.cycles.points
         self._moments = RunningMoments(len(self._names) * self._points)
         with within(job.source):

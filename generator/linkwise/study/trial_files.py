@@ -5,7 +5,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from linkwise.analysis.loads.external_loads import data_files
+from linkwise.analysis.loads.load_files import data_files
 from linkwise.errors import LinkwiseError
 from linkwise.package.manifest import FILE
 from linkwise.robot import robot_files

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from linkwise.analysis.logs.damaged_files import read_as
+from linkwise.analysis.logs.log_checks import read_as
 from linkwise.package.load import Array
 from linkwise.study.study_paths import require_own
 from linkwise.study.study_plan import StudyPlan

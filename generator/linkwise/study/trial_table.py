@@ -7,7 +7,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from linkwise.analysis.result_columns import Column
+from linkwise.analysis.result_rows import Column
 from linkwise.extras import extra
 from linkwise.package.load import Array
 from linkwise.study.column_patterns import fitting

@@ -83,7 +83,7 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         trial = files.enter_context(trial_here(task.trial))
         key = trial_key(plan, task.trial, {}, trial)
         job = prepared_trial(plan, trial, draft)
-        columns = job.decomposer.columns
+        columns = job.columns
         kept = kept_columns(columns, plan.columns)
         labels = {"trial": trial.name, **dict(trial.labels)}
         every = EverySample(len(columns), *((job.count, draft) if plan.pages else (0, None)))
@@ -120,7 +120,7 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         trial.name,
         key.key,
         key.files,
-        done.samples,
+        done.total,
         cycles.count,
         job.samples.rate,
         seconds,

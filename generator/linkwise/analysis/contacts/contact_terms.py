@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwise.analysis.contacts.ground_contacts import GroundContacts, Standing
-from linkwise.analysis.model_side import NAMES, Side
-from linkwise.analysis.term_rows import TermRows
+from linkwise.analysis.term_rows import NAMES, TermArrays
 from linkwise.package.load import Array
 
 Index = NDArray[np.intp]
@@ -69,23 +68,23 @@ class ContactTerms:
     joints: tuple[int, ...]
 
     @classmethod
-    def of(cls, free: TermRows, contacts: GroundContacts) -> "ContactTerms":
+    def of(cls, free: TermArrays, contacts: GroundContacts) -> "ContactTerms":
         """Return the terms for those of the free robot."""
         kinds = tuple(_Kind.of(getattr(free, name), contacts.joints) for name in NAMES)
         return cls(kinds, contacts.joints)
 
     @property
-    def rows(self) -> TermRows:
+    def rows(self) -> TermArrays:
         """Rows (i, j[, k], source) of the values that `left` returns."""
-        return TermRows(**{name: kind.rows for name, kind in zip(NAMES, self.kinds, strict=True)})
+        return TermArrays(*(kind.rows for kind in self.kinds))
 
-    def left(self, packed: Side, standing: Standing, n: int) -> Side:
+    def left(self, packed: TermArrays, standing: Standing, n: int) -> TermArrays:
         """Return the values that contacts leave, from the packed ones of the free robot with n joints."""
         found = (
             kind.left(np.asarray(getattr(packed, name)), standing, self.joints, n)
             for name, kind in zip(NAMES, self.kinds, strict=True)
         )
-        return Side(*found)
+        return TermArrays(*found)
 
 
 def _index(numbers: Iterable[int]) -> Index:

@@ -185,17 +185,10 @@ def _by_contact(robot: LoadedRobot, loads: Sequence[PlacedLoad]) -> tuple[tuple[
 
     Raises LinkwiseError for a load on another body, or on a body with two contacts.
     """
-    tree, ground = robot.package.manifest.tree, robot.contacts
-    assert tree is not None
-    assert ground is not None
-    body = {frame.name: frame.joint for frame in tree.frames}
-    found: list[list[PlacedLoad]] = [[] for _ in ground.contacts]
+    bodies = [robot.body_of(contact.frame) for contact in robot.ground.contacts]
+    found: list[list[PlacedLoad]] = [[] for _ in bodies]
     for load in loads:
-        there = [
-            number
-            for number, contact in enumerate(ground.contacts)
-            if body[str(contact.frame)] == load.seat.frame.joint
-        ]
+        there = [number for number, body in enumerate(bodies) if body == load.seat.frame.joint]
         if len(there) != 1:
             mend = "where no contact is; give it with --loads, or leave it out"
             if there:

@@ -12,9 +12,8 @@ from linkwise.analysis.disk_rows import collected
 from linkwise.analysis.even_time import even_rate, usual_step
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.external_loads import external_loads
 from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WIDTH, Load, Loads
-from linkwise.analysis.loads.load_columns import PARTS, LoadColumns, load_columns
+from linkwise.analysis.loads.load_files import PARTS, LoadColumns, external_loads, load_columns
 from linkwise.analysis.loads.placed_load import PlacedLoad, Seat, seat_of
 from linkwise.analysis.logs import open_log
 from linkwise.analysis.samples import finite_blocks, slowness

@@ -6,14 +6,12 @@ from typing import Protocol
 
 from linkwise_runtime.file_joints import FileJoint
 
-from linkwise.analysis.logs.array_log import ArrayFile, ArrayLog
+from linkwise.analysis.logs.array_files import Hdf5Arrays, NpzArrays
+from linkwise.analysis.logs.array_log import ArrayFile, ArrayLog, QposLog, QposOf
 from linkwise.analysis.logs.bag import BagLog
-from linkwise.analysis.logs.hdf5 import Hdf5Arrays
-from linkwise.analysis.logs.headers import open_delimited, open_storage
-from linkwise.analysis.logs.named_once import named_once
-from linkwise.analysis.logs.npz import NpzArrays
+from linkwise.analysis.logs.log_checks import named_once
 from linkwise.analysis.logs.parquet import ParquetLog
-from linkwise.analysis.logs.qpos_log import QposLog, QposOf
+from linkwise.analysis.logs.text import open_delimited, open_storage
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed

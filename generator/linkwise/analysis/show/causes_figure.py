@@ -1,21 +1,195 @@
-"""Figure of the causes of one joint's torque, in each phase of the movement: stance against swing."""
+"""Figure of the causes of one joint's torque, in each phase of the movement: stance against swing.
+
+Bars are the mean and the root mean square over each phase, the largest cause first.
+"""
 
 import math
-import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from linkwise.analysis.joint_causes import Cause, causes_of, curves
+from linkwise.analysis.loads.placed_load import moving_joints
+from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import load_unit
-from linkwise.analysis.show.cause_curves import CauseNumbers, cause_numbers, torque_curve
-from linkwise.analysis.show.drawn_curves import drawn_curves, foot
-from linkwise.analysis.show.shown_phases import asked_phases
-from linkwise.extras import extra
+from linkwise.analysis.result_rows import load_unit
+from linkwise.analysis.show.drawn_curves import (
+    drawn_curves,
+    foot,
+    largest_few,
+    new_figure,
+    write_note,
+    write_title,
+)
+from linkwise.errors import LinkwiseError
+from linkwise.escape import printable
+from linkwise.package.load import Array
 from linkwise.plotstyle import BLUE, INK, colour, drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False)
+class ShownPhase:
+    """A phase, or the rest of the movement beside it; without a phase, the whole movement."""
+
+    label: str
+    placed: PlacedPhase | None = None
+    is_rest: bool = False
+
+    def on(self, result: AnalysisResult) -> NDArray[np.bool_]:
+        """Return which samples (S,) of a result, or a part of one, are in it."""
+        if self.placed is None:
+            return np.ones(len(result.time), dtype=np.bool_)
+        contacts = result.values[result.rows["contact"].rows]
+        return self.placed.on(result.robot, result.time, result.q, contacts) ^ self.is_rest
+
+
+def shown_phases(result: AnalysisResult, i: int) -> list[ShownPhase]:
+    """Return the phases of `asked_phases`, each followed by the rest of the movement if that is named."""
+    found = []
+    for phase in asked_phases(result, i):
+        found.append(ShownPhase(drawn(phase.name, 34), phase))
+        if phase.rest:
+            found.append(ShownPhase(drawn(phase.rest, 34), phase, is_rest=True))
+    return found
+
+
+def require_samples(
+    result: AnalysisResult, phases: list[ShownPhase], counts: Sequence[int]
+) -> list[ShownPhase]:
+    """Return the phases, or the whole movement where they distinguish nothing.
+
+    counts: number of samples of each phase
+
+    Raises LinkwiseError for a phase that was asked for and has no sample.
+    """
+    empty = [phase.label for phase, count in zip(phases, counts, strict=True) if not count]
+    if empty and result.phases:
+        raise LinkwiseError(f"--phase: {empty[0]} has no sample between {_span(result)}")
+    return [ShownPhase("the whole movement")] if empty or not phases else phases
+
+
+def _span(result: AnalysisResult) -> str:
+    return f"{result.time[0]:.4g} and {result.time[-1]:.4g} s"
+
+
+def asked_phases(result: AnalysisResult, i: int) -> tuple[PlacedPhase, ...]:
+    """Return the phases that were given, else one while the only load or contact on joint i acts.
+
+    There is no phase if several act on it, or none.
+    """
+    if result.phases:
+        return result.phases
+    robot, tree = result.robot, result.robot.package.manifest.tree
+    loads = [one for one in result.loads if i in one.seat.joints]
+    held: list[int] = []
+    if robot.contacts is not None and tree is not None:
+        moved = [moving_joints(tree, robot.body_of(one.frame)) for one in robot.contacts.contacts]
+        held = [number for number, joints in enumerate(moved) if i in joints]
+    if len(loads) + len(held) != 1:
+        return ()
+    if loads:
+        name = printable(f"load {loads[0].name}")
+        return (PlacedPhase(f"{name} acts", f"{name} does not act", load=loads[0]),)
+    name = printable(robot.ground.names[held[0]])
+    return (PlacedPhase(f"{name} stands", f"{name} does not stand", contact=held[0]),)
+
+
+MOST = 10
+"""Joints whose motions have bars of their own; all other motions are summed in one."""
+NOTHING = 1e-9
+"""Part of the largest cause below which a cause is only rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseNumbers:
+    """A phase, and the mean and root mean square of each row in it, (rows,)."""
+
+    phase: ShownPhase
+    mean: Array
+    rms: Array
+
+
+@dataclass(frozen=True, eq=False)
+class CauseNumbers:
+    """Causes of the joint's torque: all causes together in the first row, and then each."""
+
+    labels: tuple[str, ...]
+    phases: tuple[PhaseNumbers, ...]
+    apart: bool
+    """True if no two phases share a sample."""
+
+
+class _Tally:
+    """Running sums of curves and of their products, over the samples of a phase."""
+
+    def __init__(self, curves: int) -> None:
+        self.count, self.sums, self.products = 0, np.zeros(curves), np.zeros((curves, curves))
+
+    def __call__(self, values: Array) -> None:
+        self.count += values.shape[1]
+        self.sums += values.sum(axis=1)
+        self.products += values @ values.T
+
+    def mean(self, rows: Array) -> Array:
+        """Return the mean of sums of curves; rows (rows, curves) has ones for the curves of each sum."""
+        mean: Array = rows @ self.sums / self.count
+        return mean
+
+    def rms(self, rows: Array) -> Array:
+        """Return the root mean square of sums of curves, with rows as for `mean`."""
+        squares = np.einsum("ra,ab,rb->r", rows, self.products, rows)
+        root: Array = np.sqrt(np.maximum(squares, 0.0) / self.count)
+        return root
+
+
+def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
+    """Return the numbers of joint i over all samples; raise LinkwiseError for a phase without any."""
+    causes = causes_of(result, result.robot.plot_joints, drawn)
+    asked = shown_phases(result, i)
+    every, tallies = _Tally(1 + len(causes)), [_Tally(1 + len(causes)) for _ in asked]
+    peaks, apart = np.zeros(len(causes)), True
+    for part in result.parts():
+        values = np.concatenate([torque_curve(part, i), curves(part, causes, i)])
+        on = [phase.on(part) for phase in asked]
+        np.maximum(peaks, np.abs(values[1:]).max(axis=1), out=peaks)
+        apart &= not on or int(np.sum(on, axis=0).max()) <= 1
+        for tally, here in zip(tallies, on, strict=True):
+            tally(values[:, here])
+        every(values)
+    shown = require_samples(result, asked, [tally.count for tally in tallies])
+    labels, rows = _rows(causes, every, peaks > NOTHING * peaks.max(initial=0.0))
+    found = zip(shown, tallies if shown == asked else [every], strict=True)
+    numbers = tuple(PhaseNumbers(phase, tally.mean(rows), tally.rms(rows)) for phase, tally in found)
+    return CauseNumbers(labels, numbers, apart)
+
+
+def torque_curve(result: AnalysisResult, i: int) -> Array:
+    """Return the joint's torque, (1, S) in its unit."""
+    found: Array = result.torque[:, [i]].T
+    return found
+
+
+def _rows(causes: Sequence[Cause], every: _Tally, there: Array) -> tuple[tuple[str, ...], Array]:
+    """Return labels and rows, the largest cause over the movement first, small motions summed last."""
+    alone = np.eye(1 + len(causes))
+    sizes = every.rms(alone)[1:]
+    order = sorted(np.flatnonzero(there).tolist(), key=lambda at: -float(sizes[at]))
+    motions = [at for at in order if causes[at].is_motion]
+    small = [motions[at] for at in largest_few(sizes[motions], MOST)[1]]
+    named = [at for at in order if at not in small]
+    labels = ["all causes together", *(causes[at].label for at in named)]
+    rows = [alone[0], *(alone[1 + at] for at in named)]
+    if small:
+        labels.append(f"motion of {len(small)} others")
+        rows.append(alone[[1 + at for at in small]].sum(axis=0))
+    return tuple(labels), np.array(rows)
+
 
 GAP = 9.0
 """Total gap between a bar, its label and the panel's edge, in pixels of the figure."""
@@ -26,7 +200,7 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
     numbers = cause_numbers(result, i)
     phases = numbers.phases
     height = (0.17 * len(phases) + 0.13) * len(numbers.labels)
-    figure: Figure = extra("matplotlib.figure").Figure(figsize=(8.4, 3.3 + height), layout="constrained")
+    figure = new_figure(8.4, 3.3 + height)
     grid = figure.add_gridspec(2, 2, height_ratios=(1.3, height))
     over_time = figure.add_subplot(grid[0, :])
     means = figure.add_subplot(grid[1, 0])
@@ -41,16 +215,9 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
         handlelength=1.5,
         borderaxespad=0.3,
     )
-    figure.suptitle(
-        f"What loads {drawn(result.robot.joints[i], 40)} · {drawn(result.robot.name, 40)}"
-        f" · {drawn(result.source, 50)}",
-        x=0.01,
-        ha="left",
-        fontsize=11,
-    )
+    write_title(figure, result, f"What loads {drawn(result.robot.joints[i], 40)}")
     told = [phase.told for phase in asked_phases(result, i)]
-    below = " · ".join(["motion: acceleration and velocity together", *told, foot(result)])
-    figure.supxlabel(textwrap.fill(below, 140), x=0.01, ha="left", fontsize=7, color="#5A6270")
+    write_note(figure, " · ".join(["motion: acceleration and velocity together", *told, foot(result)]))
     figure.draw_without_rendering()  # places the panels, so that labels have their final width
     for panel in (means, sizes):
         _make_room(panel)

@@ -1,15 +1,14 @@
 """Figure of the ground's forces at each contact, by link, and the torques of the joints above it."""
 
 import textwrap
+from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import load_unit
-from linkwise.analysis.show.drawn_curves import drawn_curves, foot
-from linkwise.analysis.show.largest_few import largest_few
-from linkwise.extras import extra
+from linkwise.analysis.result_rows import Indices, load_unit
+from linkwise.analysis.show.drawn_curves import drawn_curves, foot, largest_few, new_figure, write_title
 from linkwise.package.load import Array
 from linkwise.plotstyle import GRAVITY, INK, drawn, tone
 
@@ -29,16 +28,13 @@ PARTS = ("x", "y", "z")
 
 def contacts(result: AnalysisResult, _: int) -> "Figure":
     """Draw a column of panels for each contact: forces, with areas by link, then joints' torques."""
-    ground = result.robot.contacts
-    assert ground is not None
+    ground = result.robot.ground
     peaks, asked = _sizes(result)
     shown = _components(result, peaks)
     alone = largest_few(asked.sum(axis=(0, 1))[:-1], MOST)[0]
     joints = [_joints(result, c) for c in range(len(ground.names))]
     count = len(shown) + max(map(len, joints))
-    figure: Figure = extra("matplotlib.figure").Figure(
-        figsize=(WIDTH * len(ground.names) + 1.4, HEIGHT * count + 1.3), layout="constrained"
-    )
+    figure = new_figure(WIDTH * len(ground.names) + 1.4, HEIGHT * count + 1.3)
     panels = figure.subplots(count, len(ground.names), sharex=True, sharey="row", squeeze=False)
     for c, name in enumerate(ground.names):
         panels[0, c].set_title(drawn(name))
@@ -69,40 +65,28 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
         title=textwrap.fill(foot(result), round(15 * float(figure.get_figwidth()))),
         title_fontsize=7,
     )
-    figure.suptitle(
-        f"What the ground bears · {drawn(result.robot.name, 40)} · {drawn(result.source, 50)}",
-        x=0.01,
-        ha="left",
-        fontsize=11,
-    )
+    write_title(figure, result, "What the ground bears")
     return figure
 
 
 def _forces(result: AnalysisResult) -> Array:
     """Return the contact forces due to each link, and last due to all else, (contacts, 3, N + 1, S)."""
-    robot, ground = result.robot, result.robot.contacts
-    assert ground is not None
-    first = len(robot.constraint_rows) - len(ground.rows)
-    out = np.zeros((len(ground.names), 3, len(robot.links) + 1, len(result.time)))
-    for column, values in zip(result.columns, result.values, strict=True):
-        row = (column.cause or 0) - first
-        if column.quantity not in ("force", "force_link") or row < 0:
-            continue
-        part = ground.rows[row].rpartition("force_")[2]
+    robot, ground = result.robot, result.robot.ground
+    whole, by_link = result.dense("force"), result.dense("force_link")
+    out = np.zeros((len(ground.names), len(PARTS), len(robot.links) + 1, len(result.time)))
+    for row, (owner, name) in enumerate(
+        zip(ground.owners, ground.rows, strict=True), robot.contact_rows.start
+    ):
+        part = name.rpartition("force_")[2]
         if part in PARTS:
-            cube = out[int(ground.owners[row])]
-            if column.link is not None:
-                cube[PARTS.index(part), column.link] += values
-                cube[PARTS.index(part), -1] -= values
-            else:
-                cube[PARTS.index(part), -1] += values
+            shares = by_link[..., row].T
+            out[owner, PARTS.index(part)] = [*shares, reduce(np.subtract, shares, whole[:, row])]
     return out
 
 
 def _sizes(result: AnalysisResult) -> tuple[Array, Array]:
     """Return the largest forces (contacts, 3), and magnitudes by link summed up, (contacts, 3, N + 1)."""
-    ground = result.robot.contacts
-    assert ground is not None
+    ground = result.robot.ground
     shape = len(ground.names), len(PARTS)
     peaks, asked = np.zeros(shape), np.zeros((*shape, len(result.robot.links) + 1))
     for part in result.parts():
@@ -122,18 +106,14 @@ def _components(result: AnalysisResult, peaks: Array) -> list[int]:
 
 def _joints(result: AnalysisResult, contact: int) -> list[int]:
     """Return the driven joints between the base and a contact, the nearest to the contact first."""
-    robot, ground = result.robot, result.robot.contacts
-    assert ground is not None
-    tree = robot.package.manifest.tree
-    assert tree is not None
-    frame = str(ground.contacts[contact].frame)
-    body = next(one.joint for one in tree.frames if one.name == frame)
+    robot, ground = result.robot, result.robot.ground
+    bodies, body = robot.bodies or (), robot.body_of(ground.contacts[contact].frame)
     found: list[int] = []
     while body is not None:
-        own = tree.bodies[body].coordinate
+        own = bodies[body].coordinate
         if own in robot.driven and own not in (*ground.unactuated, *found):
             found.append(own)
-        body = tree.bodies[body].parent
+        body = bodies[body].parent
     return found[:JOINTS]
 
 
@@ -169,36 +149,35 @@ def _draw_force(
 
 
 def _draw_measured(panel: Any, result: AnalysisResult, contact: int, axis: int) -> None:
-    ground = result.robot.contacts
-    assert ground is not None
-    first = len(result.robot.constraint_rows) - len(ground.rows)
-    for at, column in enumerate(result.columns):
-        row = (column.cause or 0) - first
-        mine = column.quantity == "force_measured" and ground.owners[row] == contact
-        if mine and ground.rows[row].endswith(f" force_{PARTS[axis]}"):
-            _draw_column(panel, result, at, color="#C21E56", linestyle="dashed", label="measured")
+    ground = result.robot.ground
+    first = result.robot.contact_rows.start
+    for row in result.rows["force_measured"].at[:, 0].tolist():
+        if ground.owners[row - first] == contact and ground.rows[row - first].endswith(
+            f" force_{PARTS[axis]}"
+        ):
+            rows = result.rows.numbers("force_measured", constraint=row)
+            _draw_rows(panel, result, rows, color="#C21E56", linestyle="dashed", label="measured")
 
 
 def _draw_torque(panel: Any, result: AnalysisResult, contact: int, i: int) -> None:
     _shade(panel, result, contact)
     name, unit = drawn(result.robot.plot_joints[i]), load_unit(result.robot.units[i])
-    for at, column in enumerate(result.columns):
-        if column.joint == i and column.quantity == "tau":
-            _draw_column(panel, result, at, color=INK, linewidth=1.6, label="found from the motion")
-        if column.joint == i and column.quantity == "tau_as_loads":
-            _draw_column(panel, result, at, color="#C21E56", linestyle="dotted", label="by what was measured")
+    found, measured = (result.rows.numbers(kind, joint=i) for kind in ("tau", "tau_as_loads"))
+    _draw_rows(panel, result, found, color=INK, linewidth=1.6, label="found from the motion")
+    _draw_rows(panel, result, measured, color="#C21E56", linestyle="dotted", label="by what was measured")
     panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
     panel.set_title(f"torque of {name} ({unit})", fontsize=9)
 
 
-def _draw_column(panel: Any, result: AnalysisResult, at: int, **look: Any) -> None:
-    found = drawn_curves(result, lambda part: part.values[[at]])
-    panel.plot(found.time[0], found.values[0], **look)
+def _draw_rows(panel: Any, result: AnalysisResult, rows: Indices, **look: Any) -> None:
+    if len(rows):
+        found = drawn_curves(result, lambda part: part.values[rows])
+        panel.plot(found.time[0], found.values[0], **look)
 
 
 def _shade(panel: Any, result: AnalysisResult, contact: int) -> None:
     """Shade when a contact is on, darker when another is too: how they share forces is then a choice."""
-    rows = [row for row, column in enumerate(result.columns) if column.quantity == "contact"]
+    rows = result.rows["contact"].rows
 
     def stands(part: AnalysisResult) -> Array:
         on = part.values[rows] > 0.0

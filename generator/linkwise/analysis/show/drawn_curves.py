@@ -1,12 +1,19 @@
 """Curves as they are drawn: for long movements, the least and the greatest value of each piece."""
 
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
+from linkwise.extras import extra
 from linkwise.package.load import Array
+from linkwise.plotstyle import drawn
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PIECES = 1500
 """Most pieces of a figure's curve, about a pixel each."""
@@ -75,10 +82,35 @@ def _thinned(time: Array, values: Array, size: int) -> tuple[Array, Array, Array
     return time[place], points, middle, pieces.min(axis=-1), pieces.max(axis=-1)
 
 
+def new_figure(width: float, height: float) -> "Figure":
+    """Return a matplotlib figure of this size in inches, which places its panels itself."""
+    figure: Figure = extra("matplotlib.figure").Figure(figsize=(width, height), layout="constrained")
+    return figure
+
+
+def write_title(figure: Any, result: AnalysisResult, *what: str) -> None:
+    """Write above a figure what it shows, of which robot and log."""
+    told = " · ".join([*what, drawn(result.robot.name, 40), drawn(result.source, 50)])
+    figure.suptitle(told, x=0.01, ha="left", fontsize=11)
+
+
+def write_note(figure: Any, *notes: str, width: int = 140) -> None:
+    """Write notes below a figure, each from a line of its own on."""
+    told = "\n".join(textwrap.fill(note, width) for note in notes)
+    figure.supxlabel(told, x=0.01, ha="left", fontsize=7, color="#5A6270")
+
+
 def foot(result: AnalysisResult) -> str:
     """Return a note on how the motion was derived, and on how curves are drawn if they are thinned."""
     size = piece_size(result.total, PIECES)
     if size == 1:
         return result.provenance
-    drawn = f"curves are drawn by the least and greatest of every {size:,} samples, numbers are of all"
-    return f"{result.provenance} · {drawn}"
+    how = f"curves are drawn by the least and greatest of every {size:,} samples, numbers are of all"
+    return f"{result.provenance} · {how}"
+
+
+def largest_few(sizes: Sequence[float] | Array, most: int) -> tuple[list[int], list[int]]:
+    """Return the indices of the `most` largest and of the others, each ascending; never only one other."""
+    order = sorted(range(len(sizes)), key=lambda at: -float(sizes[at]))
+    named = len(order) if len(order) == most + 1 else most
+    return sorted(order[:named]), sorted(order[named:])

@@ -9,22 +9,24 @@ import numpy as np
 from linkwise.analysis.joint_causes import are_motions_whole
 from linkwise.analysis.loads.placed_load import model_pose
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import Column
 from linkwise.analysis.result_quantities import FORCES, GROUND, INDUCED, TORQUE_OF
-from linkwise.analysis.show.induced_figure import TITLES
-from linkwise.analysis.show.packed_page import encoded, packed, plotly_parts
+from linkwise.analysis.result_rows import ResultRows
+from linkwise.analysis.show.induced_figure import TITLES, components, numbers_of_curves, source_curves
 from linkwise.analysis.show.page_curves import (
     CurveSums,
     at_instants,
     curve_data,
+    encoded,
+    packed,
     page_pieces,
+    plotly_parts,
     point_data,
     stride_for,
 )
-from linkwise.analysis.show.poses import poses
-from linkwise.analysis.show.source_curves import components, numbers_of_curves, source_curves
 from linkwise.escape import printable, script_data
+from linkwise.oracle.newton_euler import displacement
 from linkwise.package.load import Array
+from linkwise.package.manifest import BodyEntry
 from linkwise.plotstyle import COLOURS, GRAVITY, ON_DARK
 from linkwise.render import render
 
@@ -50,17 +52,14 @@ def view(result: AnalysisResult) -> dict[str, str]:
     }
 
 
-def on_page(column: Column) -> bool:
-    """Return whether a page holds a column; it omits power, the product of two columns that it holds.
-
-    It also omits constraint forces and other quantities of contacts; of induced accelerations it holds sums.
-    """
-    return column.quantity not in (*TORQUE_OF, *FORCES, *GROUND, *INDUCED)
+OFF_PAGE = (*TORQUE_OF, *FORCES, *GROUND, *INDUCED)
+"""Quantities that a page does not hold: power, the product of two that it holds, and those of contacts; of
+induced accelerations it holds sums."""
 
 
-def numbers_on_page(columns: Sequence[Column]) -> int:
+def numbers_on_page(rows: ResultRows) -> int:
     """Return the largest count of numbers per sample on a page."""
-    return sum(map(on_page, columns)) + numbers_of_curves(columns)
+    return sum(name not in OFF_PAGE for name, _ in rows.places) + numbers_of_curves(rows)
 
 
 def page_data(result: AnalysisResult) -> str:
@@ -73,12 +72,14 @@ def page_data(result: AnalysisResult) -> str:
     left out.
     """
     robot = result.robot
-    stride = stride_for(result.total, numbers_on_page(result.columns), NUMBERS, SAMPLES)
+    stride = stride_for(result.total, numbers_on_page(result.rows), NUMBERS, SAMPLES)
     instants = replace(result, values=at_instants(result, stride))
     largest = _largest_forces(result)
     place = {i: at for at, i in enumerate(robot.driven)}
     shown = [
-        at for at, c in enumerate(result.columns) if on_page(c) and (c.joint is None or c.joint in place)
+        at
+        for at, c in enumerate(result.columns)
+        if c.quantity not in OFF_PAGE and (c.joint is None or c.joint in place)
     ]
     data = {
         "robot": printable(robot.name),
@@ -193,9 +194,8 @@ def _largest_power(result: AnalysisResult) -> float:
 
     It is the largest over all samples.
     """
-    kinds = ("power_link", "power_load", "power_contact")
-    peaks = zip(result.columns, result.totals.peak, strict=True)
-    return max((float(peak) for column, peak in peaks if column.quantity in kinds), default=0.0)
+    rows = result.rows.numbers("power_link", "power_load", "power_contact")
+    return float(result.totals.peak[rows].max(initial=0.0))
 
 
 def _upright(result: AnalysisResult) -> Array:
@@ -220,15 +220,11 @@ def _reactions(result: AnalysisResult, largest: Array) -> list[dict[str, str]]:
         centre = place + np.cross(up, moment) / np.where(firm, pressed, np.inf)[:, None]
         if ground.contacts[c].kind == "rolling":
             centre = place + ground.touch(c)
-        powers = [v for col, v in zip(result.columns, result.values, strict=True) if _feeds(col, c)]
+        powers = result.values[result.rows.numbers("power_contact", contact=c)]
         label = printable(f"ground at {ground.names[c]}")
         arrow = {"name": label, "places": encoded(centre), "forces": encoded(force)}
-        out.append(arrow | {"powers": encoded(np.array(powers))})
+        out.append(arrow | {"powers": encoded(powers)})
     return out
-
-
-def _feeds(column: Column, contact: int) -> bool:
-    return column.quantity == "power_contact" and column.cause == contact
 
 
 def _induced(result: AnalysisResult, point: int, is_thinned: bool) -> dict[str, Any]:
@@ -240,14 +236,14 @@ def _induced(result: AnalysisResult, point: int, is_thinned: bool) -> dict[str, 
         "rows": [{"name": printable(row), "unit": unit} for row, unit in rows.values()],
         "curves": [
             {
-                "kind": curve.kind,
-                "label": printable(curve.label),
-                "at": curve.number,
-                "points": point_data(result, curve.drawn, pieces)
+                "kind": source.kind,
+                "label": printable(source.label),
+                "at": source.number,
+                "points": point_data(result, found, pieces)
                 if is_thinned
-                else {"values": encoded(curve.drawn.values)},
+                else {"values": encoded(found.values)},
             }
-            for curve in source_curves(result, point, list(rows), pieces)
+            for source, found in source_curves(result, point, list(rows), pieces)
         ],
     }
 
@@ -257,17 +253,48 @@ def _work(result: AnalysisResult) -> list[dict[str, float]]:
 
     The loads come after the links.
     """
-    out, place = [], {i: at for at, i in enumerate(result.robot.driven)}
-    for c in result.columns:
-        if c.quantity == "power_link":
-            j, work, at = c.link or 0, result.work, (c.joint, c.link)
-        elif c.quantity == "power_load":
-            j, work, at = len(result.robot.links) + (c.cause or 0), result.load_work, (c.joint, c.cause)
-        elif c.quantity == "power_contact":
-            j, work, at = c.link or 0, result.contact_work, (c.link, c.cause)
+    place = {i: at for at, i in enumerate(result.robot.driven)}
+    links, rows = len(result.robot.links), result.rows
+    out = [(len(place) + c, j, result.contact_work, (j, c)) for j, c in rows["power_contact"].at.tolist()]
+    out += [(place[i], j, result.work, (i, j)) for i, j in rows["power_link"].at.tolist()]
+    out += [(place[i], links + e, result.load_work, (i, e)) for i, e in rows["power_load"].at.tolist()]
+    return [
+        {"i": i, "j": j, "given": float(work.given[at]), "taken": float(work.taken[at])}
+        for i, j, work, at in out
+    ]
+
+
+def poses(bodies: Sequence[BodyEntry], q: Array) -> tuple[Array, Array]:
+    """Return origins and centres of mass in the base frame, each (S, bodies, 3) in m.
+
+    q: coordinates (S, n) in rad or m
+    """
+    turns: list[Array] = []
+    origins: list[Array] = []
+    centres: list[Array] = []
+    for body in bodies:
+        if body.parent is None:
+            turn, origin = np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3))
         else:
-            continue
-        given, taken = float(work.given[at]), float(work.taken[at])
-        i = len(place) + (c.cause or 0) if c.quantity == "power_contact" else place[c.joint or 0]
-        out.append({"i": i, "j": j, "given": given, "taken": taken})
-    return out
+            turn, origin = turns[body.parent], origins[body.parent]
+        move = displacement(body, q)[:, 0]
+        shift, rotation = np.broadcast_to(body.translation, (len(q), 3)), np.array(body.rotation)
+        if body.kind == "prismatic":
+            shift = shift + move[:, None] * rotation[:, 2]
+        origin = origin + np.einsum("sab,sb->sa", turn, shift)
+        turn = turn @ rotation
+        if body.kind == "revolute":
+            turn = turn @ _about_z(move)
+        turns.append(turn)
+        origins.append(origin)
+        centres.append(origin + turn @ np.array(body.com))
+    return np.stack(origins, axis=1), np.stack(centres, axis=1)
+
+
+def _about_z(angle: Array) -> Array:
+    turn = np.zeros((len(angle), 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
+    turn[:, 1, 0] = np.sin(angle)
+    turn[:, 0, 1] = -turn[:, 1, 0]
+    turn[:, 2, 2] = 1.0
+    return turn

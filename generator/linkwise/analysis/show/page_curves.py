@@ -1,38 +1,60 @@
-"""Curves that a page can draw: their numbers over all samples, and for long curves the points drawn."""
+"""Curves that a page draws, their numbers over all samples, and how a page holds numbers and scripts."""
 
+import base64
+import gzip
 from typing import Any
 
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_quantities import PASSIVE, TERMS
+from linkwise.analysis.result_quantities import PASSIVE, QUANTITIES
 from linkwise.analysis.show.drawn_curves import DrawnCurves, drawn_curves, piece_size
-from linkwise.analysis.show.packed_page import encoded
-from linkwise.analysis.show.source_curves import numbers_of_curves
+from linkwise.analysis.show.induced_figure import numbers_of_curves
+from linkwise.extras import extra
 from linkwise.package.load import Array
+
+
+def plotly_parts() -> dict[str, str]:
+    """Return plotly's script, packed, and its notice; it is most of a page: 4.8 MB, and packed 2.0 MB."""
+    script = extra("plotly.offline").get_plotlyjs()
+    notice = script[: script.find("*/")].replace("*", " ").strip("/ \n")
+    return {"notice": " ".join(notice.split()), "plotly": packed(script)}
+
+
+def packed(text: str) -> str:
+    """Return a text as gzip in base64."""
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
+
+
+def encoded(values: Array, kind: str = "<f8") -> str:
+    """Return numbers as base64, float64 to the last bit unless another type is given."""
+    return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode("ascii")
+
 
 PIECES, POINTS = 750, 1_000_000
 """Most pieces of a long curve, and most points of all curves together; a point takes five bytes."""
 MOTION = ("tau_qdd", "tau_qd")
+KINDS = {"tau": ("whole",), "tau_link": ("whole",), **{name: (name, "motion") for name in MOTION}}
+KINDS |= {name: (name,) for name in ("tau_gravity", *PASSIVE, "tau_load")}
+"""Kinds of the curves in which a quantity counts."""
 Key = tuple[str, int, int | None, int | None]
 """Kind of cause ("motion" and "whole" are sums), indices of joint and cause, and link, None for all links."""
 
 
 class CurveSums:
-    """Sums of columns, one for each curve."""
+    """Sums of rows, one for each curve."""
 
     def __init__(self, result: AnalysisResult) -> None:
         place = {i: at for at, i in enumerate(result.robot.driven)}
         rows: dict[Key, list[int]] = {}
-        for row, c in enumerate(result.columns):
-            if c.joint not in place:
-                continue
-            i, kinds = place[c.joint], _kinds(c.quantity)
-            cause = place.get(c.cause) if c.quantity in MOTION and c.cause is not None else c.cause
-            links = (None,) if c.link is None else (c.link,) if c.quantity == "tau_link" else (None, c.link)
-            for kind in kinds:
-                for link in links:
-                    rows.setdefault((kind, i, cause, link), []).append(row)
+        for name, kinds in KINDS.items():
+            axes = QUANTITIES[name].axes
+            for row, at in result.rows[name].listed():
+                index = dict(zip(axes, at, strict=True))
+                link, cause = index.get("link"), index.get("load", place.get(index.get("cause", -1)))
+                for kind in kinds:
+                    for some in dict.fromkeys((link if name == "tau_link" else None, link)):
+                        rows.setdefault((kind, place[index["joint"]], cause, some), []).append(row)
         self.keys = tuple(rows)
         self._rows = np.array([row for some in rows.values() for row in some], dtype=np.intp)
         counts = np.array([len(some) for some in rows.values()], dtype=np.intp)
@@ -44,17 +66,9 @@ class CurveSums:
         return sums
 
 
-def _kinds(quantity: str) -> tuple[str, ...]:
-    if quantity in MOTION:
-        return quantity, "motion"
-    if quantity in ("tau", "tau_link"):
-        return ("whole",)
-    return (quantity,) if quantity in (*TERMS, *PASSIVE, "tau_load") else ()
-
-
 def page_pieces(result: AnalysisResult, sums: CurveSums) -> int:
     """Return the number of pieces into which long curves of a page are cut."""
-    curves = len(sums.keys) + numbers_of_curves(result.columns)
+    curves = len(sums.keys) + numbers_of_curves(result.rows)
     return max(2, min(PIECES, POINTS // (2 * curves)))
 
 
@@ -66,7 +80,7 @@ def curve_data(result: AnalysisResult, is_thinned: bool) -> dict[str, Any]:
     """
     sums = CurveSums(result)
     mean, peak = np.zeros((2, len(sums.keys)))
-    moving = [row for row, column in enumerate(result.columns) if column.quantity in MOTION]
+    moving = result.rows.numbers(*MOTION)
     most, busiest = 0.0, float(result.time[0])
     for part in result.parts():
         sizes = np.abs(sums(part))

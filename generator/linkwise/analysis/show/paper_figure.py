@@ -1,14 +1,12 @@
 """Five panels below one another, laid out like the paper's Fig. 5-9 and 10-14."""
 
-import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_columns import Column, load_unit
-from linkwise.analysis.result_quantities import Quantity
-from linkwise.analysis.show.drawn_curves import drawn_curves, foot
+from linkwise.analysis.result_rows import load_unit
+from linkwise.analysis.show.drawn_curves import drawn_curves, foot, new_figure, write_note
 from linkwise.extras import extra
 from linkwise.plotstyle import colour, dash, drawn
 
@@ -21,11 +19,11 @@ PANEL, LINE = 1.75, 0.22
 
 @dataclass(frozen=True)
 class _Panel:
-    """A panel and which columns it draws."""
+    """A panel, and which rows of the result it draws, each with the number of its colour."""
 
     title: str
     symbol: str
-    wanted: Callable[[Column], bool]
+    lines: list[tuple[int, int]]
 
 
 def paper(result: AnalysisResult, i: int) -> "Figure":
@@ -35,9 +33,7 @@ def paper(result: AnalysisResult, i: int) -> "Figure":
     named = (("Joints", robot.plot_joints), ("Links and loads" if result.loads else "Links", carried))
     legends = [_legend_rows(names) for _, names in named]
     heights = [PANEL] * len(panels) + [LINE * (rows + 1) for rows in legends]
-    figure: Figure = extra("matplotlib.figure").Figure(
-        figsize=(7.6, sum(heights) + 0.9), layout="constrained"
-    )
+    figure = new_figure(7.6, sum(heights) + 0.9)
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     axes = [figure.add_subplot(grid[0])]
     axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(1, len(panels))]
@@ -51,8 +47,7 @@ def paper(result: AnalysisResult, i: int) -> "Figure":
     for row, (title, names) in enumerate(named, len(panels)):
         _legend(figure.add_subplot(grid[row]), title, names)
     figure.suptitle(f"{drawn(robot.name, 60)} · {drawn(result.source, 60)}", x=0.01, ha="left", fontsize=11)
-    below = "\n".join(textwrap.wrap(_left_out(result), 125) + textwrap.wrap(foot(result), 125))
-    figure.supxlabel(below, x=0.01, ha="left", fontsize=7, color="#5A6270")
+    write_note(figure, _left_out(result), foot(result), width=125)
     return figure
 
 
@@ -61,29 +56,32 @@ def _panels(result: AnalysisResult, i: int) -> tuple[_Panel, ...]:
     units = " or ".join(dict.fromkeys(robot.units))
     loads = " or ".join(dict.fromkeys(map(load_unit, robot.units)))
     on = f"on {drawn(robot.joints[i])} ({load_unit(robot.units[i])})"
-    own = own_joints(result)
+    rows, number = result.rows, i + 1
 
-    def own_term(quantity: Quantity) -> Callable[[Column], bool]:
-        return lambda c: c.quantity == quantity and c.joint == i and c.cause == own[c.link or 0]
+    def lines(name: str, axis: str, first: int = 0, **where: int) -> list[tuple[int, int]]:
+        return [(row, first + rows.index(row, axis)) for row in rows.numbers(name, **where).tolist()]
 
-    number = i + 1
+    def own_terms(name: str) -> list[tuple[int, int]]:
+        every = enumerate(own_joints(result))
+        return [line for j, k in every for line in lines(name, "link", joint=i, link=j, cause=k)]
+
     return (
-        _Panel(f"Joint coordinates ({units})", "$q_i$", lambda c: c.quantity == "q"),
-        _Panel(f"Joint torques ({loads})", r"$\tau_i$", lambda c: c.quantity == "tau"),
+        _Panel(f"Joint coordinates ({units})", "$q_i$", lines("q", "joint")),
+        _Panel(f"Joint torques ({loads})", r"$\tau_i$", lines("tau", "joint")),
         _Panel(
             f"Partial torques {on}, through each link{' and by each load' if result.loads else ''}",
             rf"$\tau_{{{number}j}}$",
-            lambda c: c.quantity in ("tau_link", "tau_load") and c.joint == i,
+            lines("tau_link", "link", joint=i) + lines("tau_load", "load", len(robot.links), joint=i),
         ),
         _Panel(
             f"Propagation torques {on}: each link's own joint only, velocity",
             rf"$\tau^p_{{{number}j}}(\dot q_j)$",
-            own_term("tau_qd"),
+            own_terms("tau_qd"),
         ),
         _Panel(
             f"Propagation torques {on}: each link's own joint only, acceleration",
             rf"$\tau^p_{{{number}j}}(\ddot q_j)$",
-            own_term("tau_qdd"),
+            own_terms("tau_qdd"),
         ),
     )
 
@@ -96,21 +94,15 @@ def own_joints(result: AnalysisResult) -> tuple[int, ...]:
     robot = result.robot
     known = {body.link: robot.borne_by([body.coordinate])[-1:] for body in robot.bodies or ()}
     last = [(0,)] * len(robot.links)
-    for c in result.columns:
-        if c.quantity == "tau_link" and c.link is not None:
-            last[c.link] = max(last[c.link], (c.joint or 0,))
+    for i, j in result.rows["tau_link"].at.tolist():
+        last[j] = max(last[j], (i,))
     return tuple((known.get(link) or last[j])[0] for j, link in enumerate(robot.links))
 
 
 def _draw(axis: Any, result: AnalysisResult, panel: _Panel) -> None:
-    rows = [row for row, column in enumerate(result.columns) if panel.wanted(column)]
-    found = drawn_curves(result, lambda part: part.values[rows])
-    for row, time, values in zip(rows, found.time, found.values, strict=True):
-        column = result.columns[row]
-        at = column.joint if column.link is None else column.link
-        if column.quantity == "tau_load":
-            at = len(result.robot.links) + (column.cause or 0)
-        axis.plot(time, values, **_style(at or 0))
+    found = drawn_curves(result, lambda part: part.values[[row for row, _ in panel.lines]])
+    for (_, at), time, values in zip(panel.lines, found.time, found.values, strict=True):
+        axis.plot(time, values, **_style(at))
     axis.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
     axis.set_title(panel.title)
     axis.set_ylabel(panel.symbol, fontsize=11, parse_math=True)

@@ -1,15 +1,19 @@
 """Figure of each joint's power over time, and below it the work given to each link and taken back."""
 
-import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.show.drawn_curves import drawn_curves, foot
-from linkwise.analysis.show.largest_few import largest_few
+from linkwise.analysis.show.drawn_curves import (
+    drawn_curves,
+    foot,
+    largest_few,
+    new_figure,
+    write_note,
+    write_title,
+)
 from linkwise.analysis.work import Work
-from linkwise.extras import extra
 from linkwise.package.load import Array
 from linkwise.plotstyle import INK, colour, dash, drawn, tone
 
@@ -32,7 +36,7 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     ground = () if robot.contacts is None else robot.contacts.names
     givers = [*joints, *(drawn(f"ground at {name}") for name in ground)]
     height = 0.9 + (0.34 if len(givers) <= MANY else 0.26) * len(givers)
-    figure: Figure = extra("matplotlib.figure").Figure(figsize=(8.4, 3.4 + height), layout="constrained")
+    figure = new_figure(8.4, 3.4 + height)
     curves, bars = figure.subplots(2, 1, height_ratios=(2.4, height))
     _curves(curves, result, joints)
     targets = [drawn(name) for name in (*robot.plot_links, *result.load_labels)]
@@ -44,9 +48,8 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     bars.set_xlabel("J")
     bars.grid(axis="y", visible=False)
     _legend(bars, "link or load" if result.loads else "link")
-    figure.suptitle(f"{drawn(robot.name, 40)} · {drawn(result.source, 50)}", x=0.01, ha="left", fontsize=11)
-    made = textwrap.fill(foot(result), 140)
-    figure.supxlabel(made, x=0.01, ha="left", fontsize=7, color="#5A6270")
+    write_title(figure, result)
+    write_note(figure, foot(result))
     return figure
 
 

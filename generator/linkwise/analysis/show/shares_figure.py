@@ -1,16 +1,87 @@
-"""Figure of what loads each joint over the whole movement, as stacked bars."""
+"""Figure of what loads each joint over the whole movement, as stacked bars: gravity, loads, motions."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from linkwise.analysis.joint_causes import Cause, are_motions_whole, causes_of, sizes
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.show.share_parts import SharePart, share_parts
-from linkwise.extras import extra
-from linkwise.plotstyle import drawn
+from linkwise.analysis.show.drawn_curves import new_figure, write_title
+from linkwise.package.load import Array
+from linkwise.plotstyle import BLUE, GRAVITY, SKY, VERMILION, drawn, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+MANY = 12
+"""Number of joints above which a bar has the joint's own motion, the largest other one, and the rest."""
+HATCHES = {"motion": "", "acceleration": "", "velocity": "////", "own": "....", "load": "xx"}
+LARGEST, REST = "largest motion of another joint", "motions of all other joints, shares added"
+
+
+@dataclass(frozen=True, eq=False)
+class SharePart:
+    """A part of every joint's bar: mean sizes of net torques (joints,), and how it looks."""
+
+    label: str
+    sizes: Array
+    fill: str
+    hatch: str = ""
+    names: tuple[str, ...] = ()
+    """Name of the cause at each joint, where it differs from joint to joint."""
+
+
+def share_parts(result: AnalysisResult) -> tuple[list[SharePart], list[SharePart]]:
+    """Return parts for gravity, loads and joints' own torques, and parts for motions.
+
+    Motions are grouped if there are more joints than `MANY`.
+    """
+    robot = result.robot
+    causes = causes_of(result, robot.plot_joints, drawn, together=are_motions_whole(result))
+    found = list(zip(causes, sizes(result, causes), strict=True))
+    moving = [(cause, size) for cause, size in found if cause.is_motion]
+    fixed = [(cause, size) for cause, size in found if not cause.is_motion]
+    return _fixed(result, fixed), _few(result, moving) if len(robot.driven) > MANY else _each(result, moving)
+
+
+def _fixed(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
+    """Return parts for gravity, loads, and joints' own torques."""
+    own = [cause for cause, _ in found if cause.kind == "own"]
+    tones = [*own, *(cause for cause, _ in found if cause.kind == "load")]  # in the page's order
+    out = []
+    for cause, values in found:
+        if cause.kind == "gravity":
+            out.append(SharePart(cause.label, values, GRAVITY))
+        else:
+            fill = tone(len(result.robot.driven) + tones.index(cause))
+            out.append(SharePart(cause.label, values, fill, HATCHES[cause.kind]))
+    return out
+
+
+def _each(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
+    """Return a part for every motion, or for its acceleration and its velocity."""
+    place = {k: at for at, k in enumerate(result.robot.driven)}
+    return [
+        SharePart(cause.label, values, tone(place[cause.number or 0]), HATCHES[cause.kind])
+        for cause, values in found
+    ]
+
+
+def _few(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
+    """Return parts for many joints: each one's own motion, the largest other one, and the sum of the rest."""
+    driven, names = result.robot.driven, result.robot.plot_joints
+    by = np.array([size for _, size in found]).T
+    own = by.diagonal()
+    others = by * (1.0 - np.eye(len(driven)))
+    largest = others.max(axis=1)
+    first = tuple(drawn(names[driven[k]]) for k in others.argmax(axis=1))
+    return [
+        SharePart("its own motion", own, VERMILION),
+        SharePart(LARGEST, largest, BLUE, names=first),
+        SharePart(REST, others.sum(axis=1) - largest, SKY),
+    ]
 
 
 def shares(result: AnalysisResult, _: int) -> "Figure":
@@ -19,10 +90,8 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     fixed, movement = share_parts(result)
     every = [*fixed, *movement]
     rows = -(-len(every) // 3)
-    figure: Figure = extra("matplotlib.figure").Figure(
-        figsize=(8.4, 1.3 + (0.42 if len(movement) > 3 else 0.3) * len(robot.driven) + 0.2 * rows),
-        layout="constrained",
-    )
+    row = 0.42 if len(movement) > 3 else 0.3
+    figure = new_figure(8.4, 1.3 + row * len(robot.driven) + 0.2 * rows)
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 3))
     bars = _bars(left, every)
     _bars(right, movement)
@@ -37,12 +106,7 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
             _name_beside(right, part)
     for axis in (left, right):
         axis.set_xlabel("mean size of the net torque, % of all")
-    figure.suptitle(
-        f"What loads each joint · {drawn(robot.name, 40)} · {drawn(result.source, 50)}",
-        x=0.01,
-        ha="left",
-        fontsize=11,
-    )
+    write_title(figure, result, "What loads each joint")
     figure.legend(
         bars,
         [part.label for part in every],

@@ -1,0 +1,244 @@
+"""Rows of a result: the entries of each quantity that may differ from 0, and their places along its axes.
+
+A result is one array (rows, samples). Quantity by quantity, a row is an entry of an array with the axes of
+`QUANTITIES`; what is identically 0 has no row. Rows have names and units as columns of tables.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from linkwise_runtime.robot_axes import NamedAxis, axes_of
+from numpy.typing import NDArray
+
+from linkwise.analysis.induced_points import InducedPoint
+from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loads.placed_load import PlacedLoad
+from linkwise.analysis.result_quantities import (
+    FORCE_OF,
+    PASSIVE,
+    POWER,
+    POWER_TERMS,
+    QUANTITIES,
+    TORQUE_OF,
+    ResultQuantity,
+)
+from linkwise.analysis.term_rows import TermArrays
+from linkwise.escape import column_part
+from linkwise.package.load import Array
+
+Indices = NDArray[np.intp]
+Place = tuple[str, tuple[int, ...]]
+"""A quantity, and the index along each of its axes."""
+OVER_TIME = {"velocity": "/s", "acceleration": "/s²"}
+FIELD_OF = {"load": "cause", "contact": "cause", "constraint": "cause", "component": "row"}
+"""Fields of `Column` that have the indices along axes of other names."""
+
+
+class QuantityRows(NamedTuple):
+    """Rows of a quantity, ascending."""
+
+    rows: slice | Indices
+    """Rows, as a slice where they follow each other."""
+    numbers: Indices
+    """Numbers of the rows."""
+    at: Indices
+    """Index along each axis of the quantity, (entries, axes)."""
+
+    def listed(self) -> Iterator[tuple[int, list[int]]]:
+        """Yield the number of each row, and its index along each axis."""
+        return zip(self.numbers.tolist(), self.at.tolist(), strict=True)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A row as a column of a table; `joint`, `link` and `cause` are indices, None where they mean nothing.
+
+    The cause is a coordinate; for the torque of a load it is that load, for share and power of a contact that
+    contact, and for a force or slip the row of the constraint, where `load` is the load that causes a force,
+    if one does. An induced acceleration has the number of its point and of a row of that point.
+    """
+
+    quantity: str
+    name: str
+    unit: str
+    joint: int | None = None
+    link: int | None = None
+    cause: int | None = None
+    point: int | None = None
+    row: int | None = None
+    load: int | None = None
+
+
+def load_unit(unit: str) -> str:
+    """Return the unit of torque or force where motion is in `unit`, "rad" or "m"; both for another."""
+    return {"rad": "N·m", "m": "N"}.get(unit, "N·m or N")
+
+
+@dataclass(frozen=True, eq=False)
+class ResultRows:
+    """The rows of a result of one robot; points are those whose acceleration is split."""
+
+    axes: Mapping[str, NamedAxis]
+    points: tuple[InducedPoint, ...]
+    places: tuple[Place, ...]
+
+    @classmethod
+    def of(
+        cls,
+        robot: LoadedRobot,
+        places: Iterable[Place],
+        loads: Sequence[PlacedLoad] = (),
+        points: Sequence[InducedPoint] = (),
+    ) -> "ResultRows":
+        """Return rows at these places of the quantities of a robot with loads and points."""
+        rows = robot.constraint_rows
+        bases = tuple("rad" if " moment" in row else "m" if " force" in row else "" for row in rows)
+        contacts = () if robot.contacts is None else robot.contacts.names
+        components = {
+            row: unit.partition("/")[0] for p in points for row, unit in zip(p.rows, p.units, strict=True)
+        }
+        axes = axes_of(robot.joints, robot.units, robot.links) | {
+            "load": NamedAxis("load", tuple(borne.name for borne in loads)),
+            "constraint": NamedAxis("constraint", rows, bases),
+            "contact": NamedAxis("contact", contacts),
+            "point": NamedAxis("point", tuple(point.name for point in points)),
+            "component": NamedAxis("component", tuple(components), tuple(components.values())),
+        }
+        return cls(axes, tuple(points), tuple(places))
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+    def __getitem__(self, name: str) -> QuantityRows:
+        """Return the entries of a quantity; none where nothing of it is in the result."""
+        return self._entries.get(name) or self._entries_at(name, [])
+
+    @cached_property
+    def _entries(self) -> dict[str, QuantityRows]:
+        found: dict[str, list[int]] = {}
+        for row, (name, _) in enumerate(self.places):
+            found.setdefault(name, []).append(row)
+        return {name: self._entries_at(name, rows) for name, rows in found.items()}
+
+    def _entries_at(self, name: str, rows: list[int]) -> QuantityRows:
+        numbers, count = np.array(rows, np.intp), len(QUANTITIES[name].axes)
+        at = np.array([self.places[row][1] for row in rows], np.intp).reshape(len(rows), count)
+        first, end = (rows[0], rows[-1] + 1) if rows else (0, 0)
+        return QuantityRows(slice(first, end) if end - first == len(rows) else numbers, numbers, at)
+
+    def numbers(self, *names: str, **where: int | Sequence[int]) -> Indices:
+        """Return the numbers of the rows of quantities, at the given indices along axes only: joint=2."""
+        found = [np.zeros(0, np.intp)]
+        for name in names:
+            _, numbers, at = self[name]
+            for axis, index in where.items():
+                along = at[:, QUANTITIES[name].axes.index(axis)]
+                asked = along == index if isinstance(index, int) else np.isin(along, index)
+                numbers, at = numbers[asked], at[asked]
+            found.append(numbers)
+        return np.concatenate(found)
+
+    def index(self, row: int, axis: str) -> int:
+        """Return the index of a row along an axis of its quantity."""
+        name, at = self.places[row]
+        return at[QUANTITIES[name].axes.index(axis)]
+
+    def dense(self, name: str, values: Array) -> Array:
+        """Return a quantity (S, *axes), zero where it has no row, from the rows of a result (rows, S)."""
+        rows, _, at = self[name]
+        out = np.zeros((values.shape[1], *(len(self.axes[axis].names) for axis in QUANTITIES[name].axes)))
+        out[:, *at.T] = values[rows].T
+        return out
+
+    def put(self, out: Array, name: str, dense: Array) -> None:
+        """Fill the rows of a quantity in `out` (rows, S) from its whole array (S, *axes)."""
+        rows, _, at = self[name]
+        out[rows] = dense[:, *at.T].T
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """Rows as columns of a table, with names and units."""
+        return tuple(self._column(QUANTITIES[name], at) for name, at in self.places)
+
+    def _column(self, quantity: ResultQuantity, at: tuple[int, ...]) -> Column:
+        index = dict(zip(quantity.axes, at, strict=True))
+        names = [self.axes[axis].names[index[axis]] for axis in quantity.written_axes]
+        if quantity.name == "slip":
+            names = list(map(slip_name, names))
+        fields: dict[str, int] = {}
+        for axis, number in index.items():
+            field = FIELD_OF.get(axis, axis)
+            fields[field if field not in fields else axis] = number
+        what, _, axis = quantity.array.unit.partition(":")
+        base = self.axes[axis].units[index[axis]] if axis else what or "1"
+        if "point" in index:
+            point = self.points[index["point"]]
+            fields["row"] = point.rows.index(names[1])
+            base = point.units[fields["row"]].partition("/")[0]
+        unit = load_unit(base) if what == "torque" else base + OVER_TIME.get(what, "")
+        name = "/".join([quantity.name.removesuffix("_link"), *map(column_part, names)])
+        return Column(quantity.name, name, unit, **fields)
+
+
+def torque_places(
+    robot: LoadedRobot,
+    terms: TermArrays,
+    loads: Sequence[PlacedLoad] = (),
+    power_terms: bool = False,
+    measured: Sequence[int] = (),
+) -> list[Place]:
+    """Return the places of a result's rows: time, motion, τ_i, τ_ij, terms, passive, loads, forces, power.
+
+    measured: contacts whose loads were measured
+    """
+    out: list[Place] = [("time", ())]
+    out += [(name, (i,)) for name in ("q", "qd", "qdd") for i in range(len(robot.joints))]
+    out += [("tau", (i,)) for i in robot.driven]
+    out += [("tau_link", (i, j)) for i, j, _ in terms.torque]
+    out += [("tau_qdd", (i, j, k)) for i, j, k, _ in terms.acceleration]
+    out += [("tau_qd", (i, j, k)) for i, j, k, _ in terms.velocity]
+    out += [("tau_gravity", (i, j)) for i, j, _ in terms.gravity]
+    own = {name: robot.with_own(field) for name, field in PASSIVE.items()}
+    out += [(name, (i,)) for name, joints in own.items() for i in robot.borne_by(joints)]
+    out += [("tau_load", (i, e)) for e, borne in enumerate(loads) for i in robot.borne_by(borne.seat.joints)]
+    powers = (*POWER, *POWER_TERMS) if power_terms else POWER
+    power = [(name, at) for name in powers for torque, at in out if torque == TORQUE_OF[name]]
+    forces = [FORCE_OF[name] for name, joints in own.items() if joints]
+    return [*out, *_forces(robot, forces, len(loads)), *_ground(robot, measured), *power]
+
+
+def _forces(robot: LoadedRobot, own: Sequence[str], loads: int) -> Iterator[Place]:
+    """Yield the places of constraint forces, row by row: whole, by link, by passive torque, by load."""
+    for row in range(len(robot.constraint_rows)):
+        yield "force", (row,)
+        yield from (("force_link", (j, row)) for j in range(len(robot.links)))
+        yield from ((name, (row,)) for name in own)
+        yield from (("force_load", (row, e)) for e in range(loads))
+
+
+def _ground(robot: LoadedRobot, measured: Sequence[int]) -> Iterator[Place]:
+    """Yield the places of contacts: shares, power into links, slip, and what was measured there."""
+    ground = robot.contacts
+    if ground is None:
+        return
+    contacts = range(len(ground.names))
+    yield from (("contact", (c,)) for c in contacts)
+    yield from (("power_contact", (j, c)) for c in contacts for j in range(len(robot.links)))
+    rows = range(robot.contact_rows.start, robot.contact_rows.stop)
+    yield from (("slip", (row,)) for row in rows)
+    for row, owner, part in zip(rows, ground.owners, ground.wrench_rows, strict=True):
+        if owner in measured and part is not None:
+            yield "force_measured", (row,)
+    yield from (("tau_as_loads", (i,)) for i in robot.driven if measured)
+
+
+def slip_name(row: str) -> str:
+    """Return the name of a row's slip: "foot angular_x" for "foot moment_x", "foot x" for "foot force_x"."""
+    name, _, force = row.rpartition(" ")
+    return f"{name} {force.replace('moment_', 'angular_').replace('force_', '')}"
