@@ -439,4 +439,4 @@ def test_contacts_are_as_near_as_links_are_short(size: float, most: float, tmp_p
     manifest = Manifest.read(tmp_path / "arm")
     assert manifest.tree is not None
     held = HeldContacts(manifest, manifest.tree, random_states(manifest.joints, 2))
-    assert 0.0 < np.linalg.norm(held.equations("point", manifest.tree).asked["point"]) < most
+    assert 0.0 < np.linalg.norm(held.equations("point", manifest.tree).arguments["point"]) < most

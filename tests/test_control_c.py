@@ -15,7 +15,7 @@ from answers import random_states, relative_error
 from compiled import WARNED, compile_library, name_of
 from conftest import DATA, needs_compiler
 from linkwise import Options, generate, read_system, write_package
-from linkwise.check.compiled_c import declared
+from linkwise.check.compiled_c import declarations
 from linkwise.package.load import import_package
 from linkwise_runtime.targets import ROWS
 from test_emitted_c import COMPILERS, strict
@@ -251,7 +251,7 @@ def test_c_offers_nothing_that_python_refuses(kind: str, kinds: dict[str, Path])
     name, package = name_of(kinds[kind]), import_package(kinds[kind])
     robot = package.load("numpy")
     header = (kinds[kind] / "c" / f"{name}.h").read_text(encoding="utf-8")
-    functions = {function.removeprefix(f"{name}_") for function in declared(name, header)}
+    functions = {function.removeprefix(f"{name}_") for function in declarations(name, header)}
     offered = {function for function in functions if not re.fullmatch(r"link_\d+f?|.*f", function)}
     assert functions == {of + end for of in offered for end in ("", "f")} | {
         f"link_{j + 1}{end}" for j in range(robot.N) for end in ("", "f")

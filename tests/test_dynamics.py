@@ -10,28 +10,20 @@ from answers import random_states, relative_error
 from conftest import DATA, LOCKED_FINGERS, PANDA
 from evaluation import evaluate
 from linkwise import Options, generate, read_system
-from linkwise.dynamics.coefficients import LinkForms
-from linkwise.dynamics.derive import derive, link_kernel
+from linkwise.dynamics.derive import derive, link_forms
 from linkwise.dynamics.frame_search import MAX_AXES, FrameSearch, _spread
-from linkwise.dynamics.kernel import lowering
+from linkwise.dynamics.joint_chain import CommonAxes, JointChain
+from linkwise.dynamics.link_forms import LinkForms, lowering
 from linkwise.dynamics.link_motion import Origin
-from linkwise.dynamics.screws import CommonAxes, Orientation
-from linkwise.expression.count import count_operations
-from linkwise.expression.expression_graph import Graph
 from linkwise.symbolic.chain_rule import partial_torques
-from linkwise.symbolic.system import RigidSystem, System
+from linkwise.symbolic.system import RigidSystem
 
 BLOCKS = ("acceleration", "velocity", "gravity", "torque", "decomposed_torque", "position_gradient")
 
 
-def from_the_energy(system: System, link: int) -> tuple[Graph, LinkForms]:
-    kernel = link_kernel(system, link, "energy")
-    return kernel.graph, kernel.forms[0]
-
-
-def numbers(graph: Graph, forms: LinkForms, block: str, states: list[dict[str, float]]) -> np.ndarray:
+def numbers(forms: LinkForms, block: str, states: list[dict[str, float]]) -> np.ndarray:
     values = getattr(forms, block).values()
-    return np.array([evaluate(graph, values, state) for state in states])
+    return np.array([evaluate(forms.graph, values, state) for state in states])
 
 
 def states_of_three(samples: int) -> list[dict[str, float]]:
@@ -67,29 +59,28 @@ def test_rigid_link_rule_is_euler_lagrange_of_the_energy(block: str) -> None:
     states = states_of_three(10)
     by_rule, by_energy = [], []
     for link in range(3):
-        kernel = link_kernel(system, link)
-        graph, forms = from_the_energy(system, link)
-        assert kernel.forms[0].path == forms.path
-        by_rule.append(numbers(kernel.graph, kernel.forms[0], block, states))
-        by_energy.append(numbers(graph, forms, block, states))
+        rule, energy = link_forms(system, link), link_forms(system, link, "energy")
+        assert rule.path == energy.path
+        by_rule.append(numbers(rule, block, states))
+        by_energy.append(numbers(energy, block, states))
     assert relative_error(np.hstack(by_rule), np.hstack(by_energy)) <= 1e-12
 
 
 FRAMES = [
-    (CommonAxes(-1), Origin(-1), ("the base's", "the base's, at rest")),
-    (
-        CommonAxes(0),
-        Origin(1),
-        ("of the frame that joint 1 moves", "where joint 2 is at the instant, at rest"),
-    ),
-    (CommonAxes(2, before=True), Origin(0), ("of the frame before joint 3 moves", "where joint 1 is at ")),
+    (CommonAxes(0), Origin(0), ("the base's", "the base's, at rest")),
     (
         CommonAxes(1),
+        Origin(2),
+        ("of the frame that joint 1 moves", "where joint 2 is at the instant, at rest"),
+    ),
+    (CommonAxes(3, before=True), Origin(1), ("of the frame before joint 3 moves", "where joint 1 is at ")),
+    (
+        CommonAxes(2),
         Origin(by_points=True),
         ("of the frame that joint 2", "the link's centre of mass, moving"),
     ),
     (
-        CommonAxes(1, before=True),
+        CommonAxes(2, before=True),
         Origin(),
         ("of the frame before joint 2", "the link's centre of mass, moving"),
     ),
@@ -102,30 +93,26 @@ def test_every_common_frame_gives_the_same_numbers_and_says_which_it_is(
 ) -> None:
     system = read_system(DATA / "skew.toml")
     assert isinstance(system, RigidSystem)
-    states, tree = states_of_three(3), [(f - 1, joint) for f, joint in enumerate(system.links[2].joints)]
-    kernel = FrameSearch(system, [2], tree, [range(3)]).build(axes, origin)
-    assert all(found.startswith(said) for found, said in zip(kernel.frame, words, strict=True))
-    assert kernel.frame[1].endswith("square root of its mass, 0.4 kg") == (origin.frame is None)
-    graph, forms = from_the_energy(system, 2)
+    states = states_of_three(3)
+    rule, energy = FrameSearch(system, 2).build(axes, origin), link_forms(system, 2, "energy")
+    assert all(found.startswith(said) for found, said in zip(rule.frame, words, strict=True))
+    assert rule.frame[1].endswith("square root of its mass, 0.4 kg") == (origin.frame is None)
     for block in BLOCKS:
-        by_rule = numbers(kernel.graph, kernel.forms[0], block, states)
-        assert relative_error(by_rule, numbers(graph, forms, block, states)) <= 1e-12, block
+        assert relative_error(numbers(rule, block, states), numbers(energy, block, states)) <= 1e-12, block
 
 
 def test_an_origin_beside_the_common_axes_own_is_taken_where_it_costs_less() -> None:
     system = read_system(DATA / "skew.toml")
     assert isinstance(system, RigidSystem)
-    tree = [(f - 1, joint) for f, joint in enumerate(system.links[2].joints)]
-    found = list(FrameSearch(system, [2], tree, [range(3)]).framed(MAX_AXES))
+    found = list(FrameSearch(system, 2).framed(MAX_AXES))
     own = min(cost for cost, axes, origin in found if axes.frame == origin.frame)
     beside = min(cost for cost, axes, origin in found if axes.frame != origin.frame)
     assert beside < own
-    kernel = link_kernel(system, 2, "rule")
-    assert count_operations(kernel.graph, kernel.forms[0].decomposition()).arithmetic <= beside
+    assert link_forms(system, 2, "rule").decomposition_cost <= beside
 
 
 def test_a_decomposition_is_of_all_four_quantities() -> None:
-    forms = link_kernel(read_system("planar3"), 2, "rule").forms[0]
+    forms = link_forms(read_system("planar3"), 2, "rule")
     parts = (forms.acceleration, forms.velocity, forms.gravity, forms.decomposed_torque)
     assert list(forms.decomposition()) == [node for part in parts for node in part.values()]
     assert [len(part) for part in parts] == [6, 9, 3, 3]
@@ -156,8 +143,9 @@ def test_joints_that_follow_one_coordinate_have_labels_of_their_own() -> None:
     assert isinstance(system, RigidSystem)
     lower, x = lowering(system)
     turning, other = system.links[2].joints[0], system.links[2].joints[2]
-    tree = [(f - 1, turning) for f in range(30)] + [(29, other), (30, other)]
-    labels = Orientation(lower, tree, (0.0, 0.0, 0.0), CommonAxes(-1), x).labels
+    joints = [turning] * 30 + [other] * 2
+    chain = JointChain(lower, joints, (0.0, 0.0, 0.0), CommonAxes(0), x)
+    labels = list(chain.label.values())
     assert labels[:3] + labels[25:] == ["1", "1b", "1c", "1z", "1aa", "1ab", "1ac", "1ad", "3", "3b"]
     assert len(set(labels)) == len(labels)
 
@@ -172,6 +160,4 @@ def test_joints_that_follow_one_coordinate_have_labels_of_their_own() -> None:
     ids=["planar3", "skew", "panda"],
 )
 def test_full_decomposition_stays_cheap(robot: str, options: Options, most: int) -> None:
-    kernels = derive(read_system(robot, options))
-    total = sum(count_operations(k.graph, k.forms[0].decomposition()).arithmetic for k in kernels)
-    assert total <= most
+    assert sum(forms.decomposition_cost for forms in derive(read_system(robot, options))) <= most

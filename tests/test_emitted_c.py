@@ -102,7 +102,7 @@ def test_the_header_gives_units_by_those_of_the_joints(directory_of: Callable[[s
     assert units(LEG, "g(") == ["N m", "N m", "N", "N"]
 
 
-def test_kernels_say_their_frame_where_they_have_one(directory_of: Callable[[str], Path]) -> None:
+def test_files_of_links_say_their_frame_where_they_have_one(directory_of: Callable[[str], Path]) -> None:
     def head(robot: str, file: str) -> str:
         return (directory_of(robot) / "c" / file).read_text(encoding="utf-8").split("*/")[0]
 
@@ -166,9 +166,9 @@ def test_the_index_and_every_label_agree_with_the_layout(
         entries[array] = found
     entries |= {"tau": entries["g"], "c0": entries["c1"]}
     for path in folder.glob("link_*.h"):
-        for kernel in path.read_text(encoding="utf-8").split("KERNEL(")[1:]:
-            link = re.match(r"link_(\d+)", kernel)
-            labels = re.findall(r"(\w+)_out\[(\d+) \* W \+ b\] = .*; /\* (\w+)\((.*)\) \*/", kernel)
+        for function in path.read_text(encoding="utf-8").split("KERNEL(")[1:]:
+            link = re.match(r"link_(\d+)", function)
+            labels = re.findall(r"(\w+)_out\[(\d+) \* W \+ b\] = .*; /\* (\w+)\((.*)\) \*/", function)
             for array, entry, label, indices in labels:
                 assert link
                 own = [e for e in entries[array] if e.split(", ")[1] == link[1]]
@@ -211,7 +211,7 @@ def test_it_says_what_numpy_says_for_any_count(
 
 
 def recursion(directory: Path, q: np.ndarray, qd: np.ndarray) -> dict[str, np.ndarray]:
-    """Dense c2, c1 and g of every link from torques alone, by a recursion that knows nothing of kernels.
+    """Dense c2, c1 and g of every link from torques alone, by a recursion that knows nothing of closed forms.
 
     tau is linear in qdd and quadratic in qd, for which differences are exact: c1 = 1/2 d(tau)/d(qd).
     """

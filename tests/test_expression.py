@@ -3,14 +3,16 @@
 import math
 import random
 
+import numpy as np
 import pytest
 import sympy as sp
 from evaluation import evaluate
 from linkwise.expression.count import count_operations, in_words
 from linkwise.expression.differentiate import derivative, substitute
+from linkwise.expression.expression import Expression
 from linkwise.expression.expression_graph import FUNCTIONS, Graph, Node
 from linkwise.expression.from_sympy import Lowering
-from linkwise.expression.vector import named
+from linkwise.expression.vector import Matrix, Vector, sum_of
 
 SMOOTH_AT_HALF = sorted(FUNCTIONS)
 
@@ -172,7 +174,8 @@ def test_derivative_is_the_slope(seed: int) -> None:
     leaves = [g.symbol(name) for name in at]
     output = random_expression(g, leaves, 15, seed)
     for name, leaf in zip(at, leaves, strict=True):
-        (exact,) = evaluate(g, [derivative(g, output, leaf)], at)
+        slope = derivative(Expression(g, output), Expression(g, leaf))
+        (exact,) = evaluate(g, [slope.node], at)
         (above,), (below,) = (evaluate(g, [output], at | {name: at[name] + h}) for h in (1e-6, -1e-6))
         assert exact == pytest.approx((above - below) / 2e-6, rel=1e-6, abs=1e-6)
 
@@ -180,8 +183,8 @@ def test_derivative_is_the_slope(seed: int) -> None:
 @pytest.mark.parametrize("function", SMOOTH_AT_HALF)
 def test_derivative_of_every_function_is_the_slope(function: str) -> None:
     g = Graph()
-    x = g.symbol("x")
-    (exact,) = evaluate(g, [derivative(g, g.call(function, x), x)], {"x": 0.5})
+    x = Expression(g, g.symbol("x"))
+    (exact,) = evaluate(g, [derivative(x.call(function), x).node], {"x": 0.5})
     f = FUNCTIONS[function]
     assert exact == pytest.approx((f(0.5 + 1e-6) - f(0.5 - 1e-6)) / 2e-6, rel=1e-8)
 
@@ -195,23 +198,90 @@ def test_power_is_a_short_product() -> None:
 
 def test_substitution_folds_what_becomes_constant() -> None:
     g = Graph()
-    x, y = g.symbol("x"), g.symbol("y")
-    output = g.add(g.mul(x, g.call("cos", y)), g.mul(y, y))
-    assert substitute(g, output, {x: g.zero}) == g.mul(y, y)
-    assert g.value(substitute(g, output, {x: g.one, y: g.const(2.0)})) == math.cos(2.0) + 4.0
+    x, y = (Expression(g, g.symbol(name)) for name in "xy")
+    output = x * y.call("cos") + y * y
+    assert substitute(output, {x: x.number(0.0)}) == y * y
+    assert substitute(output, {x: x.number(1.0), y: x.number(2.0)}).value == math.cos(2.0) + 4.0
 
 
 def test_a_vector_names_its_parts_by_their_axes() -> None:
     g = Graph()
     one, two = g.symbol("q1"), g.symbol("q2")
     parts = g.add(one, two), g.sub(one, two), g.mul(one, two)
-    assert named(g, "v3", parts) == parts
+    assert Vector(g, *parts).named("v3").nodes == parts
     assert [g.names[part] for part in parts] == ["v3_x", "v3_y", "v3_z"]
 
 
 @pytest.mark.parametrize("x", [-20.0, -3.0, 0.0, 15.0])
 def test_the_slope_of_tanh_keeps_its_digits_where_tanh_is_near_one(x: float) -> None:
     g = Graph()
-    at = g.symbol("x")
-    (slope,) = evaluate(g, [derivative(g, g.call("tanh", at), at)], {"x": x})
+    at = Expression(g, g.symbol("x"))
+    (slope,) = evaluate(g, [derivative(at.call("tanh"), at).node], {"x": x})
     assert slope == pytest.approx(4.0 / (math.exp(x) + math.exp(-x)) ** 2, rel=1e-14)
+
+
+def test_operators_make_the_nodes_of_the_graph() -> None:
+    g = Graph()
+    x, y = (Expression(g, g.symbol(name)) for name in "xy")
+    a, b = x.node, y.node
+    assert (x + y).node == g.add(a, b)
+    assert (x - y).node == g.sub(a, b)
+    assert (x * y).node == g.mul(a, b)
+    assert (x / y).node == g.div(a, b)
+    assert (-x).node == g.neg(a)
+    assert (2.0 + x).node == g.add(g.const(2.0), a)
+    assert (2.0 - x).node == g.sub(g.const(2.0), a)
+    assert (2.0 * x).node == g.mul(g.const(2.0), a)
+    assert x.call("sin").named("sin1").node == g.call("sin", a)
+    assert g.names[g.call("sin", a)] == "sin1"
+    assert (x - x).is_zero
+    assert not x.is_zero
+    assert (x.number(0.5).value, x.value) == (0.5, None)
+
+
+def test_expressions_are_equal_where_they_are_one_node_of_one_graph() -> None:
+    g, other = Graph(), Graph()
+    x, y = (Expression(g, g.symbol(name)) for name in "xy")
+    assert x + y == y + x
+    assert len({x + y, y + x, x}) == 2
+    assert x != y
+    assert x != Expression(other, other.symbol("x"))
+    assert x != x.node
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_vectors_and_matrices_compute_what_numpy_does(seed: int) -> None:
+    draw, g, at = np.random.default_rng(seed), Graph(), dict[str, float]()
+
+    def vector(name: str, values: np.ndarray) -> Vector:
+        at.update({f"{name}{axis}": value for axis, value in zip("xyz", values, strict=True)})
+        return Vector(g, *(g.symbol(f"{name}{axis}") for axis in "xyz"))
+
+    def numbers(*vectors: Vector) -> np.ndarray:
+        return np.array([evaluate(g, v.nodes, at) for v in vectors]).squeeze()
+
+    (a, b, c), m, rotation = draw.normal(size=(3, 3)), draw.normal(size=(3, 3)), draw.normal(size=(3, 3))
+    m = m + m.T
+    u, v, w = vector("a", a), vector("b", b), vector("c", c)
+    k = Matrix(*(vector(f"m{i}", row) for i, row in enumerate(m)))
+    turn = Matrix(*(vector(f"r{i}", row) for i, row in enumerate(rotation)))
+    found = [
+        (numbers(u + v), a + b),
+        (numbers(u - v), a - b),
+        (numbers(-u), -a),
+        (numbers(2.0 * u), 2.0 * a),
+        (numbers(v[0] * u), b[0] * a),
+        (numbers(u.cross(v)), np.cross(a, b)),
+        (numbers(sum_of(u, v, w)), a + b + c),
+        (numbers(k @ u), m @ a),
+        (numbers(*(k @ turn)), m @ rotation),
+        (numbers(*turn.T), rotation.T),
+        (numbers(*k.rotated(turn)), rotation @ m @ rotation.T),
+        (numbers(*Matrix.symmetric(lambda i, j: k[i][j])), m),
+        (numbers(*Matrix.of(lambda i, j: turn[i][j])), rotation),
+        (numbers(*Matrix.identity(g)), np.eye(3)),
+        (numbers(Vector.zero(g)), np.zeros(3)),
+        (np.array(evaluate(g, [u.dot(v).node], at)), np.array([a @ b])),
+    ]
+    for ours, expected in found:
+        np.testing.assert_allclose(ours, expected, rtol=1e-13, atol=1e-14)

@@ -155,7 +155,7 @@ def test_a_writer_who_comes_and_goes_again_holds_no_other_up(
 
     monkeypatch.setattr(exchange, "_swapped", lambda *_: False)
     monkeypatch.setattr(Path, "rename", beside_another)
-    assert exchange.put(work / "new", target)
+    assert exchange.publish(work / "new", target)
     assert (target / "a").read_text() == "new"
     assert (work / "new/a").read_text() == "of another"
 

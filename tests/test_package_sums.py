@@ -11,7 +11,7 @@ from answers import relative_error
 from conftest import DATA, PANDA, needs_compiler
 from linkwise import Coordinate, LinkEnergy, energy_system, generate, write_package
 from linkwise.package.load import import_package
-from linkwise_runtime.answers.inertia_solve import solved
+from linkwise_runtime.answers.inertia_solve import solve_inertia
 
 torch = pytest.importorskip("torch")
 
@@ -232,7 +232,7 @@ def test_a_mass_matrix_is_singular_also_where_no_pivot_says_so(kind: str) -> Non
         mass, force = map(torch.from_numpy, given) if kind == "tensor" else given
         # Rounding decides which joints of Kahan's are told.
         with pytest.raises(ValueError, match=r"the mass matrix is singular: the joints joint\d.* together"):
-            solved(mass, force, names)
+            solve_inertia(mass, force, names)
 
 
 def test_joints_and_links_have_numbers_by_name(package_of: Packages) -> None:
@@ -255,4 +255,4 @@ def test_samples_that_are_nearly_singular_are_told_and_counted(vague: list[int],
     for sample in vague:
         mass[sample, 0, 1] = mass[sample, 1, 0] = 1.0 - (1e-11 if sample == 3 else 1e-10)
     with pytest.warns(RuntimeWarning, match=rf"nearly singular at {where}the joints a, b can move"):
-        solved(mass, np.ones((6, 2)), ["a", "b"])
+        solve_inertia(mass, np.ones((6, 2)), ["a", "b"])

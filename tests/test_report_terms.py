@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
-from linkwise.dynamics.derive import link_kernel
-from linkwise.dynamics.kernel import Kernel
+from linkwise.dynamics.derive import link_forms
+from linkwise.dynamics.link_forms import LinkForms, parameter_names
 from linkwise.errors import LinkwiseError
 from linkwise.expression.expression_graph import FUNCTIONS, Node, reachable
 from linkwise.progress import silent
@@ -88,15 +88,15 @@ def evaluated_expansion(p: Laurent, found: LinkTorques, system: System, at: dict
     return total / p.denominator
 
 
-def evaluated_graph(kernel: Kernel, output: Node, at: dict[str, float]) -> float:
-    named = {node: at[symbol.name] for symbol, node in kernel.parameters.items()}
+def evaluated_graph(forms: LinkForms, system: System, output: Node, at: dict[str, float]) -> float:
+    named = {name: at[symbol.name] for symbol, name in parameter_names(system).items()}
     value: dict[Node, float] = {}
-    for node in reachable(kernel.graph, [output]):
-        op, a, b = kernel.graph.nodes[node]
+    for node in reachable(forms.graph, [output]):
+        op, a, b = forms.graph.nodes[node]
         if op == "const":
             value[node] = a
         elif op == "symbol":
-            value[node] = named[node] if node in named else at[a]
+            value[node] = named[a] if a in named else at[a]
         elif op == "neg":
             value[node] = -value[a]
         elif op == "call":
@@ -115,9 +115,9 @@ def test_expanded_torques_equal_the_closed_forms_of_the_graph(system: System) ->
     every = tuple(range(len(system.coordinates)))
     at = values_at_random(system, 5)
     for found in link_torques(system, every, 10**6, silent):
-        kernel = link_kernel(system, found.link)
+        forms = link_forms(system, found.link)
         for i, torque in found.torques.items():
-            exact = evaluated_graph(kernel, kernel.forms[0].torque[i], at)
+            exact = evaluated_graph(forms, system, forms.torque[i], at)
             expanded = evaluated_expansion(torque, found, system, at) / found.variables.units[i]
             assert expanded == pytest.approx(exact, rel=1e-9, abs=1e-9)
 

@@ -153,6 +153,6 @@ def test_compiler_that_takes_too_much_memory_is_refused_it(size: str, tmp_path: 
 
 
 def test_compiler_that_crashes_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mjcf, "compiled", lambda *_: os.kill(os.getpid(), signal.SIGSEGV))
+    monkeypatch.setattr(mjcf, "compile_model", lambda *_: os.kill(os.getpid(), signal.SIGSEGV))
     with pytest.raises(LinkwiseError, match=r"MuJoCo's compiler does not survive it: it ended .* by SIGSEGV"):
         read_system(written(tmp_path))

@@ -38,7 +38,7 @@ ROOMS = (
     "extras",
     "progress",
     "input_file",
-    "makers",
+    "generator_fingerprint",
     "own_runtime",
     "option",
     "errors",

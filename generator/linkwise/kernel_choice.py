@@ -1,12 +1,12 @@
-"""Choice of a package's kind of kernel: straight lines of closed forms, or loops over links and joints."""
+"""Choice of a package's kernel: straight lines of closed forms, or loops over links and joints."""
 
 from collections.abc import Iterable, Iterator
 from typing import get_args
 
 from linkwise.dynamics.derive import Method
 from linkwise.dynamics.frame_search import FrameSearch
+from linkwise.dynamics.joint_chain import CommonAxes
 from linkwise.dynamics.link_motion import Origin
-from linkwise.dynamics.screws import CommonAxes
 from linkwise.emit.backend import LOOPS, BackendFiles, backends_of, chosen_backends, usual_backends
 from linkwise.emit.c.loop_costs import decomposition_cost, link_costs
 from linkwise.errors import LinkwiseError
@@ -32,7 +32,7 @@ Of links behind a single joint they need almost none.
 def chosen_kernel(
     system: System, choice: str, backends: Iterable[str] | None, derivation: str = "rule"
 ) -> KernelKind:
-    """Return the kind of kernel for one of CHOICES and the back ends asked for by name, None for all.
+    """Return the kernel for one of CHOICES and the back ends asked for by name, None for all.
 
     Raises LinkwiseError for a choice that is not one, and for loops over energies or for a derivation from
     them, and for closed forms of joints that follow curves, formulas among them.
@@ -62,7 +62,7 @@ def chosen_kernel(
 
 
 def fault(system: System, kind: KernelKind, backends: Iterable[str] | None) -> str:
-    """Return why a robot cannot have these back ends with this kind of kernel; empty if it can."""
+    """Return why a robot cannot have these back ends with this kernel; empty if it can."""
     return next((why for _, why in _faults(system, kind, backends)), "")
 
 
@@ -103,7 +103,6 @@ def closed_form_cost(system: RigidSystem) -> float:
     if least > MOST_STRAIGHT:
         return least
     middle = sorted(range(len(system.links)), key=lambda j: len(system.path(j)))[len(system.links) // 2]
-    tree = [(f - 1, joint) for f, joint in enumerate(system.links[middle].joints)]
-    search = FrameSearch(system, [middle], tree, [range(len(tree))])
-    counted, _, _ = search.attempt(CommonAxes(len(tree) // 2), Origin())
+    axes = CommonAxes(len(system.links[middle].joints) // 2 + 1)
+    counted, _, _ = FrameSearch(system, middle).attempt(axes, Origin())
     return loops * counted / costs[middle]

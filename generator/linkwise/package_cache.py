@@ -13,7 +13,7 @@ from linkwise_runtime.native.native_cache import ELSEWHERE, cache_directory, loc
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
-from linkwise.makers import generator_files
+from linkwise.generator_fingerprint import generator_files
 from linkwise.package.manifest import FILE, is_too_large
 from linkwise.package.write import write_package
 from linkwise.pipeline import plan, read_system

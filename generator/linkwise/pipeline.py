@@ -4,7 +4,7 @@
     energies in Python ─read_energies───────────▶ EnergySystem ─┤
                                                                 ▼
     constrained_system   loops are closed, and independent coordinates found
-    derive         closed forms, one kernel per link: by the rigid-link rule, which differentiates nothing, or
+    derive         closed forms, link by link: by the rigid-link rule, which differentiates nothing, or
                    by Euler–Lagrange from energies, those that a user wrote or, if asked for, those of rigid
                    links; left out where the kernel is in loops
     package_files  their text in each back end, the runtime, the manifest
@@ -65,7 +65,7 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
 class PackagePlan:
     """A package that can be made: its system, its back ends, and how it was asked for.
 
-    kernel: the kind that was chosen
+    kernel: the one that was chosen
     name: of the package
     request: what its manifest keeps, so that it can be made again
     """
@@ -80,8 +80,8 @@ class PackagePlan:
 
     def files(self, progress: Progress = silent) -> dict[str, str]:
         """Return the files of the package, {path inside the package: text}."""
-        kernels = derive(self.system, progress, self.derivation) if self.kernel == "straight" else ()
-        derivation = Derivation(self.system, kernels, self.name, self.request, self.vendor_runtime)
+        forms = derive(self.system, progress, self.derivation) if self.kernel == "straight" else ()
+        derivation = Derivation(self.system, forms, self.name, self.request, self.vendor_runtime)
         return package_files(derivation, self.backends, progress)
 
 

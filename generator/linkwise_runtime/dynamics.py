@@ -29,7 +29,7 @@ from .interface import Array, Numbers
 from .kinematics.robot_kinematics import Kinematics
 from .labelled import labelled
 from .motion.induced_accelerations import Driven, induced_accelerations, induced_reactions
-from .motion.simulated import Simulated, simulated
+from .motion.simulated import Simulated, simulate_motion
 from .quantities import (
     Coefficients,
     Contact,
@@ -560,7 +560,7 @@ class Dynamics:
         SciPy, for its methods.
         """
         given = Simulated(q, qd, time, tau, loads, passive, step, method, rtol, atol, constraints)
-        trajectory: Trajectory[Array] = simulated(self, given)
+        trajectory: Trajectory[Array] = simulate_motion(self, given)
         return trajectory
 
     def induced_reactions(

@@ -72,7 +72,8 @@ ROOMS: dict[str, Room] = {
             for name in (
                 *("__init__", "__main__", "package_cache", "pipeline", "kernel_choice", "plotstyle"),
                 *("render", "extras"),
-                *("progress", "input_file", "makers", "errors", "escape", "own_process", "own_runtime"),
+                *("progress", "input_file", "generator_fingerprint"),
+                *("errors", "escape", "own_process", "own_runtime"),
             )
         )
     ),

@@ -12,9 +12,9 @@ from linkwise.emit.c.shared_headers import INNER, with_headers
 from linkwise.emit.shared_texts import BodyText, init_text, names_text
 from linkwise.emit.tree_file import tree_text
 from linkwise.emit.vendored_runtime import with_runtime
-from linkwise.package.agreement import disagreements, miscounted
+from linkwise.package.agreement import disagreements, wrong_counts
 from linkwise.package.bytecode import caches, is_compiled_from_source
-from linkwise.package.contents import added, changed
+from linkwise.package.contents import changed_files, unlisted_files
 from linkwise.package.emitted_text import foreign
 from linkwise.package.load import Package
 from linkwise.package.manifest import Manifest, altered_entries
@@ -37,9 +37,9 @@ def check_files(directory: Path, manifest: Manifest) -> list[Result]:
     Symbolic links are faults.
     """
     wrong = [] if manifest.files else ["the manifest lists no files"]
-    wrong += changed(directory, manifest.files)
+    wrong += changed_files(directory, manifest.files)
     try:
-        wrong += [f"{path} was added" for path in added(directory, manifest.files)]
+        wrong += [f"{path} was added" for path in unlisted_files(directory, manifest.files)]
         compiled = caches(directory, manifest.files)
     except OSError as error:
         wrong.append(f"{error.filename} cannot be read ({error.strerror})")
@@ -69,7 +69,7 @@ def check_manifest(package: Package) -> Result:
     """Check every entry of the manifest against the package itself, else against its checksum."""
     wrong = [
         *disagreements(package.manifest, package.module),
-        *miscounted(package.directory, package.manifest),
+        *wrong_counts(package.directory, package.manifest),
         *altered_entries(package.directory),
     ]
     return _result("manifest", wrong, "agrees with the package")

@@ -15,7 +15,7 @@ from linkwise.check.model_calls import Named, against_reference
 from linkwise.check.passive_checks import passive_calls
 from linkwise.check.regressor_checks import regressor_calls
 from linkwise.check.simulation_checks import simulation_calls
-from linkwise.check.subject import Subject, Way, there
+from linkwise.check.subject import BackendVariant, Subject, there
 from linkwise.check.sum_checks import sums_against_reference
 
 
@@ -35,14 +35,14 @@ class Check:
     run: Callable[[Subject, str, Dynamics], Iterator[Result]]
     by_rule: bool = False
     composed: bool = True
-    of: Callable[[Subject, Way], bool] = lambda subject, way: True
+    of: Callable[[Subject, BackendVariant], bool] = lambda subject, way: True
 
-    def concerns(self, subject: Subject, way: Way) -> bool:
+    def concerns(self, subject: Subject, way: BackendVariant) -> bool:
         """Return whether this back end of this package has such calls."""
         return (self.by_rule or way.kernel != "rule") and self.of(subject, way)
 
 
-def _is_rigid(subject: Subject, way: Way) -> bool:
+def _is_rigid(subject: Subject, way: BackendVariant) -> bool:
     return subject.tree is not None
 
 
@@ -79,12 +79,12 @@ CHECKS = (
     Check(
         "contacts",
         lambda s, name, model: s.contacts.calls(name, model, s.package.module.Contact),
-        of=lambda s, way: s.closed is not None,
+        of=lambda s, way: s.closed_states is not None,
     ),
     Check(
         "a simulated motion",
-        lambda s, name, model: simulation_calls(name, model, s.simulated),
-        of=lambda s, way: s.closed is not None,
+        lambda s, name, model: simulation_calls(name, model, s.simulation),
+        of=lambda s, way: s.closed_states is not None,
     ),
     Check(
         "passive torques",

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from linkwise.check.compare import IndexRows
-from linkwise.check.compiled_c import CompiledPackage, Prototype, declared
+from linkwise.check.compiled_c import CompiledPackage, Prototype, declarations
 from linkwise.escape import identifiers
 from linkwise.package.manifest import Manifest
 
@@ -63,7 +63,7 @@ def _wrong_table(manifest: Manifest, directory: Path, rows: IndexRows) -> str:
 
 def _wrong_function(name: str, header: str, functions: Iterable[Prototype]) -> str:
     expected = {f"{name}_{f.name}": f.declaration(name) for f in functions}
-    found = declared(name, header)
+    found = declarations(name, header)
     wrong = [
         *(f"{function} is not declared" for function in expected.keys() - found.keys()),
         *(f"{function} is declared, and there is no such function" for function in found.keys() - expected),

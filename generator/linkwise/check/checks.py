@@ -21,11 +21,11 @@ from linkwise.check.compare import IndexRows, Result, is_short_of_memory, skippe
 from linkwise.check.derivations import derivations
 from linkwise.check.formula_texts import check_formulas
 from linkwise.check.parametric_tree import changed_values, check_bodies
-from linkwise.check.subject import Subject, Way, long_enough
+from linkwise.check.subject import BackendVariant, Subject, long_enough
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import affordable
 from linkwise.own_process import Ended, begun
-from linkwise.package.load import Package, load_package, staying
+from linkwise.package.load import Package, load_package, refuse_exit
 from linkwise.package.manifest import Manifest
 
 OPTIONAL = ("torch",)
@@ -63,7 +63,7 @@ def results_of(directory: Path, samples: int = SAMPLES) -> Iterator[Result]:
     if texts.failed:
         return
     try:
-        with staying():
+        with refuse_exit():
             package = load_package(directory, manifest)
             agrees, made = check_manifest(package), check_made(package)
     except Exception as error:
@@ -75,7 +75,7 @@ def results_of(directory: Path, samples: int = SAMPLES) -> Iterator[Result]:
     yield made
     beside = "native" in package.backends and system_here().forks
     compiled = begun(partial(_compile, package)) if beside else lambda: None
-    with staying():
+    with refuse_exit():
         loaded, missing = _load(package)
     yield from missing
     yield from _guarded("answers", _numbers(package, loaded, samples))
@@ -91,17 +91,17 @@ def _compile(package: Package) -> None:
             library(sources, real, what)
 
 
-def _load(package: Package) -> tuple[dict[Way, Dynamics], list[Result]]:
+def _load(package: Package) -> tuple[dict[BackendVariant, Dynamics], list[Result]]:
     if not package.backends:
         return {}, [skipped("back ends", "nothing to load: C and formulas only")]
-    loaded: dict[Way, Dynamics] = {}
+    loaded: dict[BackendVariant, Dynamics] = {}
     missing: list[Result] = []
     for name in package.backends:
         try:
             model = package.load(name)
             chooses = getattr(model.backend, "kernel", "") == "auto" and model.backend.name != "native"
             for kernel in ("straight", "rule") if chooses else ("auto",):
-                loaded[Way(name, kernel)] = package.load(name, kernel=kernel)
+                loaded[BackendVariant(name, kernel)] = package.load(name, kernel=kernel)
         except Exception as error:
             if _lacks(error):
                 missing.append(skipped(f"{name}: not checked", " ".join(str(error).split())))
@@ -138,7 +138,7 @@ def _lacks(error: Exception) -> bool:
     return isinstance(error, RuntimeError) and here and " failed: " not in str(error)
 
 
-def _numbers(package: Package, loaded: Mapping[Way, Dynamics], samples: int) -> Iterator[Result]:
+def _numbers(package: Package, loaded: Mapping[BackendVariant, Dynamics], samples: int) -> Iterator[Result]:
     """Yield all results for the parameters as generated and, if there are any, for other values too."""
     manifest = package.manifest
     rows = IndexRows.of_paths([link.path for link in manifest.links], package.module.ROBOT.linear)
@@ -167,9 +167,9 @@ def _results(subject: Subject) -> Iterator[Result]:
         unphysical = bool(manifest.request.get("allow_unphysical"))
         bodies = subject.package.module.ROBOT.bodies
         yield from check_bodies(manifest.tree, bodies, subject.parameters, unphysical, label)
-    reference, tried = subject.found
+    reference, tried = subject.tried_reference
     if manifest.energies is not None:
-        yield from _told(f"energies{label}", reference, tried, subject.count[0])
+        yield from _remarks(f"energies{label}", reference, tried, subject.count[0])
     if reference is None and tried:
         return
     yield from check_formulas(subject.package, subject.rows, subject.parameters, label, reference)
@@ -216,7 +216,7 @@ def _guarded(title: str, results: Iterator[Result]) -> Iterator[Result]:
     while True:
         try:
             # A user's energies need not be defined everywhere.
-            with staying(), np.errstate(all="ignore"), _one_thread():
+            with refuse_exit(), np.errstate(all="ignore"), _one_thread():
                 result = next(results, None)
         except Exception as error:
             if is_short_of_memory(error):
@@ -229,7 +229,7 @@ def _guarded(title: str, results: Iterator[Result]) -> Iterator[Result]:
         yield result
 
 
-def _told(name: str, reference: Reference | None, tried: int, samples: int) -> Iterator[Result]:
+def _remarks(name: str, reference: Reference | None, tried: int, samples: int) -> Iterator[Result]:
     """Yield remarks on energies that a user wrote: what they are compared with, and at how many states."""
     if not find_spec("torch"):
         own = "a user's own, and no torch here to differentiate them: its own torques are what counts"

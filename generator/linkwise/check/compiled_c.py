@@ -137,7 +137,7 @@ def _constants(name: str, header: str) -> dict[str, int]:
     return {key: int(value) for key, value in found}
 
 
-def declared(name: str, header: str) -> dict[str, str]:
+def declarations(name: str, header: str) -> dict[str, str]:
     """Return the declaration of each of the package's functions in a header, on one line, by name in C."""
     code = " ".join(re.sub(r'/\*.*?\*/|"[^"\n]*"', " ", header, flags=re.DOTALL).split())
     found = re.finditer(rf"[^;{{}}]*\b({re.escape(name)}_\w+) *\([^;]*;", code)

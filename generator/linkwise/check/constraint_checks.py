@@ -13,7 +13,7 @@ from linkwise.oracle.held_motion import condition_of, far_from_singular, held_mo
 from linkwise.oracle.loop_equations import LoopEquations, following
 from linkwise.oracle.loop_reference import LoopReference
 from linkwise.oracle.newton_euler import NewtonEuler
-from linkwise.oracle.rounding import measured
+from linkwise.oracle.rounding import measure_rounding
 from linkwise.oracle.states import States
 from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array
@@ -147,7 +147,7 @@ class HeldContacts:
     def _compared(self, model: Any, kind: str, contact: Callable[..., Any]) -> Iterator[Entries]:
         """Yield entries of one kind; none where no state is far enough from singular positions."""
         held = self.equations(kind, self.tree)
-        made = model.constrained(contacts=[contact(**held.asked)])
+        made = model.constrained(contacts=[contact(**held.arguments)])
         own = tuple(model.joint_names.index(name) for name in made.independent)
         if (kind, own) not in self._kept:
             self._kept[kind, own] = self._expected(held, own)
@@ -170,7 +170,7 @@ class HeldContacts:
         def answers(tree: RigidTree) -> dict[str, Array]:
             return _answers(self.equations(held.kind, tree), given)
 
-        values, scales = measured(answers, self.tree, condition**2)
+        values, scales = measure_rounding(answers, self.tree, condition**2)
         return _Expected(given, given.moved(values["velocity"], values["acceleration"]), values, scales)
 
 

@@ -12,7 +12,7 @@ from linkwise.oracle.held_motion import held_motion, mass_matrix, steady
 from linkwise.oracle.loop_equations import LoopEquations, following
 from linkwise.oracle.magnitudes import Magnitudes
 from linkwise.oracle.newton_euler import NewtonEuler
-from linkwise.oracle.rounding import measured
+from linkwise.oracle.rounding import measure_rounding
 from linkwise.oracle.states import States
 from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array
@@ -92,7 +92,7 @@ def _simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Si
         found = _integrated(motion(tree, tau), (q, qd[:, own], np.zeros(1)))
         return dict(zip(("q", "qd", "work"), found, strict=True))
 
-    return SimulatedMotion(q, qd, tau, *measured(ends, tree), Magnitudes(manifest, tree))
+    return SimulatedMotion(q, qd, tau, *measure_rounding(ends, tree), Magnitudes(manifest, tree))
 
 
 def simulation_calls(name: str, model: Dynamics, expected: SimulatedMotion | str) -> Iterator[Result]:

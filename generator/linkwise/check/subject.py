@@ -37,7 +37,7 @@ UNBOUNDED = 1 << 50
 """Bytes that stand for unbounded memory."""
 
 
-class Way(NamedTuple):
+class BackendVariant(NamedTuple):
     """A back end, and the kernel that it computes by."""
 
     backend: str
@@ -70,7 +70,7 @@ class Subject:
     package: Package
     label: str
     parameters: Mapping[str, float]
-    loaded: Mapping[Way, Dynamics]
+    loaded: Mapping[BackendVariant, Dynamics]
     rows: IndexRows
     compiled: CompiledPackage | None
     count: tuple[int, int]
@@ -112,7 +112,7 @@ class Subject:
     @property
     def reference(self) -> Reference:
         """Reference for torques and their coefficients."""
-        return there(self.found[0])
+        return there(self.tried_reference[0])
 
     @cached_property
     def regressors(self) -> Reference | None:
@@ -134,7 +134,7 @@ class Subject:
         return loop_reference(self.manifest, self.tree, self.reference.states)
 
     @property
-    def closed(self) -> States | None:
+    def closed_states(self) -> States | None:
         """States that the robot can move on from, in which ties close; None if there are none."""
         if not self.tied:
             return None if self.tree is None else self.reference.states
@@ -143,15 +143,15 @@ class Subject:
     @cached_property
     def contacts(self) -> HeldContacts:
         """Reference for contacts."""
-        return HeldContacts(self.manifest, there(self.tree), there(self.closed))
+        return HeldContacts(self.manifest, there(self.tree), there(self.closed_states))
 
     @cached_property
-    def simulated(self) -> SimulatedMotion | str:
+    def simulation(self) -> SimulatedMotion | str:
         """A short motion, or the reason why there is none."""
-        return simulated_motion(self.manifest, there(self.tree), there(self.closed))
+        return simulated_motion(self.manifest, there(self.tree), there(self.closed_states))
 
     @cached_property
-    def found(self) -> tuple[Reference | None, int]:
+    def tried_reference(self) -> tuple[Reference | None, int]:
         """Reference for numbers, None if nothing can compute or at no state; and how many were tried."""
         manifest = self.manifest
         if self.tree is not None:

@@ -1,7 +1,7 @@
 """Dependencies of a package's files, as make and ninja read them.
 
-A package is made of the robot's file, of its own modules where it is one of Python, and of what `makers`
-lists.
+A package is made of the robot's file, of its own modules where it is one of Python, and of what
+`generator_fingerprint` lists.
 """
 
 import re
@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path, PurePath
 
 from linkwise.errors import LinkwiseError
-from linkwise.makers import HOMES
+from linkwise.generator_fingerprint import HOMES
 
 INSTALLED = {"site-packages", "dist-packages"}
 SPOKEN = str.maketrans({" ": "\\ ", "#": "\\#", "$": "$$"})

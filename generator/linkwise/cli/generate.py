@@ -21,8 +21,8 @@ from linkwise.dynamics.derive import Method
 from linkwise.emit.backend import BACKENDS
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
+from linkwise.generator_fingerprint import generator_files
 from linkwise.input_file import is_inside, is_same
-from linkwise.makers import generator_files
 from linkwise.option import REQUIRED, flag_of, option
 from linkwise.output import require_writable, sweep, write_files
 from linkwise.package.manifest import FILE

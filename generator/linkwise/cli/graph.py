@@ -11,7 +11,7 @@ from linkwise.escape import json_text
 from linkwise.extras import extra
 from linkwise.graphs import FOLDS, FORMATS, Overlay, graph_files, graph_json, graph_summary, overlay
 from linkwise.output import write_files
-from linkwise.package.load import open_package, staying
+from linkwise.package.load import open_package, refuse_exit
 from linkwise.package.write import require_free
 from linkwise.progress import progress
 from linkwise.report import position
@@ -74,7 +74,7 @@ def _robot(directory: Path) -> Any:
             f"{directory}: there is no autograd back end, whose operations graphs are of; generate it with "
             "--backend autograd"
         )
-    with staying():
+    with refuse_exit():
         return package.module.load("autograd")
 
 

@@ -65,9 +65,9 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
             "let it tie less"
         )
     proposed = _proposed(robot, rows)
-    if not robot.wanted:
+    if not robot.requested_independent:
         return proposed
-    chosen = sorted(names.index(name) for name in robot.wanted)
+    chosen = sorted(names.index(name) for name in robot.requested_independent)
     others = _asked(names[k] for k in proposed)
     if len(chosen) != free:
         raise LinkwiseError(
@@ -77,8 +77,8 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
     rest = [k for k in range(len(names)) if k not in chosen]
     if rank_of(rows[:, rest]) < rank:
         raise LinkwiseError(
-            f"{listed(robot.wanted)} cannot be independent, for the other joints do not follow from them; "
-            f"choose {others}, say"
+            f"{listed(robot.requested_independent)} cannot be independent, for the other joints do not "
+            f"follow from them; choose {others}, say"
         )
     return tuple(chosen)
 

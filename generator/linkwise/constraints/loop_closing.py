@@ -67,7 +67,7 @@ def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
     owners = (*(one.name for one in held for _ in one.row_names), *couplings)
     if not found.is_closed:
         rows = [*(row for one in held for row in one.row_names), *couplings]
-        raise LinkwiseError(_told(found, owners, rows, len(starts)))
+        raise LinkwiseError(_left_open(found, owners, rows, len(starts)))
     _check_slopes(tree, found)
     upright, *wider = (equations.closed_from(start) for start in (np.zeros(joints), *starts[TRIES::TRIES]))
     there = tuple(at for at in (upright, *closed, *wider) if at.is_closed)
@@ -85,7 +85,7 @@ def _check_slopes(tree: RigidTree, found: Closing) -> None:
             )
 
 
-def _told(found: Closing, owners: tuple[str, ...], rows: list[str], tries: int) -> str:
+def _left_open(found: Closing, owners: tuple[str, ...], rows: list[str], tries: int) -> str:
     """Return what stays open, and by how much, in words."""
     worst = int(np.abs(found.left).argmax())
     return (

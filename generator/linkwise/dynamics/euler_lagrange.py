@@ -8,32 +8,48 @@ H₀ is there where L has terms b(q)·q̇, with b = ∂L/∂q̇ at q̇ = 0, but 
 function of q.
 """
 
-from linkwise.dynamics.coefficients import Inputs, LinkForms
+from linkwise.dynamics.link_forms import Inputs, LinkForms, nodes
 from linkwise.expression.differentiate import derivative, substitute
-from linkwise.expression.expression_graph import Graph, Node
+from linkwise.expression.expression import Expression
 
 
-def euler_lagrange(graph: Graph, lagrangian: Node, path: tuple[int, ...], x: Inputs) -> LinkForms:
-    """Return the closed forms of one link from its Lagrangian alone, over the coordinates of `path`."""
-    g = graph
-    rest = {x.qd[s]: g.zero for s in path}
-    momentum = {i: derivative(g, lagrangian, x.qd[i]) for i in path}
-    force = {i: derivative(g, lagrangian, x.q[i]) for i in path}
-    c2 = {(i, k): derivative(g, momentum[i], x.qd[k]) for i in path for k in path if i <= k}
-    h = {
-        i: g.sub(g.sum(g.mul(derivative(g, momentum[i], x.q[s]), x.qd[s]) for s in path), force[i])
-        for i in path
-    }
-    leans = any(substitute(g, p, rest) != g.zero for p in momentum.values())
+def euler_lagrange(
+    kinetic: Expression, potential: Expression, path: tuple[int, ...], x: Inputs, by_hand: bool
+) -> LinkForms:
+    """Return the closed forms of one link from its energies alone, over the coordinates of `path`.
+
+    by_hand: the energies were written by hand, and are kept
+    """
+    lagrangian = kinetic - potential
+    zero = lagrangian.number(0.0)
+    rest = {x.qd[s]: zero for s in path}
+    momentum = {i: derivative(lagrangian, x.qd[i]) for i in path}
+    force = {i: derivative(lagrangian, x.q[i]) for i in path}
+    c2 = {(i, k): derivative(momentum[i], x.qd[k]) for i in path for k in path if i <= k}
+    h = {i: sum((derivative(momentum[i], x.q[s]) * x.qd[s] for s in path), zero) - force[i] for i in path}
+    leans = any(not substitute(p, rest).is_zero for p in momentum.values())
     c1, linear = {}, {}
     for i in path:
         for k in path:
-            slope = derivative(g, h[i], x.qd[k])
-            at_rest = substitute(g, slope, rest)
-            c1[i, k] = g.mul(g.const(0.5), g.add(slope, at_rest))
+            slope = derivative(h[i], x.qd[k])
+            at_rest = substitute(slope, rest)
+            c1[i, k] = 0.5 * (slope + at_rest)
             if leans:
                 linear[i, k] = at_rest
-    gravity = {i: substitute(g, h[i], rest) for i in path}
-    tau = {i: g.add(h[i], g.sum(g.mul(c2[min(i, k), max(i, k)], x.qdd[k]) for k in path)) for i in path}
-    c0 = {(i, k): derivative(g, tau[i], x.q[k]) for i in path for k in path}
-    return LinkForms(path, c2, c1, gravity, tau, tau, c0, linear)
+    gravity = {i: substitute(h[i], rest) for i in path}
+    tau = {i: h[i] + sum((c2[min(i, k), max(i, k)] * x.qdd[k] for k in path), zero) for i in path}
+    c0 = {(i, k): derivative(tau[i], x.q[k]) for i in path for k in path}
+    return LinkForms(
+        lagrangian.graph,
+        x,
+        path,
+        frame=(),
+        acceleration=nodes(c2),
+        velocity=nodes(c1),
+        gravity=nodes(gravity),
+        torque=nodes(tau),
+        decomposed_torque=nodes(tau),
+        position_gradient=nodes(c0),
+        velocity_linear=nodes(linear),
+        energy=(kinetic.node, potential.node) if by_hand else (),
+    )

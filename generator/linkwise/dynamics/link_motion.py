@@ -9,15 +9,16 @@ s the direction). With the twist V_k = (ω, v) and the acceleration A_k, gravity
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from linkwise.dynamics.screws import Orientation, Spatial, motion_cross
-from linkwise.expression import vector as vec
-from linkwise.expression.expression_graph import Node, Vector
+from linkwise.dynamics.joint_chain import JointChain
+from linkwise.dynamics.spatial_vectors import MotionVector
+from linkwise.expression.expression import Expression
+from linkwise.expression.vector import Vector, sum_of
 from linkwise.symbolic.system import RigidLink
 
 
 @dataclass(frozen=True)
 class Origin:
-    """Origin o of the common frame: that of a frame of the tree, at rest; None: the centre of mass, moving.
+    """Origin o of the common frame: that of a frame of the chain, at rest; None: the centre of mass, moving.
 
     `by_points` finds each ṡ of a moving o from the velocity of a point on the axis relative to it: cheaper
     where axes keep their direction.
@@ -33,9 +34,9 @@ class Screw:
 
     coordinate: int
     label: str
-    s: Spatial
-    sd: Spatial
-    sdd: Spatial
+    s: MotionVector
+    sd: MotionVector
+    sdd: MotionVector
 
 
 @dataclass(frozen=True)
@@ -44,154 +45,142 @@ class LinkMotion:
 
     m: its mass; com: its centre of mass from o; gravity: the gravity vector
     twist (ω, v) and acceleration (α, a − gravity) of the link; screws: those of its path, root first
-    With `scaled`, lengths are in units of 1/√m, in which m is 1.
     """
 
-    m: Node
+    m: Expression
     com: Vector
     gravity: Vector
-    twist: Spatial
-    acceleration: Spatial
+    twist: MotionVector
+    acceleration: MotionVector
     screws: tuple[Screw, ...]
-    scaled: bool
 
 
-def link_motion(turn: Orientation, link: RigidLink, chain: Sequence[int], origin: Origin) -> LinkMotion:
-    """Return the motion of the link at the end of `chain`, the indices of its path in the tree of `turn`."""
-    g, end = turn.g, chain[-1]
-    mass = turn.lower(link.mass)
+def link_motion(chain: JointChain, link: RigidLink, origin: Origin) -> LinkMotion:
+    """Return the motion of the link at the end of `chain`.
+
+    Where o is its centre of mass, lengths are in units of 1/√m, in which m is 1.
+    """
+    zero, end = Vector.zero(chain.graph), chain.frames[-1]
+    mass = chain.scalar(link.mass)
     # √m of a run-time parameter would have no gradient at 0, and a negative mass has none at all.
-    value = g.value(mass)
-    scaled = origin.frame is None and value is not None and value >= 0.0
-    unit = g.call("sqrt", mass) if scaled else g.one
-    gravity = vec.scale(g, unit, turn.gravity)
-    x, y, z = (turn.lower(c) for c in link.com)
-    com = vec.apply(g, turn.rotations[end], vec.scale(g, unit, (x, y, z)))
-    path = _Path(turn, chain, unit)
+    scaled = origin.frame is None and mass.value is not None and mass.value >= 0.0
+    unit = mass.call("sqrt") if scaled else chain.one
+    gravity = unit * chain.gravity
+    com = chain.rotation[end] @ (unit * chain.vector(link.com))
+    path = _Path(chain, unit)
     if origin.frame is None:
-        places = path.places(end, vec.minus(g, com))
-        com = vec.zero(g)
+        places = path.places(end, -com)
+        com = zero
     else:
-        places = path.places(origin.frame, vec.zero(g))
-        com = vec.add(g, places[end], com)
-    axes = [path.axis(f, places[f]) for f in chain]
+        places = path.places(origin.frame, zero)
+        com = places[end] + com
+    axes = [path.axis(f, places[f]) for f in chain.frames]
     if origin.by_points:
         twists, rates = path.motion_of_points(axes, places)
     else:
         twists = path.twists_from_the_link(axes) if origin.frame is None else path.twists_from_the_base(axes)
-        rates = [motion_cross(g, twist, axis) for twist, axis in zip(twists, axes, strict=False)]
+        rates = [twist.cross_linear(axis) for twist, axis in zip(twists, axes, strict=False)]
     screws, a = path.screws(axes, rates, twists, gravity)
-    return LinkMotion(
-        g.one if scaled else mass, com, gravity, twists[-1], (turn.alpha[end], a), tuple(screws), scaled
-    )
+    acceleration = MotionVector(chain.alpha[end], a)
+    return LinkMotion(chain.one if scaled else mass, com, gravity, twists[-1], acceleration, tuple(screws))
 
 
 @dataclass(frozen=True)
 class _Path:
-    """The joints `chain` of a tree in common axes; lengths times `unit`."""
+    """A chain of joints in common axes; lengths times `unit`."""
 
-    turn: Orientation
-    chain: Sequence[int]
-    unit: Node
+    chain: JointChain
+    unit: Expression
 
     def step(self, f: int) -> Vector:
-        """Return the vector from the origin of the parent's frame to that of frame f."""
-        g, turn = self.turn.g, self.turn
-        return vec.apply(g, turn.rotations[turn.tree[f][0]], vec.scale(g, self.unit, turn.offset(f)))
+        """Return the vector from the origin of frame f − 1 to that of frame f."""
+        return self.chain.rotation[f - 1] @ (self.unit * self.chain.offset(f))
 
     def places(self, start: int, at: Vector) -> dict[int, Vector]:
-        """Return the origins of the frames of the chain.
+        """Return the origins of all frames.
 
         They are found from that of frame `start`, up to the base and out again.
         """
-        g, tree = self.turn.g, self.turn.tree
-        places, f = {start: at}, start
-        while f >= 0:
-            places[tree[f][0]] = vec.sub(g, places[f], self.step(f))
-            f = tree[f][0]
-        for f in self.chain:
-            if f not in places:
-                places[f] = vec.add(g, places[tree[f][0]], self.step(f))
+        places = {start: at}
+        for f in range(start, 0, -1):
+            places[f - 1] = places[f] - self.step(f)
+        for f in self.chain.frames[start:]:
+            places[f] = places[f - 1] + self.step(f)
         return places
 
-    def axis(self, f: int, place: Vector) -> Spatial:
+    def axis(self, f: int, place: Vector) -> MotionVector:
         """Return S = (z, s) of joint f."""
-        g, turn = self.turn.g, self.turn
-        if turn.tree[f][1].kind == "revolute":
-            s = vec.cross(g, place, turn.z[f])
-        else:
-            s = vec.scale(g, self.unit, turn.slide[f])
-        return turn.z[f], vec.named(g, f"s{turn.labels[f]}", s)
+        chain, z = self.chain, self.chain.z[f]
+        s = place.cross(z) if chain.joints[f].kind == "revolute" else self.unit * chain.slide[f]
+        return MotionVector(z, s.named(f"s{chain.label[f]}"))
 
-    def twists_from_the_base(self, axes: Sequence[Spatial]) -> list[Spatial]:
+    def twists_from_the_base(self, axes: Sequence[MotionVector]) -> list[MotionVector]:
         """Return the twist before each joint, then the link's, about an o at rest: v = 0 at the base."""
-        g, turn = self.turn.g, self.turn
-        v = [vec.zero(g)]
-        for f, (_, s) in zip(self.chain, axes, strict=True):
-            move = vec.scale(g, turn.rate(f), s)
-            v.append(vec.named(g, f"v{turn.labels[f]}", vec.add(g, v[-1], move)))
+        chain = self.chain
+        v = [Vector.zero(chain.graph)]
+        for f, axis in zip(chain.frames, axes, strict=True):
+            v.append((v[-1] + chain.qd(f) * axis.linear).named(f"v{chain.label[f]}"))
         return self._with_omega(v)
 
-    def twists_from_the_link(self, axes: Sequence[Spatial]) -> list[Spatial]:
+    def twists_from_the_link(self, axes: Sequence[MotionVector]) -> list[MotionVector]:
         """Return the twist before each joint, then the link's, about an o that moves with the link.
 
         v = 0 at the link.
         """
-        g, turn = self.turn.g, self.turn
-        v = [vec.zero(g)]
-        for f, (_, s) in zip(reversed(self.chain), reversed(axes), strict=True):
-            move = vec.scale(g, turn.rate(f), s)
-            v.insert(0, vec.named(g, f"v{turn.label_before(f)}", vec.sub(g, v[0], move)))
+        chain = self.chain
+        v = [Vector.zero(chain.graph)]
+        for f, axis in zip(reversed(chain.frames), reversed(axes), strict=True):
+            v.insert(0, (v[0] - chain.qd(f) * axis.linear).named(f"v{chain.label_before(f)}"))
         return self._with_omega(v)
 
-    def _with_omega(self, v: Sequence[Vector]) -> list[Spatial]:
-        turn = self.turn
-        omegas = [turn.omega[turn.tree[f][0]] for f in self.chain] + [turn.omega[self.chain[-1]]]
-        return list(zip(omegas, v, strict=True))
+    def _with_omega(self, v: Sequence[Vector]) -> list[MotionVector]:
+        return [MotionVector(self.chain.omega[f], linear) for f, linear in enumerate(v)]
 
     def motion_of_points(
-        self, axes: Sequence[Spatial], places: dict[int, Vector]
-    ) -> tuple[list[Spatial], list[Vector]]:
+        self, axes: Sequence[MotionVector], places: dict[int, Vector]
+    ) -> tuple[list[MotionVector], list[Vector]]:
         """Return the twist before each joint, then the link's, and each ṡ, by velocities u relative to o.
 
         With r the place of a frame and o moving: ṙ = u, u = ω × r for the link's own, u_parent = u − ω × step
         − slide q̇, and s = r × z gives ṡ = u × z + r × ż. The parent's v at o is u − ω × r.
         """
-        g, turn, end = self.turn.g, self.turn, self.chain[-1]
-        u = vec.cross(g, turn.omega[end], places[end])
-        twists: list[Spatial] = [(turn.omega[end], vec.zero(g))]
+        chain, end = self.chain, self.chain.frames[-1]
+        u = chain.omega[end].cross(places[end])
+        twists = [MotionVector(chain.omega[end], Vector.zero(chain.graph))]
         rates: list[Vector] = []
-        for f, (z, s) in zip(reversed(self.chain), reversed(axes), strict=True):
-            parent, joint = turn.tree[f]
-            omega = turn.omega[parent]
-            if joint.kind == "revolute":
-                rate = vec.add(g, vec.cross(g, u, z), vec.cross(g, places[f], turn.zd[f]))
-                u = vec.sub(g, u, vec.cross(g, omega, self.step(f)))
+        for f, axis in zip(reversed(chain.frames), reversed(axes), strict=True):
+            omega, z, s = chain.omega[f - 1], axis.angular, axis.linear
+            if chain.joints[f].kind == "revolute":
+                rate = u.cross(z) + places[f].cross(chain.zd[f])
+                u = u - omega.cross(self.step(f))
             else:
-                rate = vec.cross(g, omega, s)
-                slid = vec.scale(g, turn.rate(f), s)
-                u = vec.sub(g, vec.sub(g, u, vec.cross(g, omega, self.step(f))), slid)
+                rate = omega.cross(s)
+                slid = chain.qd(f) * s
+                u = u - omega.cross(self.step(f)) - slid
             rates.insert(0, rate)
-            u = vec.named(g, f"u{turn.label_before(f)}", u)
-            twists.insert(0, (omega, vec.sub(g, u, vec.cross(g, omega, places[parent]))))
+            u.named(f"u{chain.label_before(f)}")
+            twists.insert(0, MotionVector(omega, u - omega.cross(places[f - 1])))
         return twists, rates
 
     def screws(
-        self, axes: Sequence[Spatial], rates: Sequence[Vector], twists: Sequence[Spatial], gravity: Vector
+        self,
+        axes: Sequence[MotionVector],
+        rates: Sequence[Vector],
+        twists: Sequence[MotionVector],
+        gravity: Vector,
     ) -> tuple[list[Screw], Vector]:
         """Return S, Ṡ, S̈ of the path's joints, and the link's acceleration.
 
         The acceleration starts from −gravity, with a ← a + q̇ ṡ + q̈ s.
         """
-        g, turn = self.turn.g, self.turn
-        a = vec.minus(g, gravity)
+        chain = self.chain
+        a = -gravity
         screws = []
-        for f, axis, rate, twist in zip(self.chain, axes, rates, twists, strict=False):
-            parent, joint = turn.tree[f]
-            sd = turn.zd[f], vec.named(g, f"sd{turn.labels[f]}", rate)
-            push = motion_cross(g, (turn.alpha[parent], a), axis)
-            sdd = turn.zdd[f], vec.add(g, push, motion_cross(g, twist, sd))
-            screws.append(Screw(joint.coordinate, turn.labels[f], axis, sd, sdd))
-            qdd = turn.x.qdd[joint.coordinate]
-            a = vec.add(g, a, vec.scale(g, turn.rate(f), sd[1]), vec.scale(g, qdd, axis[1]))
+        for f, s, rate, twist in zip(chain.frames, axes, rates, twists, strict=False):
+            label = chain.label[f]
+            sd = MotionVector(chain.zd[f], rate.named(f"sd{label}"))
+            push = MotionVector(chain.alpha[f - 1], a).cross_linear(s)
+            sdd = MotionVector(chain.zdd[f], push + twist.cross_linear(sd))
+            screws.append(Screw(chain.joints[f].coordinate, label, s, sd, sdd))
+            a = sum_of(a, chain.qd(f) * sd.linear, chain.qdd(f) * s.linear)
         return screws, a

@@ -24,155 +24,149 @@ the link's centre of mass, moving along with it, h, v and P vanish; lengths in u
 where it is a number. The cheaper one is found by counting (`frame_search`).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from linkwise.dynamics.coefficients import LinkForms
+from linkwise.dynamics.joint_chain import JointChain
+from linkwise.dynamics.link_forms import LinkForms, nodes
 from linkwise.dynamics.link_motion import LinkMotion, Origin, Screw, link_motion
-from linkwise.dynamics.screws import Orientation, Spatial, force_cross, pair_product, spatial_add
+from linkwise.dynamics.spatial_vectors import ForceVector, MotionVector
 from linkwise.dynamics.torque_sums import TorqueSums
-from linkwise.expression import vector as vec
-from linkwise.expression.expression_graph import Graph, Matrix, Node, Vector
+from linkwise.expression.expression import Expression
+from linkwise.expression.vector import Matrix, Vector
 from linkwise.symbolic.system import RigidLink
 
 ROUNDING = 1e-14
 
 
 def rigid_forms(
-    turn: Orientation, link: RigidLink, chain: Sequence[int], origin: Origin, gradient: bool = True
+    chain: JointChain, link: RigidLink, origin: Origin, frame: tuple[str, ...] = (), gradient: bool = True
 ) -> LinkForms:
-    """Return the closed forms of the link at the end of `chain`, the indices of its path in `turn`'s tree.
+    """Return the closed forms of the link at the end of `chain`.
 
-    Without `gradient` the position gradient is left out.
+    frame: the common frame in words; without `gradient` the position gradient is left out
     """
-    g = turn.g
-    motion = link_motion(turn, link, chain, origin)
-    moments = _moments(turn, link, chain[-1], motion)
-    weight, wrench = _weight(g, moments, motion), moments.wrench(g, motion)
+    motion = link_motion(chain, link, origin)
+    moments = _moments(chain, link, motion)
+    weight, wrench = _weight(moments, motion), moments.wrench(motion)
     path = tuple(sorted({screw.coordinate for screw in motion.screws}))
     pairs = [(i, k) for i in path for k in path]
-    c2 = {pair: g.zero for pair in pairs if pair[0] <= pair[1]}
-    c1, c0 = dict.fromkeys(pairs, g.zero), dict.fromkeys(pairs, g.zero)
-    gravity, torque = dict.fromkeys(path, g.zero), dict.fromkeys(path, g.zero)
+    c2 = {pair: chain.zero for pair in pairs if pair[0] <= pair[1]}
+    c1, c0 = dict.fromkeys(pairs, chain.zero), dict.fromkeys(pairs, chain.zero)
+    gravity, torque = dict.fromkeys(path, chain.zero), dict.fromkeys(path, chain.zero)
     for screw in motion.screws:
-        i = screw.coordinate
-        gravity[i] = g.add(gravity[i], pair_product(g, screw.s, weight))
-        torque[i] = g.add(torque[i], pair_product(g, screw.s, wrench))
-    sums = TorqueSums(g, turn.x, gravity)
+        gravity[screw.coordinate] += screw.s.dot(weight)
+        torque[screw.coordinate] += screw.s.dot(wrench)
+    sums = TorqueSums(chain.inputs, gravity)
     ordered = sorted(enumerate(motion.screws), key=lambda numbered: numbered[1].coordinate)
     for k, columns in groupby(ordered, key=lambda numbered: numbered[1].coordinate):
         for at, screw in columns:
-            inertial, coriolis = moments.inertial(g, screw), moments.coriolis(g, screw)
-            after, before = moments.turned(g, screw, wrench) if gradient else (None, None)
+            inertial, coriolis = moments.inertial(screw), moments.coriolis(screw)
+            after, before = moments.change_with(screw, wrench) if gradient else (None, None)
             for number, other in enumerate(motion.screws):
                 i = other.coordinate
                 if i <= k:
-                    c2[i, k] = g.add(c2[i, k], pair_product(g, other.s, inertial))
-                c1[i, k] = g.add(c1[i, k], pair_product(g, other.s, coriolis))
-                row = before if number <= at else after
-                if row is not None:
-                    c0[i, k] = g.add(c0[i, k], pair_product(g, other.s, row))
+                    c2[i, k] += other.s.dot(inertial)
+                c1[i, k] += other.s.dot(coriolis)
+                change = before if number <= at else after
+                if change is not None:
+                    c0[i, k] += other.s.dot(change)
         sums.add(k, c2, c1)
-    return LinkForms(path, c2, c1, gravity, torque, sums.if_cheaper(torque, c2, c1), c0)
+    return LinkForms(
+        chain.graph,
+        chain.inputs,
+        path,
+        frame,
+        acceleration=nodes(c2),
+        velocity=nodes(c1),
+        gravity=nodes(gravity),
+        torque=nodes(torque),
+        decomposed_torque=nodes(sums.if_cheaper(torque, c2, c1)),
+        position_gradient=nodes(c0),
+    )
 
 
 @dataclass(frozen=True)
 class _Moments:
     """Moments of a link about o: m, h, I, P and B."""
 
-    m: Node
+    m: Expression
     h: Vector
     inertia: Matrix
     momentum: Vector
     b: Matrix
 
-    def accelerated(self, g: Graph, a: Spatial) -> Spatial:
+    def inertial_wrench(self, a: MotionVector) -> ForceVector:
         """Return N = h × s + I z, f = m s + z × h, for an acceleration (z, s)."""
-        z, s = a
-        moment = vec.add(g, vec.cross(g, self.h, s), vec.apply(g, self.inertia, z))
-        return moment, vec.add(g, vec.scale(g, self.m, s), vec.cross(g, z, self.h))
+        z, s = a.angular, a.linear
+        return ForceVector(self.h.cross(s) + self.inertia @ z, self.m * s + z.cross(self.h))
 
-    def by_velocity(self, g: Graph, z: Vector) -> Spatial:
+    def velocity_wrench(self, z: Vector) -> ForceVector:
         """Return N = B z, f = z × P."""
-        return vec.apply(g, self.b, z), vec.cross(g, z, self.momentum)
+        return ForceVector(self.b @ z, z.cross(self.momentum))
 
-    def wrench(self, g: Graph, motion: LinkMotion) -> Spatial:
+    def wrench(self, motion: LinkMotion) -> ForceVector:
         """Return the wrench of τ, by the link's acceleration and twist."""
-        return spatial_add(g, self.accelerated(g, motion.acceleration), self.by_velocity(g, motion.twist[0]))
+        return self.inertial_wrench(motion.acceleration) + self.velocity_wrench(motion.twist.angular)
 
-    def inertial(self, g: Graph, screw: Screw) -> Spatial:
-        """Return the wrench of c2 for the screw's coordinate."""
-        return _named(g, screw, "c2", self.accelerated(g, screw.s))
+    def inertial(self, screw: Screw) -> ForceVector:
+        """Return the wrench of c2 for the screw's coordinate, named n3_c2 and f3_c2 for that of joint 3."""
+        return self.inertial_wrench(screw.s).named(f"{screw.label}_c2")
 
-    def coriolis(self, g: Graph, screw: Screw) -> Spatial:
-        """Return the wrench of c1 for the screw's coordinate."""
-        turning = self.by_velocity(g, screw.s[0])
-        return _named(g, screw, "c1", spatial_add(g, self.accelerated(g, screw.sd), turning))
+    def coriolis(self, screw: Screw) -> ForceVector:
+        """Return the wrench of c1 for the screw's coordinate, named n3_c1 and f3_c1 for that of joint 3."""
+        turning = self.velocity_wrench(screw.s.angular)
+        return (self.inertial_wrench(screw.sd) + turning).named(f"{screw.label}_c1")
 
-    def turned(self, g: Graph, screw: Screw, wrench: Spatial) -> tuple[Spatial, Spatial]:
+    def change_with(self, screw: Screw, wrench: ForceVector) -> tuple[ForceVector, ForceVector]:
         """Return the change of the wrench with the screw's coordinate, as two wrenches.
 
         The first is for joints behind the screw's, the second for it and those before.
         """
-        turning = self.by_velocity(g, screw.sd[0])
-        after = spatial_add(g, self.accelerated(g, screw.sdd), spatial_add(g, turning, turning))
-        return after, spatial_add(g, after, force_cross(g, screw.s, wrench))
+        turning = self.velocity_wrench(screw.sd.angular)
+        after = self.inertial_wrench(screw.sdd) + (turning + turning)
+        return after, after + screw.s.cross_force(wrench)
 
 
-def _moments(turn: Orientation, link: RigidLink, frame: int, motion: LinkMotion) -> _Moments:
+def _moments(chain: JointChain, link: RigidLink, motion: LinkMotion) -> _Moments:
     """Return h, I, P and B in the common frame, from the inertia J about the centre of mass c."""
-    g, (omega, v), com = turn.g, motion.twist, motion.com
+    omega, v, com = motion.twist.angular, motion.twist.linear, motion.com
     # h = m c
-    h = vec.scale(g, motion.m, com)
+    h = motion.m * com
     # E about c: ½ tr(J) − J, turned into the common axes; about o: E + m c cᵀ.
-    j = tuple(tuple(turn.lower(entry) for entry in row) for row in link.inertia)
-    half = g.mul(g.const(0.5), g.sum(j[i][i] for i in range(3)))
-    about_com = vec.symmetric(lambda i, k: g.sub(half, j[i][i]) if i == k else g.neg(j[i][k]))
-    turned = _without_rounding(g, vec.rotated(g, turn.rotations[frame], about_com))
-    e = vec.symmetric(lambda i, k: g.add(turned[i][k], g.mul(h[i], com[k])))
+    j = [chain.vector(row) for row in link.inertia]
+    half = 0.5 * (j[0][0] + j[1][1] + j[2][2])
+    about_com = Matrix.symmetric(lambda i, k: half - j[i][i] if i == k else -j[i][k])
+    turned = _without_rounding(about_com.rotated(chain.rotation[chain.frames[-1]]))
+    e = Matrix.symmetric(lambda i, k: turned[i][k] + h[i] * com[k])
     # I = tr(E) − E, with tr(E) = ½ tr(J) + m c·c, the same in any axes.
-    trace = g.add(half, vec.dot(g, h, com))
-    inertia = vec.symmetric(lambda i, k: g.sub(trace, e[i][i]) if i == k else g.neg(e[i][k]))
+    trace = half + h.dot(com)
+    inertia = Matrix.symmetric(lambda i, k: trace - e[i][i] if i == k else -e[i][k])
     # P = m v + ω × h
-    momentum = vec.add(g, vec.scale(g, motion.m, v), vec.cross(g, omega, h))
+    momentum = motion.m * v + omega.cross(h)
     # B = −[ω]× E − v hᵀ + (h·v) 1; E is symmetric, so column k of −[ω]× E is E_k × ω.
-    hv = vec.dot(g, h, v)
-    crossed = [vec.cross(g, column, omega) for column in e]
-
-    def row(i: int) -> Vector:
-        entries = (g.add(crossed[k][i], g.sub(hv if i == k else g.zero, g.mul(v[i], h[k]))) for k in range(3))
-        x, y, z = entries
-        return x, y, z
-
-    return _Moments(motion.m, h, inertia, momentum, (row(0), row(1), row(2)))
+    hv = h.dot(v)
+    crossed = [column.cross(omega) for column in e]
+    b = Matrix.of(lambda i, k: crossed[k][i] + ((hv if i == k else chain.zero) - v[i] * h[k]))
+    return _Moments(motion.m, h, inertia, momentum, b)
 
 
-def _weight(g: Graph, moments: _Moments, motion: LinkMotion) -> Spatial:
+def _weight(moments: _Moments, motion: LinkMotion) -> ForceVector:
     """Return gravity's wrench: f = −m a_g, N = c × f."""
-    force = vec.minus(g, vec.scale(g, moments.m, motion.gravity))
-    return vec.cross(g, motion.com, force), force
+    force = -(moments.m * motion.gravity)
+    return ForceVector(motion.com.cross(force), force)
 
 
-def _without_rounding(g: Graph, m: Matrix) -> Matrix:
+def _without_rounding(m: Matrix) -> Matrix:
     """Return the matrix without numbers that are only rounding.
 
     Turns by right angles leave such numbers in products of inertia.
     """
-    values = [abs(v) for row in m for e in row if (v := g.value(e)) is not None]
-    least = ROUNDING * max(values, default=0.0)
+    entries = [row[k] for row in m for k in range(3)]
+    least = ROUNDING * max((abs(e.value) for e in entries if e.value is not None), default=0.0)
 
-    def kept(i: int, k: int) -> Node:
-        value = g.value(m[i][k])
-        return g.zero if value is not None and abs(value) <= least else m[i][k]
+    def kept(i: int, k: int) -> Expression:
+        value = m[i][k].value
+        return m[i][k].number(0.0) if value is not None and abs(value) <= least else m[i][k]
 
-    return vec.symmetric(kept)
-
-
-def _named(g: Graph, screw: Screw, coefficient: str, wrench: Spatial) -> Spatial:
-    """Return the wrench, named n3_c2 (moment) and f3_c2 (force) where the coefficients are c2 of joint 3."""
-    n, f = wrench
-    return (
-        vec.named(g, f"n{screw.label}_{coefficient}", n),
-        vec.named(g, f"f{screw.label}_{coefficient}", f),
-    )
+    return Matrix.symmetric(kept)

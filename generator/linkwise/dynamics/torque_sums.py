@@ -7,11 +7,11 @@ column by column: after joint k there is one value of τ for each joint i, howev
 
 from collections.abc import Mapping
 
-from linkwise.dynamics.coefficients import Inputs
+from linkwise.dynamics.link_forms import Inputs
 from linkwise.expression.count import count_operations
-from linkwise.expression.expression_graph import Graph, Node
+from linkwise.expression.expression import Expression
 
-Pairs = Mapping[tuple[int, int], Node]
+Pairs = Mapping[tuple[int, int], Expression]
 
 
 class TorqueSums:
@@ -20,26 +20,31 @@ class TorqueSums:
     gravity: g_ij, by joint, coordinates ascending
     """
 
-    def __init__(self, g: Graph, x: Inputs, gravity: Mapping[int, Node]) -> None:
-        self.g, self.x, self._gravity = g, x, gravity
+    def __init__(self, x: Inputs, gravity: Mapping[int, Expression]) -> None:
+        self.x, self._gravity = x, gravity
         self.tau = dict(gravity)
-        self._steps = [(node, f"g_{i + 1}") for i, node in gravity.items()]
+        self._steps = [(g, f"g_{i + 1}") for i, g in gravity.items()]
 
     def add(self, k: int, c2: Pairs, c1: Pairs) -> None:
         """Add column k; its c2 (i, k) for i ≤ k and c1 (i, k) must be complete, and columns come in order."""
+        x = self.x
         for i in self.tau:
             if i <= k:
-                self._add(i, c2[i, k], self.x.qdd[k])
+                self.tau[i] += c2[i, k] * x.qdd[k]
             if i < k:  # by symmetry: c2 (k, i)
-                self._add(k, c2[i, k], self.x.qdd[i])
-            self._add(i, c1[i, k], self.x.qd[k])
-        self._steps += [(node, f"tau{i + 1}_{k + 1}") for i, node in self.tau.items()]
+                self.tau[k] += c2[i, k] * x.qdd[i]
+            self.tau[i] += c1[i, k] * x.qd[k]
+        self._steps += [(tau, f"tau{i + 1}_{k + 1}") for i, tau in self.tau.items()]
 
-    def if_cheaper(self, torque: dict[int, Node], c2: Pairs, c1: Pairs) -> dict[int, Node]:
+    def if_cheaper(self, torque: dict[int, Expression], c2: Pairs, c1: Pairs) -> dict[int, Expression]:
         """Return the sums if they cost less than `torque` beside the coefficients, else `torque`."""
         known = [*c2.values(), *c1.values(), *self._gravity.values()]
-        summed, other = (count_operations(self.g, [*known, *t.values()]) for t in (self.tau, torque))
-        if summed.arithmetic >= other.arithmetic:
+        graph = known[0].graph
+        summed, other = (
+            count_operations(graph, [value.node for value in (*known, *t.values())]).arithmetic
+            for t in (self.tau, torque)
+        )
+        if summed >= other:
             return torque
         self._name(c2, c1)
         return self.tau
@@ -47,12 +52,9 @@ class TorqueSums:
     def _name(self, c2: Pairs, c1: Pairs) -> None:
         """Suggest names for the coefficients and for each joint's sums except the last: c1_3_4, tau3_4."""
         for prefix, pairs in (("c2", c2), ("c1", c1)):
-            for (i, k), node in pairs.items():
-                self.g.name(node, f"{prefix}_{i + 1}_{k + 1}")
+            for (i, k), value in pairs.items():
+                value.named(f"{prefix}_{i + 1}_{k + 1}")
         whole = set(self.tau.values())
-        for node, name in self._steps:
-            if node not in whole:
-                self.g.name(node, name)
-
-    def _add(self, i: int, coefficient: Node, motion: Node) -> None:
-        self.tau[i] = self.g.add(self.tau[i], self.g.mul(coefficient, motion))
+        for value, name in self._steps:
+            if value not in whole:
+                value.named(name)

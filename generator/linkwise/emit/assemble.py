@@ -11,7 +11,6 @@ from pathlib import Path
 import sympy as sp
 from linkwise_runtime.version import VERSION
 
-from linkwise.dynamics.kernel import decomposition_cost
 from linkwise.emit.backend import BackendFiles
 from linkwise.emit.bodies import body_texts, parameter_rules
 from linkwise.emit.c import loop_costs
@@ -170,5 +169,5 @@ def _costs(derivation: Derivation) -> tuple[list[int], int]:
     system = derivation.system
     if derivation.kernel == "loops" and isinstance(system, RigidSystem):
         return loop_costs.link_costs(system), loop_costs.decomposition_cost(system)
-    costs = [decomposition_cost([kernel]) for kernel in derivation.kernels]
+    costs = [forms.decomposition_cost for forms in derivation.forms]
     return costs, sum(costs)

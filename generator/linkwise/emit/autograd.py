@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from linkwise_runtime.version import VERSION
 
-from linkwise.dynamics.kernel import lowering
+from linkwise.dynamics.link_forms import lowering
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.rigid_energy import rigid_energy
 from linkwise.emit.straight_line import fetched, straight_line

@@ -87,7 +87,7 @@ class BackendFiles:
 def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
     from linkwise.emit.closed_forms import closed_form_files
 
-    return closed_form_files(d.system, d.kernels)
+    return closed_form_files(d.system, d.forms)
 
 
 def _tree(d: Derivation) -> Iterator[tuple[str, str]]:

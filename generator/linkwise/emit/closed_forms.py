@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 from linkwise_runtime.version import VERSION
 
-from linkwise.dynamics.coefficients import LinkForms
-from linkwise.dynamics.kernel import Kernel
+from linkwise.dynamics.link_forms import LinkForms
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.escape import python_literal
@@ -37,39 +36,38 @@ class FormFunction:
     groups: tuple[tuple[tuple[str, str], ...], ...]
 
 
-def closed_form_files(system: System, kernels: Sequence[Kernel]) -> Iterator[tuple[str, str]]:
+def closed_form_files(system: System, links: Sequence[LinkForms]) -> Iterator[tuple[str, str]]:
     """Yield paths inside the package and texts."""
-    for j, kernel in enumerate(kernels):
-        path = kernel.forms[0].path
+    for j, forms in enumerate(links):
         view = {
             "number": j + 1,
             "version": VERSION,
             "name": python_literal(system.link_names[j]),
-            "path": repr(path),
-            "frame": kernel.frame,
-            "functions": list(_functions(system, kernel, j + 1)),
+            "path": repr(forms.path),
+            "frame": forms.frame,
+            "functions": list(_functions(system, forms, j + 1)),
         }
         yield f"forms/link_{j + 1}.py", render("closed_forms/link.py.j2", view)
-    numbers = range(1, len(kernels) + 1)
+    numbers = range(1, len(links) + 1)
     yield "forms/__init__.py", render("closed_forms/init.py.j2", {"version": VERSION, "numbers": numbers})
 
 
-def _functions(system: System, kernel: Kernel, j: int) -> Iterator[FormFunction]:
-    groups = labelled(kernel, kernel.forms[0], j)
+def _functions(system: System, forms: LinkForms, j: int) -> Iterator[FormFunction]:
+    groups = labelled(forms, j)
     whole = [groups[name] for name in ("c2", "c1", "g", "tau", "h1") if groups[name]]
     doc = "Return c2 (for i <= k: it is symmetric), c1, g and tau"
     if groups["h1"]:
         doc += ", and h1, c1's part by energy terms linear in qd"
-    yield _function(system, kernel, "decomposition", doc, whole)
-    yield _function(system, kernel, "torque", "Return tau", [groups["torque"]])
-    yield _function(system, kernel, "position_gradient", "Return c0 = d(tau)/d(q)", [groups["c0"]])
-    if kernel.energy:
-        energies = [(f"{kind}({j})", node) for kind, node in zip("KP", kernel.energy, strict=True)]
+    yield _function(system, forms, "decomposition", doc, whole)
+    yield _function(system, forms, "torque", "Return tau", [groups["torque"]])
+    yield _function(system, forms, "position_gradient", "Return c0 = d(tau)/d(q)", [groups["c0"]])
+    if forms.energy:
+        energies = [(f"{kind}({j})", node) for kind, node in zip("KP", forms.energy, strict=True)]
         doc = "Return kinetic energy K and potential energy P in J"
-        yield _function(system, kernel, "energy", doc, [energies], MOTION[:2])
+        yield _function(system, forms, "energy", doc, [energies], MOTION[:2])
 
 
-def labelled(kernel: Kernel, forms: LinkForms, j: int) -> dict[str, Rows]:
+def labelled(forms: LinkForms, j: int) -> dict[str, Rows]:
     """Return the outputs of link j, counted from 1, by quantity; h1 is empty without linear energy terms."""
 
     def triples(name: str, nodes: dict[tuple[int, int], Node]) -> Rows:
@@ -91,15 +89,15 @@ def labelled(kernel: Kernel, forms: LinkForms, j: int) -> dict[str, Rows]:
 
 def _function(
     system: System,
-    kernel: Kernel,
+    forms: LinkForms,
     name: str,
     doc: str,
     groups: Sequence[Rows],
     motion: Sequence[str] = MOTION,
 ) -> FormFunction:
     nodes = [node for rows in groups for _, node in rows]
-    code = straight_line(kernel.graph, nodes, PythonPrinter("xp"))
-    cost = count_operations(kernel.graph, nodes)
+    code = straight_line(forms.graph, nodes, PythonPrinter("xp"))
+    cost = count_operations(forms.graph, nodes)
     texts = iter(code.outputs)
     results = tuple(tuple((next(texts), label) for label, _ in rows) for rows in groups)
     inputs = fetched(system, code, "[..., {}]")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from linkwise.dynamics.kernel import lowering
+from linkwise.dynamics.link_forms import lowering
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.escape import python_literal

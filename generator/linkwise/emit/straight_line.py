@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from linkwise.dynamics.kernel import parameter_names
+from linkwise.dynamics.link_forms import parameter_names
 from linkwise.emit.printer import ATOM, Printer, Text
 from linkwise.escape import python_literal
 from linkwise.expression.expression_graph import Entry, Graph, Node, operands, reachable

@@ -9,7 +9,7 @@ from linkwise.expression.expression_graph import Graph, Node, reachable
 
 @dataclass(frozen=True)
 class OperationCount:
-    """Operations of one kernel; every shared expression counts once."""
+    """Operations of some outputs; every shared expression counts once."""
 
     additions: int
     multiplications: int

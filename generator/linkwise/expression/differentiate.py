@@ -2,72 +2,82 @@
 
 from collections.abc import Mapping
 
+from linkwise.expression.expression import Expression
 from linkwise.expression.expression_graph import Graph, Node, reachable
 
 
-def derivative(graph: Graph, output: Node, symbol: Node) -> Node:
+def derivative(output: Expression, symbol: Expression) -> Expression:
     """Return ∂output/∂symbol by the chain rule in forward order; shared parts are differentiated once."""
-    tangent: dict[Node, Node] = {symbol: graph.one}
-    for node in reachable(graph, [output]):
-        if node not in tangent:
-            tangent[node] = _tangent(graph, node, tangent)
-    return tangent[output]
+    graph, tangent = output.graph, {symbol.node: Expression(output.graph, output.graph.one)}
+    for node in reachable(graph, [output.node]):
+        op, a, b = graph.nodes[node]
+        # A node none of whose operands depends on the symbol has no tangent: it would be 0.
+        if op == "call":
+            if b in tangent:
+                tangent[node] = _call_tangent(a, Expression(graph, node), Expression(graph, b), tangent[b])
+        elif op not in ("const", "symbol") and (a in tangent or b in tangent):
+            tangent[node] = _tangent(graph, node, tangent.get(a), tangent.get(b))
+    return tangent.get(output.node, Expression(graph, graph.zero))
 
 
-def _tangent(g: Graph, node: Node, tangent: Mapping[Node, Node]) -> Node:
-    op, a, b = g.nodes[node]
-    if op in ("const", "symbol"):
-        return g.zero
-    if op == "neg":
-        return g.neg(tangent[a])
+def _tangent(graph: Graph, node: Node, da: Expression | None, db: Expression | None) -> Expression:
+    """Return the derivative of a node of arithmetic from those of its operands; None stands for zeros."""
+    op, a, b = graph.nodes[node]
+    if db is None and da is not None:
+        if op in ("add", "sub"):
+            return da
+        return -da if op == "neg" else da * Expression(graph, b) if op == "mul" else da / Expression(graph, b)
+    assert db is not None
     if op == "add":
-        return g.add(tangent[a], tangent[b])
+        return db if da is None else da + db
     if op == "sub":
-        return g.sub(tangent[a], tangent[b])
+        return -db if da is None else da - db
     if op == "mul":
-        return g.add(g.mul(tangent[a], b), g.mul(a, tangent[b]))
-    if op == "div":
-        return g.div(g.sub(tangent[a], g.mul(node, tangent[b])), b)
-    return _call_tangent(g, a, node, b, tangent[b])
+        if da is None:
+            return Expression(graph, a) * db
+        return da * Expression(graph, b) + Expression(graph, a) * db
+    change = Expression(graph, node) * db
+    return (-change if da is None else da - change) / Expression(graph, b)
 
 
-def _call_tangent(g: Graph, function: str, node: Node, a: Node, da: Node) -> Node:
-    """Return d f(a) with node = f(a)."""
-    if da == g.zero:
-        return g.zero
+def _call_tangent(function: str, f: Expression, a: Expression, da: Expression) -> Expression:
+    """Return d f(a) with f = function(a)."""
+    if da.is_zero:
+        return da
     match function:
         case "sin":
-            return g.mul(g.call("cos", a), da)
+            return a.call("cos") * da
         case "cos":
-            return g.neg(g.mul(g.call("sin", a), da))
+            return -(a.call("sin") * da)
         case "tan":
-            return g.mul(g.add(g.one, g.mul(node, node)), da)
+            return (1.0 + f * f) * da
         case "asin":
-            return g.div(da, g.call("sqrt", g.sub(g.one, g.mul(a, a))))
+            return da / (1.0 - a * a).call("sqrt")
         case "acos":
-            return g.neg(g.div(da, g.call("sqrt", g.sub(g.one, g.mul(a, a)))))
+            return -(da / (1.0 - a * a).call("sqrt"))
         case "atan":
-            return g.div(da, g.add(g.one, g.mul(a, a)))
+            return da / (1.0 + a * a)
         case "sinh":
-            return g.mul(g.call("cosh", a), da)
+            return a.call("cosh") * da
         case "cosh":
-            return g.mul(g.call("sinh", a), da)
+            return a.call("sinh") * da
         case "tanh":
-            cosh = g.call("cosh", a)  # 1 − tanh² would leave nothing but rounding where tanh is near 1
-            return g.div(da, g.mul(cosh, cosh))
+            cosh = a.call("cosh")  # 1 − tanh² would leave nothing but rounding where tanh is near 1
+            return da / (cosh * cosh)
         case "exp":
-            return g.mul(node, da)
+            return f * da
         case "log":
-            return g.div(da, a)
+            return da / a
         case "sqrt":
-            return g.div(da, g.mul(g.const(2.0), node))
+            return da / (2.0 * f)
     raise ValueError(f"no derivative is known for {function}")
 
 
-def substitute(graph: Graph, output: Node, values: Mapping[Node, Node]) -> Node:
-    """Return `output` with nodes replaced; constants fold again on the way."""
-    g, new = graph, dict(values)
-    for node in reachable(graph, [output]):
+def substitute(output: Expression, values: Mapping[Expression, Expression]) -> Expression:
+    """Return `output` with expressions replaced; constants fold again on the way."""
+    g = output.graph
+    new = {old.node: value.node for old, value in values.items()}
+    for node in reachable(g, [output.node]):
         if node in new:
             continue
         op, a, b = g.nodes[node]
@@ -79,4 +89,4 @@ def substitute(graph: Graph, output: Node, values: Mapping[Node, Node]) -> Node:
             new[node] = g.call(a, new[b])
         else:
             new[node] = getattr(g, op)(new[a], new[b])
-    return new[output]
+    return Expression(g, new[output.node])

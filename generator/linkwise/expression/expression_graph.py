@@ -14,8 +14,6 @@ from typing import Any
 
 Node = int
 Entry = tuple[str, Any, Any]
-Vector = tuple[Node, Node, Node]
-Matrix = tuple[Vector, Vector, Vector]
 
 DECIMAL = Context(prec=40, traps=[])
 """Context that is exact for the product of two floats as they print; infinity and NaN come out as such."""
@@ -34,6 +32,10 @@ FUNCTIONS: dict[str, Callable[[float], float]] = {
     "log": math.log,
     "sqrt": math.sqrt,
 }
+
+
+ARITHMETIC = frozenset({"add", "sub", "mul", "div"})
+"""Operations on two nodes."""
 
 
 class Graph:
@@ -217,13 +219,11 @@ class Graph:
 def operands(entry: Entry) -> tuple[Node, ...]:
     """Return the nodes that an entry is computed from."""
     op, a, b = entry
-    if op in ("const", "symbol"):
-        return ()
+    if op in ARITHMETIC:
+        return (a, b)
     if op == "neg":
         return (a,)
-    if op == "call":
-        return (b,)
-    return (a, b)
+    return (b,) if op == "call" else ()
 
 
 def reachable(graph: Graph, outputs: Iterable[Node], given: Container[Node] = ()) -> list[Node]:

@@ -41,13 +41,13 @@ def noisy_positions(log: TorqueLog, joints: Sequence[str], units: Sequence[str],
         return ""
     many = int((shares > NOISY).sum()) - 1
     whose = repr(joints[at]) + (f" and {many} more" if many else "")
-    mend = "pass --cutoff, in Hz, a little above the motion's own frequencies"
+    remedy = "pass --cutoff, in Hz, a little above the motion's own frequencies"
     if how.lowpass is not None:
-        mend = f"lower --cutoff {how.lowpass.cutoff:g} towards the motion's own frequencies"
+        remedy = f"lower --cutoff {how.lowpass.cutoff:g} towards the motion's own frequencies"
     unit = units[at]
     return (
         f"the positions of {whose} are noisy: {log.noise[at]:.1g} {unit} of noise, differentiated, is "
-        f"{made[at]:.2g} of the {found[at]:.2g} {unit}/s^2 of acceleration (root mean squares); {mend}"
+        f"{made[at]:.2g} of the {found[at]:.2g} {unit}/s^2 of acceleration (root mean squares); {remedy}"
     )
 
 
@@ -100,16 +100,16 @@ def _opposite(found: Identification) -> Iterator[str]:
     if not against.any():
         return
     if len(against) > 1 and not (correlation > -OPPOSITE).any() and 2 * against.sum() >= len(against):
-        what, mend = "torques are", "if the log counts them so, pass --torque-factor -1"
+        what, remedy = "torques are", "if the log counts them so, pass --torque-factor -1"
     else:
         names = [joint for joint, is_so in zip(found.joints, against, strict=True) if is_so]
-        what, mend = (
+        what, remedy = (
             f"torque of {listed(map(repr, names))} is",
             "see its column, and turn its sign if it is so",
         )
     yield (
         f"the {what} opposite to what the robot, as it is, needs (correlation "
-        f"{correlation.min():.2f}): {mend}; or the robot stands otherwise than its gravity says"
+        f"{correlation.min():.2f}): {remedy}; or the robot stands otherwise than its gravity says"
     )
 
 

@@ -35,7 +35,7 @@ class OwnMjcf(OwnFile):
             for at, joint in enumerate(joints):
                 if rubs := friction.get(joint_name(joint.get("name", ""), name, at, len(joints))):
                     edits += xml.with_attributes(joint, {FRICTION[what]: text for what, text in rubs.items()})
-        text = xml.edited(edits)
+        text = xml.apply_edits(edits)
         self._read_again(text, links, friction)
         return text
 

@@ -25,7 +25,7 @@ class OwnOsim(OwnFile):
         assert model is not None
         bodies = ((body, links.get(name_of(body))) for body in members(model, "BodySet"))
         edits = [edit for body, own in bodies if own is not None for edit in _body(xml, body, own)]
-        return xml.edited(edits)
+        return xml.apply_edits(edits)
 
     def has_friction(self, joint: str) -> bool:
         """Return False: no joint has a place for friction."""

@@ -25,7 +25,7 @@ class OwnSdf(OwnFile):
         for joint in xml.root.iter("joint"):
             if rubs := friction.get(joint.get("name", "")):
                 edits += _dynamics(xml, joint, rubs)
-        return xml.edited(edits)
+        return xml.apply_edits(edits)
 
 
 def _inertial(xml: PlacedXml, inertial: Element, carried: LinkMass) -> Iterator[Edit]:

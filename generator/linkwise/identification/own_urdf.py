@@ -30,7 +30,7 @@ class OwnUrdf(OwnFile):
         for joint in xml.root.findall("joint"):
             if rubs := friction.get(joint.get("name", "")):
                 edits += _dynamics(xml, joint, rubs)
-        return xml.edited(edits)
+        return xml.apply_edits(edits)
 
 
 def moments(carried: LinkMass, turn: Array) -> dict[str, str]:

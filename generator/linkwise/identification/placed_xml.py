@@ -89,7 +89,7 @@ class PlacedXml:
             return Edit(place.inside_stop, place.inside_stop, inside)
         return Edit(place.inside, place.stop, b">" + inside + f"</{parent.tag}>".encode())
 
-    def edited(self, edits: Iterable[Edit]) -> bytes:
+    def apply_edits(self, edits: Iterable[Edit]) -> bytes:
         """Return the file with edits that do not overlap."""
         data = self._own
         for edit in sorted(edits, reverse=True):

@@ -33,8 +33,8 @@ class ContactEquations:
     kind: str
 
     @property
-    def asked(self) -> dict[str, Any]:
-        """Arguments of the contact, as a package is asked for it."""
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of the contact, as a package accepts them."""
         length = min(1.0, SPACIOUS * self.recursion.reach) or 1.0  # no reach: the whole robot is in one point
         given: dict[str, Any] = {"frame": self.frame.name, "kind": self.kind, "point": tuple(length * POINT)}
         if self.kind == "hinged":
@@ -50,7 +50,7 @@ class ContactEquations:
 
     def rows(self, q: Array) -> Array:
         """Return A (samples, C, n)."""
-        own = contact_rows(self.recursion, self.frame, Contact(**self.asked), q)
+        own = contact_rows(self.recursion, self.frame, Contact(**self.arguments), q)
         if self.ties is None:
             return own
         rows = self.ties.rows(q)

@@ -156,7 +156,7 @@ def states_of_energies(lagrangians: Lagrangians, joints: Sequence[JointEntry], s
 
 
 def _values(lagrangians: Lagrangians, states: States) -> tuple[dict[str, Array], Array, Array]:
-    """Return quantities, kinetic and potential energies (2, samples, N), and rates of `kept` (samples, N)."""
+    """Return quantities, energies (2, samples, N): K and P, and rates of `energy_integral` (samples, N)."""
     torch = extra("torch")
     motion = [torch.from_numpy(m) for m in states.motion]
     rows = [[part.numpy() for part in torch.func.vmap(_Link(one))(*motion)] for one in lagrangians]
@@ -179,11 +179,11 @@ class _Link:
         h1 = self.func.jacrev(self.torque, 1)(q, rest, rest)
         c2 = self.func.jacrev(self.momentum, 1)(q, qd)
         g = self.torque(q, rest, rest)
-        along, across = self.func.grad(self.kept, (0, 1))(q, qd)
+        along, across = self.func.grad(self.energy_integral, (0, 1))(q, qd)
         rate = (along * qd + across * qdd).sum()
         return self.torque(q, qd, qdd), c2, 0.5 * (slope + h1), g, stiffness, h1, rate
 
-    def kept(self, q: Any, qd: Any) -> Any:
+    def energy_integral(self, q: Any, qd: Any) -> Any:
         """Return qd . dL/dqd - L, whose rate is the torques' power: K + P where K is quadratic in qd."""
         return (qd * self.momentum(q, qd)).sum() - self.lagrangian(q, qd)
 

@@ -27,7 +27,7 @@ from linkwise.oracle.held_motion import (
 from linkwise.oracle.loop_equations import LoopEquations
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import by_unit
-from linkwise.oracle.rounding import measured
+from linkwise.oracle.rounding import measure_rounding
 from linkwise.oracle.states import States
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest, RigidTree
@@ -73,7 +73,7 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
     def answers(tree: RigidTree) -> dict[str, Array]:
         return _answers(LoopEquations(NewtonEuler(manifest, tree), tree), (q, yd, ydd), tau)
 
-    values, scales = measured(answers, tree, condition**2)
+    values, scales = measure_rounding(answers, tree, condition**2)
     moved = States(q, values["velocity"], values["acceleration"])
     return LoopReference(equations, own, moved, tau, values, scales)
 

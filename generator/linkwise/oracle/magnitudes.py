@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from linkwise.oracle.newton_euler import Points, displacement_bound, path_of
-from linkwise.oracle.rounding import gathered
+from linkwise.oracle.rounding import rounding_growth
 from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
 
@@ -68,7 +68,7 @@ class Magnitudes:
                 moment = reach * force + abs(body.mass) * (frame.v + frame.omega * reach) ** 2
                 moment = moment + float(np.linalg.norm(body.inertia)) * turning
                 about = moment[:, None] + reaches[:, path] * force[:, None]
-                work = slopes[:, path] * np.where(turns, about, force[:, None]) * gathered(len(path))
+                work = slopes[:, path] * np.where(turns, about, force[:, None]) * rounding_growth(len(path))
                 work = work * frame.lost[:, None]
                 for k, column in zip(coordinates, work.T, strict=True):
                     tau[:, k, j, x] += column

@@ -22,12 +22,12 @@ JOINTS = 10
 """Number of joints above which their number counts."""
 
 
-def gathered(joints: int) -> float:
+def rounding_growth(joints: int) -> float:
     """Return how many times more roundings there are for so many joints, one after the other, than a few."""
     return max(1.0, joints / JOINTS)
 
 
-def measured(
+def measure_rounding(
     answers: Callable[[RigidTree], Mapping[str, Array]], tree: RigidTree, losing: Array | float = 1.0
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return answers by name, samples first, and scales: each sample's largest change, for all its numbers.
@@ -43,7 +43,7 @@ def measured(
         for what, value in values.items():
             moved = np.abs(changed[what] - value).reshape(len(value), -1).max(-1, initial=0.0)
             scales[what] = np.maximum(scales[what], moved / NOISE)
-    losing = losing * gathered(len(tree.bodies))
+    losing = losing * rounding_growth(len(tree.bodies))
     scales = {what: scale * losing for what, scale in scales.items()}
     return values, {
         what: np.broadcast_to(scale.reshape(-1, *[1] * (values[what].ndim - 1)), values[what].shape)

@@ -18,7 +18,7 @@ TRIES = 100
 TAKEN = (errno.ENOTEMPTY, errno.EEXIST)
 
 
-def put(draft: Path, target: Path) -> bool:
+def publish(draft: Path, target: Path) -> bool:
     """Rename folder `draft`, of a workplace beside `target`, to that name; return whether one was there.
 
     The former folder is then at `draft`. Raises OSError; nothing has changed then.

@@ -17,7 +17,7 @@ from linkwise_runtime.native.native_system import system_here
 
 from linkwise.errors import LinkwiseError
 from linkwise.input_file import kind_of
-from linkwise.output.exchange import exchange, flush, put
+from linkwise.output.exchange import exchange, flush, publish
 from linkwise.output.workplace import ENDING, NEW, REST, sweep, workplace
 
 ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:(?=/|$)")
@@ -82,7 +82,7 @@ def _replace(draft: Path, target: Path, refuse: Callable[[Path], None]) -> None:
     """Put `draft` in the place of `target`, unless something was added there since it was looked at."""
     if os.path.lexists(target):
         flush(draft)
-    if not put(draft, target):
+    if not publish(draft, target):
         return
     try:
         refuse(draft)

@@ -76,7 +76,7 @@ def _not_loaded(backends: Iterable[str], module: ModuleType) -> Iterator[str]:
     return (name for name in backends if name not in module.BACKENDS)
 
 
-def miscounted(directory: Path, manifest: Manifest) -> list[str]:
+def wrong_counts(directory: Path, manifest: Manifest) -> list[str]:
     """Return the links whose decomposition has other operations than the manifest says, each in words."""
     wrong = []
     for j, link in enumerate(manifest.links):

@@ -9,7 +9,7 @@ from linkwise.package.bytecode import CACHE, cache_of
 from linkwise.package.manifest import FILE, LARGEST, is_too_large
 
 
-def changed(directory: Path, files: Mapping[str, str]) -> list[str]:
+def changed_files(directory: Path, files: Mapping[str, str]) -> list[str]:
     """Return what is wrong with the listed files, in words, such as "forms/link_1.py was changed".
 
     The list is empty if nothing is wrong.
@@ -22,7 +22,7 @@ def faults(directory: Path, files: Mapping[str, str]) -> dict[str, str]:
     return {path: fault for path, digest in files.items() if (fault := _fault(directory, path, digest))}
 
 
-def added(directory: Path, files: Mapping[str, str]) -> list[str]:
+def unlisted_files(directory: Path, files: Mapping[str, str]) -> list[str]:
     """Return the paths of what the manifest doesn't list, caches of the listed modules aside.
 
     Raises OSError.

@@ -34,7 +34,7 @@ class Misfit(ValueError):
         self.place, self.data, self.wanted = place, data, wanted
 
 
-def parsed(text: str) -> Any:
+def parse_json(text: str) -> Any:
     """Return JSON as Python has it.
 
     Raises ValueError for what is not JSON, is nested too deeply, or has an entry twice.
@@ -90,7 +90,7 @@ def toml_value(kind: Any, place: str, data: Any) -> Any:
         raise LinkwiseError(f"{misfit.place} is {short(repr(misfit.data), 80)}; give {wanted}") from None
 
 
-def decoded(kind: type[T], data: Any, place: str, also: Iterable[str] = ()) -> T:
+def decode(kind: type[T], data: Any, place: str, also: Iterable[str] = ()) -> T:
     """Return the dataclass of a JSON object that has all entries of its fields; raise Misfit.
 
     also: entries of the object that are there besides those of `kind`
@@ -112,7 +112,7 @@ def _value(kind: Any, data: Any, place: str, strict: bool = True) -> Any:
     """
     inner, origin = get_args(kind), get_origin(kind)
     if isinstance(kind, type) and is_dataclass(kind):
-        return decoded(kind, data, place)
+        return decode(kind, data, place)
     if origin in (UnionType, Union):  # X | None
         return None if data is None else _value(inner[0], data, place, strict)
     if origin is tuple:

@@ -10,7 +10,7 @@ from linkwise_runtime.rule.joint_tree import TreeCoupling, TreeCurve, TreeFrame,
 Row = tuple[float, float, float]
 
 KernelKind = Literal["straight", "loops"]
-"""Kind of kernel: closed forms in straight lines, or loops over links and joints."""
+"""Kernel of a package: its C is straight lines of closed forms, or loops over links and joints."""
 
 PLACE = re.compile(
     r"(?:gravity|bodies\[(?P<body>\d+)\]\.(?:translation|com))\[[0-2]\]"

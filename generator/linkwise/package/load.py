@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from linkwise.errors import LinkwiseError, LinkwiseWarning
 from linkwise.extras import extra
 from linkwise.package.agreement import disagreements
-from linkwise.package.contents import changed
+from linkwise.package.contents import changed_files
 from linkwise.package.emitted_text import foreign
 from linkwise.package.importer import import_listed
 from linkwise.package.manifest import Manifest, altered_entries
@@ -53,13 +53,13 @@ class Package:
         # The argument is left out for packages made before there were kernels to choose from.
         chosen: dict[str, Any] = {} if kernel == "auto" else {"kernel": kernel}
         chosen |= {} if bodies is None else {"bodies": bodies}
-        with staying():
+        with refuse_exit():
             dynamics: Dynamics = self.module.load(backend, parameters, allow_unphysical=True, **chosen)
         return cast(Dynamics, TensorModel(dynamics)) if dynamics.backend.takes_tensors else dynamics
 
 
 @contextmanager
-def staying() -> Iterator[None]:
+def refuse_exit() -> Iterator[None]:
     """Raise LinkwiseError where a package's code would end this process, as by SystemExit.
 
     Ctrl-C and errors pass through.
@@ -78,7 +78,7 @@ def open_package(directory: Path) -> Package:
     Raises LinkwiseError otherwise, with the first file or entry of the manifest that differs.
     """
     manifest = Manifest.read(directory)
-    for fault in (*altered_entries(directory), *changed(directory, manifest.files)):
+    for fault in (*altered_entries(directory), *changed_files(directory, manifest.files)):
         raise LinkwiseError(f"{directory}: {fault}; generate the robot again")
     version = manifest.generator.get("linkwise")
     if version != VERSION:
@@ -101,7 +101,7 @@ def open_package(directory: Path) -> Package:
 
 def load_package(directory: Path, manifest: Manifest) -> Package:
     """Import the package of a manifest; passes on whatever the package raises."""
-    with staying():
+    with refuse_exit():
         return Package(directory, manifest, import_listed(directory, manifest))
 
 

@@ -14,7 +14,7 @@ from linkwise_runtime.rule.joint_tree import TreeCoupling, TreeFrame, TreeTie
 from linkwise.errors import LinkwiseError
 from linkwise.output import sweep
 from linkwise.package.checked_tree import check_curve, check_tree
-from linkwise.package.decode import decoded, parsed, require
+from linkwise.package.decode import decode, parse_json, require
 from linkwise.package.entries import (
     BodyEntry,
     CodeSize,
@@ -72,7 +72,7 @@ CONVENTIONS = {
 class Manifest:
     """Contents of a package: a `tree` of rigid bodies, or `energies` that a user wrote, link by link.
 
-    request: the options of `generate`; kernel: the kind of its C
+    request: the options of `generate`; kernel: how its C computes
     followers: joints of the robot's file that are none here: they follow others, or are fixed
     file_joints: the file's joints that move, where some are several here, or Pinocchio has another order
     in_radians: joints and followers that logs have in radians, also where others are in degrees
@@ -153,7 +153,7 @@ class Manifest:
             )
         try:
             require(schema == SCHEMA and type(schema) is int, "schema", f"the number {SCHEMA}")
-            return decoded(cls, data, "", also=("schema", "units", "conventions", "checksums"))
+            return decode(cls, data, "", also=("schema", "units", "conventions", "checksums"))
         except ValueError as error:
             raise LinkwiseError(f"{path} is damaged: {error}; generate the robot again") from error
 
@@ -207,7 +207,7 @@ def _read(path: Path) -> dict[str, Any]:
         )
     try:
         require(not is_too_large(path), f"the file of {path.stat().st_size} bytes", "a manifest")
-        data = parsed(path.read_text(encoding="utf-8"))
+        data = parse_json(path.read_text(encoding="utf-8"))
         require(isinstance(data, dict), "the whole", "an object")
     except OSError as error:
         raise LinkwiseError(f"{path} cannot be read: {error.strerror}") from error

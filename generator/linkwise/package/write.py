@@ -14,7 +14,7 @@ from typing import Any
 
 from linkwise.errors import LinkwiseError
 from linkwise.output import require_writable, whole_directory
-from linkwise.package.contents import added, entries, faults
+from linkwise.package.contents import entries, faults, unlisted_files
 from linkwise.package.manifest import FILE, is_too_large
 
 
@@ -34,7 +34,7 @@ def check_target(directory: Path, robot: str | None) -> None:
     earlier = earlier_package(directory)
     try:
         foreign = not earlier and next(entries(directory), None) is not None
-        own = added(directory, earlier.get("files", {}))
+        own = unlisted_files(directory, earlier.get("files", {}))
     except OSError as error:
         raise LinkwiseError(
             f"cannot write to {directory}: {error.strerror}; choose another --out or --name"

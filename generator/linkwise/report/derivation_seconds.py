@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 
 import sympy as sp
 
-from linkwise.dynamics.derive import link_kernel
+from linkwise.dynamics.derive import link_forms
 from linkwise.progress import Progress
 from linkwise.report.expanded_arm import expanded_arm
 from linkwise.report.trigonometric_ring import TrigonometricRing
@@ -61,7 +61,7 @@ def measure_derivations(
         if link is not None:
             link = _bounded(lagrangians[n - 1], moving, limit)
         started = time.process_time()
-        link_kernel(system, n - 1)
+        link_forms(system, n - 1)
         times.append(DerivationTime(n, whole, link, time.process_time() - started))
         progress("derive by SymPy", len(times), len(dof))
     return tuple(times)

@@ -155,7 +155,7 @@ class Expansion:
             )
         sine = Laurent({key + 1: -1, -key + 1: 1}, 2, bound) if key else ZERO
         cosine = Laurent({key: 1, -key: 1}, 2, bound) if key else ONE
-        s, c = snapped(math.sin(phase)), snapped(math.cos(phase))
+        s, c = snap_number(math.sin(phase)), snap_number(math.cos(phase))
         if expr.func == sp.sin:
             return add([sine.scaled(c), cosine.scaled(s)])
         return add([cosine.scaled(c), sine.scaled(-s)])
@@ -180,7 +180,7 @@ def exact(number: sp.Expr) -> Fraction:
     return Fraction(repr(float(number)))
 
 
-def snapped(value: float) -> Fraction:
+def snap_number(value: float) -> Fraction:
     """Return 0 or ±1 where `value` is that within rounding, else the decimal it prints as."""
     near = round(value)
     return Fraction(near) if abs(value - near) < 1e-12 else Fraction(repr(value))

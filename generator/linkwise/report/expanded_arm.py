@@ -11,7 +11,7 @@ from typing import TypeAlias, TypeVar
 
 import sympy as sp
 
-from linkwise.report.expand import ROUNDING, Expansion, angle_units, snapped
+from linkwise.report.expand import ROUNDING, Expansion, angle_units, snap_number
 from linkwise.report.expanded_torques import is_exact
 from linkwise.report.laurent import ONE, ZERO, BudgetExceededError, Laurent, add, constant, multiply
 from linkwise.robot import Coordinate, Joint
@@ -87,7 +87,7 @@ def _moved(
     angle, rate = ratio * coordinate.q, expansion(ratio * coordinate.qd)
     origin = _sum(origin, _combined(expansion, columns, [expansion(t) for t in exact(joint.translation)]))
     turned = [
-        _combined(expansion, columns, [constant(snapped(e)) for e in column])
+        _combined(expansion, columns, [constant(snap_number(e)) for e in column])
         for column in zip(*joint.rotation, strict=True)
     ]
     if joint.kind == "prismatic":

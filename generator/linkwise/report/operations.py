@@ -7,14 +7,12 @@ part of τ_i  = (Σ_j c2_ijk) q̈_k, and so on: the coefficients are added first
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from linkwise.dynamics.derive import link_kernel
-from linkwise.dynamics.kernel import Kernel
+from linkwise.dynamics.derive import link_forms
+from linkwise.dynamics.link_forms import LinkForms
 from linkwise.expression.count import count_operations
-from linkwise.expression.expression_graph import Graph, Node, operands, reachable
+from linkwise.expression.expression_graph import ARITHMETIC, Graph, Node, operands, reachable
 from linkwise.report.term_count import TermQuery
 from linkwise.symbolic.system import System
-
-ARITHMETIC = frozenset({"add", "sub", "mul", "div"})
 
 
 @dataclass(frozen=True)
@@ -54,32 +52,31 @@ class LinkOperations:
 
 
 def link_operations(system: System, joints: tuple[int, ...], query: TermQuery) -> Iterator[LinkOperations]:
-    """Yield the operations of each link's own kernel, link after link."""
+    """Yield the operations of each link's own closed forms, link after link."""
     for j in range(len(system.links)):
-        kernel = link_kernel(system, j)
-        forms = kernel.forms[0]
-        everything = cost_of(kernel.graph, list(forms.decomposition()))
-        rows = {i: _row(kernel, i, query) for i in joints if i in forms.path}
+        forms = link_forms(system, j)
+        everything = cost_of(forms.graph, list(forms.decomposition()))
+        rows = {i: _row(forms, i, query) for i in joints if i in forms.path}
         yield LinkOperations(j, everything, rows)
 
 
-def _row(kernel: Kernel, i: int, query: TermQuery) -> PartOperations:
-    graph, k = kernel.graph, query.coordinate
-    factor = coefficient(kernel, i, query)
-    motion = (graph.one, kernel.inputs.qd[k], kernel.inputs.qdd[k])[query.order]
-    torque = kernel.forms[0].torque[i]
+def _row(forms: LinkForms, i: int, query: TermQuery) -> PartOperations:
+    graph, k = forms.graph, query.coordinate
+    factor = coefficient(forms, i, query)
+    motion = (graph.one, forms.inputs.qd[k].node, forms.inputs.qdd[k].node)[query.order]
+    torque = forms.torque[i]
     return PartOperations(
         *(_cost_of_one(graph, node) for node in (torque, factor, graph.mul(factor, motion)))
     )
 
 
-def coefficient(kernel: Kernel, i: int, query: TermQuery) -> Node:
+def coefficient(forms: LinkForms, i: int, query: TermQuery) -> Node:
     """Return the node of the requested coefficient; zero where its coordinate is off the path."""
-    forms, k = kernel.forms[0], query.coordinate
+    k = query.coordinate
     if query.order == 0:
         return forms.gravity[i]
     if k not in forms.path:
-        return kernel.graph.zero
+        return forms.graph.zero
     if query.order == 1:
         return forms.velocity[i, k]
     return forms.acceleration[min(i, k), max(i, k)]
@@ -89,7 +86,7 @@ def _cost_of_one(graph: Graph, node: Node) -> Operations | None:
     return None if node == graph.zero else cost_of(graph, [node])
 
 
-def summed(costs: Sequence[LinkOperations], i: int, query: TermQuery) -> tuple[Operations, Operations]:
+def total_cost(costs: Sequence[LinkOperations], i: int, query: TermQuery) -> tuple[Operations, Operations]:
     """Return the cost of τ_i = Σ_j τ_ij and of its part, with each link computed by itself.
 
     Zeros are not added.

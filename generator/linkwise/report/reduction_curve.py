@@ -15,7 +15,7 @@ from linkwise.report.curve_fit import (
 )
 from linkwise.report.expanded_torques import form_of, link_torques
 from linkwise.report.laurent import BudgetExceededError
-from linkwise.report.operations import NO_OPERATIONS, LinkOperations, Operations, link_operations, summed
+from linkwise.report.operations import NO_OPERATIONS, LinkOperations, Operations, link_operations, total_cost
 from linkwise.report.recorded_operations import RecordedPair, recorded_operations
 from linkwise.report.spatial_arms import is_spatial
 from linkwise.report.term_count import RunningCount, TermPair, TermQuery
@@ -136,7 +136,7 @@ def curve(
             running.add(found.torques[0], found.variables)
             costs.append(cost)
             everything += cost.everything
-            whole, part = summed(costs, 0, PAPER)
+            whole, part = total_cost(costs, 0, PAPER)
             total, kept = running.count.total, running.count.kept(PAPER)
             if not kept:
                 raise LinkwiseError(

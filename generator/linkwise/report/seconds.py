@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from linkwise.dynamics.derive import derive
-from linkwise.dynamics.kernel import Kernel
+from linkwise.dynamics.link_forms import LinkForms
 from linkwise.emit.assemble import package_files
 from linkwise.emit.backend import chosen_backends
 from linkwise.emit.derivation import Derivation
@@ -89,7 +89,7 @@ def _generated(system: System, directory: Path) -> Package:
     """Return the package of `system`, with an additional module: row.py, which computes τ_1 alone."""
     derivation = Derivation(system, derive(system), directory.name, {})
     files = package_files(derivation, chosen_backends(("numpy", "autograd")))
-    files["row.py"] = render("report/row.py.j2", row_view(system, derivation.kernels))
+    files["row.py"] = render("report/row.py.j2", row_view(system, derivation.forms))
     write_package(files, directory)
     return open_package(directory)
 
@@ -149,16 +149,13 @@ class RowFunction:
     output: str
 
 
-def row_view(system: System, kernels: tuple[Kernel, ...]) -> dict[str, Any]:
+def row_view(system: System, links: tuple[LinkForms, ...]) -> dict[str, Any]:
     """Return functions for c2_1j1 and for τ_1j, written as the package's own functions are."""
     coefficients = [
-        _function(system, kernel, f"coefficient_{j + 1}", kernel.forms[0].acceleration[0, 0])
-        for j, kernel in enumerate(kernels)
+        _function(system, forms, f"coefficient_{j + 1}", forms.acceleration[0, 0])
+        for j, forms in enumerate(links)
     ]
-    torques = [
-        _function(system, kernel, f"torque_{j + 1}", kernel.forms[0].torque[0])
-        for j, kernel in enumerate(kernels)
-    ]
+    torques = [_function(system, forms, f"torque_{j + 1}", forms.torque[0]) for j, forms in enumerate(links)]
     return {
         "functions": coefficients + torques,
         "coefficients": [function.name for function in coefficients],
@@ -166,8 +163,8 @@ def row_view(system: System, kernels: tuple[Kernel, ...]) -> dict[str, Any]:
     }
 
 
-def _function(system: System, kernel: Kernel, name: str, output: Node) -> RowFunction:
-    code = straight_line(kernel.graph, [output], PythonPrinter("np"))
+def _function(system: System, forms: LinkForms, name: str, output: Node) -> RowFunction:
+    code = straight_line(forms.graph, [output], PythonPrinter("np"))
     return RowFunction(name, fetched(system, code, "[..., {}]"), code.assignments, code.outputs[0])
 
 

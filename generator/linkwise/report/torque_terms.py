@@ -7,7 +7,7 @@ from linkwise.package.potential_word import potential_word
 from linkwise.progress import Progress
 from linkwise.report.expanded_torques import form_of, link_torques
 from linkwise.report.laurent import BudgetExceededError
-from linkwise.report.operations import LinkOperations, Operations, link_operations, summed
+from linkwise.report.operations import LinkOperations, Operations, link_operations, total_cost
 from linkwise.report.term_count import RunningCount, TermCount, TermQuery
 from linkwise.symbolic.system import EnergySystem, System
 
@@ -87,7 +87,7 @@ def terms_report(
         budget,
         rows,
         tuple(cost for cost in costs if query.link in (None, cost.link)),
-        {i: summed(costs, i, query) for i in joints if query.link is None},
+        {i: total_cost(costs, i, query) for i in joints if query.link is None},
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import sympy as sp
 
 from linkwise.errors import LinkwiseError
-from linkwise.robot.constrained import check_constraints, constrained
+from linkwise.robot.constrained import check_constraints, remaining_constraints
 from linkwise.robot.coordinates import AxisRule, movement
 from linkwise.robot.description import Connection, Description
 from linkwise.robot.following_joints import followers
@@ -56,7 +56,7 @@ def build(description: Description, options: Options) -> Robot:
     numbers = assembly.links if naming is None else _links(plain, options, moving.motion)
     named = {body.name for body in plain.bodies if not body.invented}
     freedom = options.lock, options.free_mimic, options.independent
-    held = constrained(description, ends, assembly.frames, moving, *freedom)
+    held = remaining_constraints(description, ends, assembly.frames, moving, *freedom)
     if numbers and all(link.massless for link in numbers):
         which = "moving link" if any(body.mass for body in plain.bodies) else "link"
         raise LinkwiseError(f"no {which} has mass, so no torque is to be had; give one mass and inertia")
@@ -89,7 +89,7 @@ def build(description: Description, options: Options) -> Robot:
         passive,
         held.ties,
         held.couplings,
-        held.wanted,
+        held.requested_independent,
         held.driven,
         limits=coordinate_limits(connections, moving.coordinates),
         followers=tuple(followers(axes, connections, moving, options.lock)),

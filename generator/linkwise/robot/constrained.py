@@ -11,26 +11,26 @@ from linkwise_runtime.rule.joint_tree import TreeTie
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.coordinates import Movement
-from linkwise.robot.couplings import check_joints, coupled
+from linkwise.robot.couplings import check_joints, coordinate_couplings
 from linkwise.robot.description import Description
 from linkwise.robot.joint_types import expand
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import Coupling, Frame
 from linkwise.robot.size import check_constraint_count
-from linkwise.robot.ties import Ends, check_ties, tied
+from linkwise.robot.ties import Ends, check_ties, frame_ties
 
 
 @dataclass(frozen=True)
 class Constrained:
     """Constraints of a robot.
 
-    `wanted` are the names of the joints asked for as independent, `driven` the coordinates that actuators
-    drive.
+    `requested_independent` are the names of the joints asked for as independent, `driven` the coordinates
+    that actuators drive.
     """
 
     ties: tuple[TreeTie, ...]
     couplings: tuple[Coupling, ...]
-    wanted: tuple[str, ...]
+    requested_independent: tuple[str, ...]
     driven: tuple[int, ...]
     notes: tuple[Note, ...]
 
@@ -50,7 +50,7 @@ def check_constraints(description: Description) -> None:
         )
 
 
-def constrained(
+def remaining_constraints(
     description: Description,
     ends: Ends,
     frames: Sequence[Frame],
@@ -66,8 +66,8 @@ def constrained(
     and for names that are not of coordinates or are given twice.
     """
     values = {sp.Symbol(name, real=True): value for name, value in description.parameters}
-    ties, lost = tied(description.ties, ends, frames, values)
-    couplings, uncoupled = coupled(description.couplings, movement.motion, lock, free_mimic)
+    ties, lost = frame_ties(description.ties, ends, frames, values)
+    couplings, uncoupled = coordinate_couplings(description.couplings, movement.motion, lock, free_mimic)
     check_constraint_count(len(ties) + len(couplings), len(movement.coordinates))
     wanted = independent or description.independent
     if not (ties or couplings):

@@ -15,7 +15,7 @@ CLOSE = 1e-9
 """Tolerance in rad and m: joints that stand still may miss a coupling by this much."""
 
 
-def coupled(
+def coordinate_couplings(
     couplings: Iterable[JointCoupling],
     motion: Mapping[str, AxisRule],
     lock: Collection[str],
@@ -79,7 +79,7 @@ def _terms(
     constant, by_coordinate = 0.0, dict[int, list[float]]()
     for joint, coefficients in coupling.terms:
         rule = motion[joint]
-        moved = composed(coefficients, rule.ratio, rule.offset)
+        moved = compose_polynomial(coefficients, rule.ratio, rule.offset)
         if rule.coordinate is None:
             constant += moved[0]
             continue
@@ -106,7 +106,7 @@ def _given_by_others(rule: AxisRule, terms: tuple[tuple[int, tuple[float, ...]],
     return None
 
 
-def composed(coefficients: tuple[float, ...], ratio: float, offset: float) -> tuple[float, ...]:
+def compose_polynomial(coefficients: tuple[float, ...], ratio: float, offset: float) -> tuple[float, ...]:
     """Return the polynomial p(ratio q + offset) in q, by Horner's rule."""
     result = [0.0]
     for coefficient in reversed(coefficients):

@@ -232,8 +232,9 @@ class Robot:
     those of the file, one for each link among them, or none.
 
     `ties` and `couplings` hold beside the tree. Under them the `independent` coordinates, in ascending order,
-    determine all others, and `closed_position` is one in which they hold; before these are found, `wanted`
-    are the names asked for as independent, and `driven` the coordinates that actuators drive.
+    determine all others, and `closed_position` is one in which they hold; before these are found,
+    `requested_independent` are the names asked for as independent, and `driven` the coordinates that
+    actuators drive.
     """
 
     name: str
@@ -247,7 +248,7 @@ class Robot:
     passive: tuple[PassiveAxis, ...] = ()
     ties: tuple[TreeTie, ...] = ()
     couplings: tuple[Coupling, ...] = ()
-    wanted: tuple[str, ...] = ()
+    requested_independent: tuple[str, ...] = ()
     driven: tuple[int, ...] = ()
     independent: tuple[int, ...] = ()
     closed_position: tuple[float, ...] = ()

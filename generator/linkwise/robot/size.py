@@ -8,12 +8,12 @@ FOR_EACH = 10
 """Most constraints for each joint that moves: one that holds nothing that others leave free is redundant."""
 
 
-def check_joints(count: int, mend: str) -> None:
-    """Raise LinkwiseError where more joints move than linkwise accepts; `mend` is the remedy in words."""
+def check_joints(count: int, remedy: str) -> None:
+    """Raise LinkwiseError where more joints move than linkwise accepts; `remedy` in words."""
     if count > MOST_JOINTS:
         raise LinkwiseError(
             f"{count:,} joints move, and {MOST_JOINTS:,} are the most, as the number of coefficients grows"
-            f" with N³; {mend}"
+            f" with N³; {remedy}"
         )
 
 

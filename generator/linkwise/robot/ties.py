@@ -81,7 +81,7 @@ def check_ties(ties: Iterable[AnchoredTie], bodies: Iterable[Body], sites: Itera
             )
 
 
-def tied(
+def frame_ties(
     ties: Iterable[AnchoredTie],
     ends: Ends,
     frames: Sequence[Frame],

@@ -9,7 +9,7 @@ from typing import Literal
 
 from linkwise.errors import LinkwiseError
 from linkwise.input_file import is_file
-from linkwise.package.decode import decoded, parsed, require
+from linkwise.package.decode import decode, parse_json, require
 from linkwise.package.manifest import is_inside
 from linkwise.study.band_figure import FORMATS
 from linkwise.study.study_paths import read_back, require_own
@@ -75,7 +75,7 @@ class StudyMark:
         if not is_file(path):
             return None
         try:
-            mark = decoded(cls, parsed(read_back(path)), "")
+            mark = decode(cls, parse_json(read_back(path)), "")
             for name in mark.files:
                 is_plain = is_inside(name) and "/" not in name
                 require(is_plain and is_of_study(name), f"{name!r} among 'files'", "a name of a study's file")

@@ -8,7 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Protocol
 
-from linkwise.makers import fingerprint
+from linkwise.generator_fingerprint import fingerprint
 from linkwise.output import require_writable, write_files
 from linkwise.progress import Progress, silent
 from linkwise.study.process_pool import ProcessPool

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from linkwise.makers import fingerprint
+from linkwise.generator_fingerprint import fingerprint
 from linkwise.robot.read import is_built_in, most_bytes
 from linkwise.study.study_paths import opened_here, version_of
 from linkwise.study.study_plan import OF_FILES, StudyPlan, Trial

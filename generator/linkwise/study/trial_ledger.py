@@ -8,7 +8,7 @@ from pathlib import Path
 
 from linkwise.errors import LinkwiseError
 from linkwise.input_file import is_file
-from linkwise.package.decode import decoded, parsed
+from linkwise.package.decode import decode, parse_json
 from linkwise.study.study_paths import read_back
 from linkwise.study.study_plan import StudyPlan, Trial
 from linkwise.study.trial_key import SeenFile, trial_key
@@ -53,7 +53,7 @@ class TrialRecord:
         try:
             if not (folder / RECORD).exists():
                 return None
-            return decoded(cls, parsed(read_back(folder / RECORD)), "")
+            return decode(cls, parse_json(read_back(folder / RECORD)), "")
         except LinkwiseError:
             raise
         except (OSError, ValueError):

@@ -12,8 +12,8 @@ from ..packed_engine import PackedEngine
 from ..passive_joints import passive_torques
 from ..robot_axes import axes_of
 from ..structure import Structure
-from .inertia_solve import solved
-from .namespace import hidden, namespace, side_by_side
+from .inertia_solve import solve_inertia
+from .namespace import is_traced, namespace, side_by_side
 from .packed_tables import PackedTables
 
 AT_ONCE = 1 << 22
@@ -73,7 +73,7 @@ class Answers:
 
     def inverse_dynamics(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return tau_i, (..., n)."""
-        return (self._tables.summed(self._engine.torque(q, qd, qdd)),)
+        return (self._tables.sum_over_links(self._engine.torque(q, qd, qdd)),)
 
     def passive_torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return the torques for spring, damping, friction and armature, (..., n) each."""
@@ -156,12 +156,12 @@ class Answers:
     def forward_dynamics_of_links(self, q: Numbers, qd: Numbers, tau: Numbers) -> Sequence[Numbers]:
         """Solve M qdd = tau - (h + g) for qdd, (..., n)."""
         mass, bias = self.equations(q, qd)
-        return (solved(mass, tau - bias, self._structure.joint_names),)
+        return (solve_inertia(mass, tau - bias, self._structure.joint_names),)
 
     def forward_dynamics(self, q: Numbers, qd: Numbers, tau: Numbers) -> Sequence[Numbers]:
         """Solve (M + armature) qdd = tau - spring - damping - friction - (h + g) for qdd, (..., n)."""
         mass, bias = self.equations(q, qd, passive=True)
-        return (solved(mass, tau - bias, self._structure.joint_names),)
+        return (solve_inertia(mass, tau - bias, self._structure.joint_names),)
 
     def equations(self, q: Numbers, qd: Numbers, passive: bool = False) -> tuple[Numbers, Numbers]:
         """Return M (..., n, n) and h + g (..., n) of M qdd + h + g = tau.
@@ -170,7 +170,7 @@ class Answers:
         """
         rest = self._rest(q)
         c2, _, _, bias, _ = self.packed(q, qd, rest)
-        mass, force = self._tables.matrices(c2, "acceleration"), self._tables.summed(bias)
+        mass, force = self._tables.matrices(c2, "acceleration"), self._tables.sum_over_links(bias)
         if not (passive and self._structure.passive):
             return mass, force
         sums = self._structure.passive_sums
@@ -182,7 +182,7 @@ class Answers:
         """Return M, C (..., n, n) and g (..., n)."""
         c2, c1, g, _, _ = self.packed(q, qd, self._rest(q))
         matrices = self._tables.matrices
-        return matrices(c2, "acceleration"), matrices(c1, "velocity"), self._tables.summed(g)
+        return matrices(c2, "acceleration"), matrices(c1, "velocity"), self._tables.sum_over_links(g)
 
     def energy(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
         """Return K_j and P_j, (..., N) each."""
@@ -227,7 +227,7 @@ class Answers:
     def _christoffel(self, q: Numbers, made: Callable[[Numbers], Numbers]) -> Sequence[Numbers]:
         n, batch, each = self._structure.n, q.shape[:-1], max(1, sum(self._structure.sizes))
         units = self._engine.constant(np.eye(n), q)
-        if hidden(q):
+        if is_traced(q):
             return (side_by_side(self._of_units(q, units, made)),)
         if self._engine.samples:  # samples stay with their numbers
             # What is not of the motion's samples is refused here: the unit velocities below are samples too.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..chosen_names import listed, sample_of
 from ..interface import Numbers
-from .namespace import NUMPY, array_of, epsilon_of, hidden, kind_of, namespace
+from .namespace import NUMPY, array_of, epsilon_of, is_traced, kind_of, namespace
 
 if TYPE_CHECKING:
     from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
@@ -39,12 +39,12 @@ class Told(NamedTuple):
     """Further text on what is known by even fewer digits."""
 
 
-def solved(mass: Numbers, force: Numbers, joint_names: Sequence[str]) -> Numbers:
-    """Return M^-1 f (..., n), for matrices (..., n, n) and forces (..., n); raise as `solved_columns`."""
-    return solved_columns(mass, force[..., None], joint_names)[..., 0]
+def solve_inertia(mass: Numbers, force: Numbers, joint_names: Sequence[str]) -> Numbers:
+    """Return M^-1 f (..., n), for matrices (..., n, n) and forces (..., n); raise as it does for columns."""
+    return solve_inertia_columns(mass, force[..., None], joint_names)[..., 0]
 
 
-def solved_columns(mass: Numbers, forces: Numbers, joint_names: Sequence[str]) -> Numbers:
+def solve_inertia_columns(mass: Numbers, forces: Numbers, joint_names: Sequence[str]) -> Numbers:
     """Return M^-1 F (..., n, X), for matrices (..., n, n) and columns of forces (..., n, X).
 
     Rows and columns are first scaled to ones on the diagonal, so that a hand's inertia is not lost beside a
@@ -57,7 +57,7 @@ def solved_columns(mass: Numbers, forces: Numbers, joint_names: Sequence[str]) -
     size = xp.where(diagonal > 0.0, diagonal, xp.ones_like(diagonal)) ** 0.5
     scaled = mass / (size[..., :, None] * size[..., None, :])
     columns = forces / size[..., None]
-    if hidden(mass) or 0 in scaled.shape:
+    if is_traced(mass) or 0 in scaled.shape:
         return _quotient(scaled, columns) / size[..., None]
     own = _unit_of(_lightest(scaled, joint_names), scaled)
     wide = xp.zeros_like(own[..., None] + columns.sum(-1)[..., None])

@@ -22,7 +22,7 @@ def namespace(values: object) -> Namespace:
     return NUMPY if isinstance(values, np.ndarray) else MODULES["torch"]
 
 
-def hidden(values: Numbers) -> bool:
+def is_traced(values: Numbers) -> bool:
     """Return whether the numbers cannot be looked at.
 
     That is so where a compiler or a transformation such as vmap follows them, and where they have no data.

@@ -70,7 +70,7 @@ class PackedTables:
         dense: Numbers = entries.reshape(*values.shape[:-1], *self._shapes[field], PARAMETERS)
         return dense
 
-    def summed(self, tau: Numbers) -> Numbers:
+    def sum_over_links(self, tau: Numbers) -> Numbers:
         """Return packed torques (..., count) summed over the links, (..., n)."""
         return tau @ self._joint_sums(tau)
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
-from ..answers.namespace import array_of, hidden, namespace
+from ..answers.namespace import array_of, is_traced, namespace
 from ..chosen_names import plain, sample_of
 from ..interface import Numbers
-from ..rule.kinematics import taken
+from ..rule.kinematics import gather
 from .closing_search import OPEN
 from .independent_joints import JointColumns, check_factors, check_following, row_sizes
 from .tie_rows import RowsAt, TieRows
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
 
 
-class Followers(NamedTuple):
+class DependentMap(NamedTuple):
     """Map from the independent joints to all joints, at one position or at many."""
 
     columns: JointColumns
@@ -73,7 +73,7 @@ class ClosedPlace(NamedTuple):
 
     q: Numbers
     """Positions of all joints, (..., n)."""
-    found: Followers
+    found: DependentMap
     made: RowsAt
     rows: Numbers
     """A, with its rows divided by their sizes, (..., C, n)."""
@@ -101,7 +101,7 @@ class ClosedPlace(NamedTuple):
 
     def own(self, motion: Numbers) -> Numbers:
         """Return the independent joints' entries (..., m) of motion (..., n)."""
-        return taken(motion, self.found.columns.independent, -1)
+        return gather(motion, self.found.columns.independent, -1)
 
 
 def ties_at(ties: TieRows, columns: JointColumns, q: Numbers, held_at: Numbers | None = None) -> TiesAt:
@@ -113,17 +113,17 @@ def ties_at(ties: TieRows, columns: JointColumns, q: Numbers, held_at: Numbers |
         sizes = row_sizes(positions[..., 1:], ties.couplings)
         positions = positions / sizes[..., None]
     rows = positions[..., 1:]
-    return TiesAt(q, made, sizes, positions[..., 0], rows, factored(rows, columns))
+    return TiesAt(q, made, sizes, positions[..., 0], rows, factor_dependent(rows, columns))
 
 
-def followed(at: TiesAt, columns: JointColumns, names: RowNames) -> ClosedPlace:
+def checked_place(at: TiesAt, columns: JointColumns, names: RowNames) -> ClosedPlace:
     """Return how joints follow where ties close; raises ValueError where they do not stay closed."""
-    inverse = inverted(at.factors) if at.inverse is None else at.inverse
+    inverse = pseudoinverse(at.factors) if at.inverse is None else at.inverse
     mapped = velocity_map(at.rows, columns, inverse)
     check_following(at.rows, columns, mapped, names.owners, names.joints)
     if at.sizes is not None:  # rates and forces are those of rows that are not scaled
         inverse = inverse / at.sizes[..., None, :]
-    return ClosedPlace(at.q, Followers(columns, inverse, mapped), at.made, at.rows, at.factors[1])
+    return ClosedPlace(at.q, DependentMap(columns, inverse, mapped), at.made, at.rows, at.factors[1])
 
 
 def closed_place(
@@ -135,16 +135,16 @@ def closed_place(
     check_factors(at.rows, at.factors[1], columns, names.joints)
     if tolerance is None:  # stricter for what joints could close than for what nothing can
         check_closed(at.closable, closable_tolerance(q), names.rows, names.owners)
-    return followed(at, columns, names)
+    return checked_place(at, columns, names)
 
 
-def factored(rows: Numbers, columns: JointColumns) -> tuple[Numbers, Numbers]:
+def factor_dependent(rows: Numbers, columns: JointColumns) -> tuple[Numbers, Numbers]:
     """Return the factors Q and R of A_d, from rows A (..., C, n)."""
-    q, r = namespace(rows).linalg.qr(taken(rows, columns.dependent, -1))
+    q, r = namespace(rows).linalg.qr(gather(rows, columns.dependent, -1))
     return q, r
 
 
-def inverted(factors: tuple[Numbers, Numbers]) -> Numbers:
+def pseudoinverse(factors: tuple[Numbers, Numbers]) -> Numbers:
     """Return A_d^+ (..., d, C) from the factors of A_d, of which R is regular."""
     orthogonal, triangle = factors
     linalg, right = namespace(triangle).linalg, orthogonal.mT
@@ -159,11 +159,11 @@ def inverted(factors: tuple[Numbers, Numbers]) -> Numbers:
 def velocity_map(rows: Numbers, columns: JointColumns, inverse: Numbers) -> Numbers:
     """Return the velocity map G (..., n, m)."""
     xp = namespace(rows)
-    moved = -inverse @ taken(rows, columns.independent, -1)
+    moved = -inverse @ gather(rows, columns.independent, -1)
     m = len(columns.independent)
     # Zeros made from the motion give a unit matrix of its kind, through which gradients can flow.
     unit = xp.zeros_like(moved[..., :1, :]) + xp.eye(m, **_kind(rows))
-    return taken(xp.concat([unit, moved], -2), columns.order, -2)
+    return gather(xp.concat([unit, moved], -2), columns.order, -2)
 
 
 def dependent_shares(columns: JointColumns, inverse: Numbers, changes: Numbers) -> Numbers:
@@ -171,7 +171,7 @@ def dependent_shares(columns: JointColumns, inverse: Numbers, changes: Numbers) 
     xp, m = namespace(changes), len(columns.independent)
     moved = -inverse @ changes
     still = xp.zeros_like(moved[..., :1, :]) + xp.zeros((m, 1), **_kind(moved))
-    return taken(xp.concat([still, moved], -2), columns.order, -2)
+    return gather(xp.concat([still, moved], -2), columns.order, -2)
 
 
 def closable(factors: tuple[Numbers, Numbers], violation: Numbers) -> Numbers:
@@ -179,12 +179,12 @@ def closable(factors: tuple[Numbers, Numbers], violation: Numbers) -> Numbers:
     return times(factors[0], times(factors[0].mT, violation))
 
 
-def borne(found: Followers, torque: Numbers) -> Numbers:
+def tie_forces(found: DependentMap, torque: Numbers) -> Numbers:
     """Return lambda (..., C, X) for torques (..., n, X), of which those of dependent joints count."""
-    return found.inverse.mT @ taken(torque, found.columns.dependent, -2)
+    return found.inverse.mT @ gather(torque, found.columns.dependent, -2)
 
 
-def projected(found: Followers, torque: Numbers) -> Numbers:
+def independent_torque(found: DependentMap, torque: Numbers) -> Numbers:
     """Return G^T times torques (..., n, X), (..., m, X)."""
     return found.map.mT @ torque
 
@@ -222,7 +222,7 @@ def closable_tolerance(like: Numbers) -> float:
 
 def worst_open(violation: Numbers, tolerance: float | None) -> tuple[list[int], int, float] | None:
     """Return the first sample where phi (..., C) is open, its most open row, and by how much; or None."""
-    if hidden(violation):
+    if is_traced(violation):
         return None
     size = np.abs(array_of(violation))
     allowed = OPEN if tolerance is None else tolerance

@@ -193,7 +193,7 @@ def tie_tables(tree: JointTree, n: int, held: Sequence[Held]) -> TieTables:
         # Points are wanted in these axes, and so are turned like them.
         own = np.array([*(one.axes.T @ one.point for one in held), *[np.zeros(3)] * ties])
         points = own.T[..., None]
-        moved = np.asarray(frames.carried).T[..., None]
+        moved = np.asarray(frames.moved_frames).T[..., None]
         first, second = moved[: len(held)], np.zeros_like(moved[: len(held)])
         second[:ties] = moved[len(held) :]
     every = np.array([[float(one.kind == "frame")] for one in held])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.inertia_solve import SHARE
-from ..answers.namespace import array_of, epsilon_of, hidden, namespace
+from ..answers.namespace import array_of, epsilon_of, is_traced, namespace
 from ..chosen_names import listed, plain, sample_of
 from ..interface import Numbers
 from ..rule.joint_tree import JointTree
@@ -172,7 +172,7 @@ def least_left(triangle: Numbers) -> NDArray[np.floating]:
 
 def lost_at(triangle: Numbers) -> list[int] | None:
     """Return the first sample where R has lost its rank, or None."""
-    if hidden(triangle):
+    if is_traced(triangle):
         return None
     lost = least_left(triangle) <= _epsilon(triangle)
     if not lost.any():
@@ -217,7 +217,7 @@ def check_following(
     Rows are compared with the largest of their tie: in a loop that a joint carries as a whole, or that is
     open within the tolerance, some rows are nothing but what is left of differences.
     """
-    if rows.shape[-2] == len(columns.dependent) or hidden(rows):
+    if rows.shape[-2] == len(columns.dependent) or is_traced(rows):
         return
     a, g = array_of(rows), array_of(mapped)
     starts = [at for at, name in enumerate(names) if not at or name != names[at - 1]]

@@ -16,18 +16,18 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..answers.namespace import hidden, namespace
+from ..answers.namespace import is_traced, namespace
 from ..chosen_names import listed, plain, sample_of
 from ..interface import Numbers
-from ..rule.kinematics import taken
+from ..rule.kinematics import gather
 from .closed_places import (
     ClosedPlace,
     RowNames,
     TiesAt,
     closable_tolerance,
     dependent_shares,
-    inverted,
     open_by,
+    pseudoinverse,
     ties_at,
     worst_open,
 )
@@ -49,13 +49,13 @@ SHORTEST = 1e-6
 class DoesNotClose(ValueError):
     """Error for ties that stay open: why, and what to do about it."""
 
-    def __init__(self, reason: str, mend: str) -> None:
-        super().__init__(f"{reason}; {mend}")
-        self.reason, self._mend = reason, mend
+    def __init__(self, reason: str, remedy: str) -> None:
+        super().__init__(f"{reason}; {remedy}")
+        self.reason, self._remedy = reason, remedy
 
     def __reduce__(self) -> tuple[type["DoesNotClose"], tuple[str, str]]:
         """Return the parts that pickle needs to pass the error between processes."""
-        return DoesNotClose, (self.reason, self._mend)
+        return DoesNotClose, (self.reason, self._remedy)
 
 
 def closed(
@@ -79,10 +79,10 @@ def closed(
             at = _found(ties, columns, q, held_at, tolerance, names)
         if torch.is_grad_enabled():
             found = with_independent(
-                cast("Tensor", at.q).detach(), taken(q, columns.independent, -1), columns
+                cast("Tensor", at.q).detach(), gather(q, columns.independent, -1), columns
             )
             at = ties_at(ties, columns, found, held_at)
-            step = dependent_shares(columns, inverted(at.factors), at.violation[..., None])[..., 0]
+            step = dependent_shares(columns, pseudoinverse(at.factors), at.violation[..., None])[..., 0]
             at = ties_at(ties, columns, found + step, held_at)
     _check(at.violation, tolerance, columns, names)
     if tolerance is None:
@@ -101,10 +101,10 @@ def _found(
     double = q.dtype.itemsize == 8
     near = 1e-8 if double else 1e-4  # of a step; what is left is about its square
     least = 1e-12 if double else 1e-6  # of a step that changes no row by more than rounding does
-    at, is_near, is_seen = ties_at(ties, columns, q, held_at), False, not hidden(q)
+    at, is_near, is_seen = ties_at(ties, columns, q, held_at), False, not is_traced(q)
     for count in range(STEPS):
         _check_step(at, columns, tolerance, names, not count)
-        inverse = inverted(at.factors)
+        inverse = pseudoinverse(at.factors)
         at = at._replace(inverse=inverse)
         step = dependent_shares(columns, inverse, at.violation[..., None])[..., 0]
         size = (step * step).sum(-1)[..., None] ** 0.5
@@ -149,8 +149,8 @@ def _led(columns: JointColumns) -> str:
 
 def with_independent(q: Numbers, own: Numbers, columns: JointColumns) -> Numbers:
     """Return q (..., n) with its independent joints at `own` (..., m); gradients flow through both."""
-    others = taken(q, columns.dependent, -1)
-    return taken(namespace(q).concat([own, others], -1), columns.order, -1)
+    others = gather(q, columns.dependent, -1)
+    return gather(namespace(q).concat([own, others], -1), columns.order, -1)
 
 
 def _check(violation: Numbers, tolerance: float | None, columns: JointColumns, names: RowNames) -> None:

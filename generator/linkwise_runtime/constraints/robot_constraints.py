@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.answers import Answers
-from ..answers.namespace import array_of, hidden, side_by_side
+from ..answers.namespace import array_of, is_traced, side_by_side
 from ..arguments import ANY, NOTHING, Beside, shape_of
 from ..arrays.array_backend import ArrayBackend
 from ..door import Door
@@ -20,9 +20,9 @@ from ..structure import Structure
 from .chosen_constraints import ChosenConstraints
 from .closed_places import (
     ClosedPlace,
-    Followers,
-    borne,
-    projected,
+    DependentMap,
+    independent_torque,
+    tie_forces,
 )
 from .newton_closing import led, with_independent
 from .tied_joints import TiedJoints, without_gradient
@@ -218,7 +218,7 @@ class Constraints(Generic[Array]):
 
         by_link: whether torque is (..., n, X), for X links, loads or others, and the answer (..., m, X)
         """
-        found = projected(*self._loaded(q, torque, by_link))
+        found = independent_torque(*self._loaded(q, torque, by_link))
         return cast("Array", found if by_link else found[..., 0])
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
@@ -227,12 +227,14 @@ class Constraints(Generic[Array]):
         They are those of the links, as in `Dynamics`.
         """
         found, answers, motion = self._accelerated(q, qd, qdd)
-        return cast("Array", projected(found, answers.inverse_dynamics(*motion)[0][..., None])[..., 0])
+        return cast(
+            "Array", independent_torque(found, answers.inverse_dynamics(*motion)[0][..., None])[..., 0]
+        )
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Return the partial torques tau^_aj, (..., m, N)."""
         found, answers, motion = self._accelerated(q, qd, qdd)
-        return cast("Array", projected(found, answers.partial_torque(*motion)[0]))
+        return cast("Array", independent_torque(found, answers.partial_torque(*motion)[0]))
 
     def coefficients(self, q: Array, qd: Array) -> Coefficients[Array]:
         """Return c2^ and c1^ (..., m, N, m) and g^ (..., m, N) of the closing convention."""
@@ -252,7 +254,7 @@ class Constraints(Generic[Array]):
         Dependent joints are taken to have no actuators.
         """
         found, answers, motion = self._accelerated(q, qd, qdd)
-        return cast("Array", borne(found, answers.partial_torque(*motion)[0]))
+        return cast("Array", tie_forces(found, answers.partial_torque(*motion)[0]))
 
     def forces_of(self, q: Array, torque: Array, by_link: bool = False) -> Array:
         """Return lambda (..., C) for torques (..., n) that joints need and the dependent ones do not give.
@@ -261,7 +263,7 @@ class Constraints(Generic[Array]):
 
         Subtract what actuators, springs or loads of dependent joints give from the torque first.
         """
-        found = borne(*self._loaded(q, torque, by_link))
+        found = tie_forces(*self._loaded(q, torque, by_link))
         return cast("Array", found if by_link else found[..., 0])
 
     def forward_dynamics(
@@ -296,7 +298,7 @@ class Constraints(Generic[Array]):
         }
         engine, (own, begin, *last) = self._robot.door.read({"q": q}, self.independent, given)
         held = last[0] if last else begin
-        if hidden(own):
+        if is_traced(own):
             raise ValueError(
                 "joints cannot be led where nobody may look at numbers, as under vmap or a compiler; give "
                 f"closed(q) all {len(joints)} joints"
@@ -322,7 +324,7 @@ class Constraints(Generic[Array]):
         joints = self.independent
         return {name: Beside(given, (len(joints),), f"one for each of {', '.join(joints)}", joints)}
 
-    def _loaded(self, q: object, torque: object, by_link: bool) -> tuple[Followers, Numbers]:
+    def _loaded(self, q: object, torque: object, by_link: bool) -> tuple[DependentMap, Numbers]:
         """Return how joints follow, and torques (..., n, X)."""
         joints = self._robot.joint_names
         about = Beside(torque, (len(joints),), "one for each joint; with by_link=True (..., n, X)", joints)
@@ -341,7 +343,7 @@ class Constraints(Generic[Array]):
 
     def _accelerated(
         self, q: object, qd: object, qdd: object
-    ) -> tuple[Followers, Answers, tuple[Numbers, Numbers, Numbers]]:
+    ) -> tuple[DependentMap, Answers, tuple[Numbers, Numbers, Numbers]]:
         """Return how joints follow, the answers for the open tree, and a motion in which they follow."""
         place, engine, (at, moved, asked) = self._moving(q, qd, qdd=qdd)
         qdd_there = place.velocity(place.own(asked)) + place.bias(moved)

@@ -12,16 +12,16 @@ from typing import NamedTuple
 
 from ..interface import Namespace, Numbers
 from ..kinematics.frame_arrays import (
-    Carried,
+    FramePoses,
     by_coordinate,
-    carried,
+    forward_kinematics,
     moving,
     of_frames,
     point_at,
     point_velocity,
-    turned,
+    rotate_vectors,
 )
-from ..rule.kinematics import around, cross, joint_screws, taken
+from ..rule.kinematics import cross, extend_xy, gather, joint_screws
 from ..rule.tree_arrays import TreeArrays
 from .held_frames import TieTables
 
@@ -32,7 +32,7 @@ TINY = 1e-12
 class Ends(NamedTuple):
     """Frames of all pairs at a position."""
 
-    carried: Carried
+    poses: FramePoses
     places: Numbers
     """Places of the frames' points, (3, frames, samples)."""
 
@@ -64,7 +64,7 @@ def ends(xp: Namespace, tables: TieTables, numbers: TreeArrays, q: Numbers) -> E
     """Return the frames at q (n, samples); None without ties and contacts."""
     if tables.frames is None:
         return None
-    found = carried(xp, tables.frames, numbers, numbers.offsets, q, from_world=True)
+    found = forward_kinematics(xp, tables.frames, numbers, numbers.offsets, q, from_world=True)
     return Ends(found, point_at(found, tables.points))
 
 
@@ -73,7 +73,7 @@ def pairs(xp: Namespace, tables: TieTables, numbers: TreeArrays, q: Numbers) -> 
     at = ends(xp, tables, numbers, q)
     if at is None or tables.frames is None:
         return None
-    screws = joint_screws(xp, tables.frames.joints, at.carried.joints)[:, :, None]
+    screws = joint_screws(xp, tables.frames.joints, at.poses.joints)[:, :, None]
     one, z = tables.moved_apart, screws[:, 0]
     linear = one * screws[:3, 1] + cross(z, _arms(xp, tables, at.places))
     return paired(xp, tables, at, by_coordinate(tables.frames, xp.concat([one * z[:3], linear], 0)))
@@ -92,7 +92,7 @@ def pair_changes(
     if at is None or tables.frames is None:
         return None
     places = at.ends.places
-    moved = moving(xp, tables.frames, numbers, at.ends.carried, qd)
+    moved = moving(xp, tables.frames, numbers, at.ends.poses, qd)
     twist = of_frames(tables.frames, moved.twists)
     speeds = point_velocity(xp, twist, places)
     z, zd, sd = moved.screws[:, 0, None], moved.rates[:, 0, None], moved.rates[:3, 1, None]
@@ -108,15 +108,15 @@ def violation(
     """Return phi (C, samples); held: where contacts took hold, where they are unless given."""
     parts: list[Numbers] = []
     if at is not None:
-        axes, places = at.ends.carried.axes, at.ends.places
+        axes, places = at.ends.poses.axes, at.ends.places
         shift, weights = at.shift, at.weights
         if held is not None:
             shift = places[:, : tables.pairs] - _seconds(xp, tables, places, held.places)
-        along = (weights[3:] * taken(shift, tables.row_pairs)).sum(0)
+        along = (weights[3:] * gather(shift, tables.row_pairs)).sum(0)
         if tables.all_axes is not None:
-            second = _seconds(xp, tables, axes, held and held.carried.axes)
+            second = _seconds(xp, tables, axes, held and held.poses.axes)
             turn = _turn(xp, tables.all_axes, axes[:, :, : tables.pairs], second)
-            along = along + (weights[:3] * taken(turn, tables.row_pairs)).sum(0)
+            along = along + (weights[:3] * gather(turn, tables.row_pairs)).sum(0)
         parts.append(along * tables.placed - tables.apart)
     if tables.polynomials:
         parts.append(_polynomial(tables.polynomials[0], q).sum(1))
@@ -127,7 +127,7 @@ def tie_jacobian(xp: Namespace, tables: TieTables, q: Numbers, at: Pairs | None)
     """Return A (C, n, samples)."""
     parts: list[Numbers] = []
     if at is not None:
-        parts.append((at.weights[:, :, None] * taken(at.moves, tables.row_pairs, -3)).sum(0))
+        parts.append((at.weights[:, :, None] * gather(at.moves, tables.row_pairs, -3)).sum(0))
     if tables.polynomials:
         parts.append(_polynomial(tables.polynomials[1], q))
     return _joined(xp, parts)
@@ -139,10 +139,10 @@ def tie_jacobian_rate(
     """Return dA/dt (C, n, samples)."""
     parts: list[Numbers] = []
     if at is not None and changes is not None:
-        total = at.weights[:, :, None] * taken(changes.moves, tables.row_pairs, -3)
+        total = at.weights[:, :, None] * gather(changes.moves, tables.row_pairs, -3)
         rates = _weight_rates(xp, tables, at, changes)
         if rates is not None:
-            total = total + rates[:, :, None] * taken(at.moves, tables.row_pairs, -3)
+            total = total + rates[:, :, None] * gather(at.moves, tables.row_pairs, -3)
         parts.append(total.sum(0))
     if tables.polynomials:
         parts.append(_polynomial(tables.polynomials[2], q) * qd)
@@ -166,7 +166,7 @@ def _turn(xp: Namespace, every: Numbers, first: Numbers, second: Numbers) -> Num
 
     With all axes a, sin t times that axis is half the sum of a2 x a1; with z alone it is z2 x z1.
     """
-    sines = cross(around(xp, second), around(xp, first))
+    sines = cross(extend_xy(xp, second), extend_xy(xp, first))
     cosines = (second * first).sum(0)
     sine = every * 0.5 * sines.sum(1) + (1.0 - every) * sines[:, 2]
     cosine = every * 0.5 * (cosines.sum(0) - 1.0) + (1.0 - every) * cosines[2]
@@ -178,10 +178,10 @@ def _weights(xp: Namespace, tables: TieTables, at: Ends, shift: Numbers) -> Numb
     """Return w (6, C, samples), with one for all samples where w is constant."""
     weights = tables.fixed
     if tables.turning is not None:
-        turning = turned(taken(at.carried.axes, tables.row_pairs), tables.turning)
+        turning = rotate_vectors(gather(at.poses.axes, tables.row_pairs), tables.turning)
         weights = weights + xp.concat([turning, 0.0 * turning], 0)
     if tables.along is not None:
-        along = tables.along * taken(shift / _size(xp, tables, shift), tables.row_pairs)
+        along = tables.along * gather(shift / _size(xp, tables, shift), tables.row_pairs)
         weights = weights + xp.concat([0.0 * along, along], 0)
     return weights
 
@@ -193,14 +193,14 @@ def _weight_rates(xp: Namespace, tables: TieTables, at: Pairs, changes: Changes)
     turning, along = 0.0 * at.weights[:3], 0.0 * at.weights[3:]
     if tables.turning is not None:
         own = at.weights[:3] - tables.fixed[:3]
-        spin = around(xp, changes.spin)
-        turning = cross(taken(spin, tables.row_pairs), around(xp, own))
+        spin = extend_xy(xp, changes.spin)
+        turning = cross(gather(spin, tables.row_pairs), extend_xy(xp, own))
     if tables.along is not None:
         # the part of d's rate that is normal to d, divided by |d|
         size = _size(xp, tables, at.shift)
         speeds = changes.speeds
         u, slip = at.shift / size, speeds[:, : tables.pairs] - _seconds(xp, tables, speeds)
-        along = tables.along * taken((slip - u * (u * slip).sum(0)) / size, tables.row_pairs)
+        along = tables.along * gather((slip - u * (u * slip).sum(0)) / size, tables.row_pairs)
     return xp.concat([turning, along], 0)
 
 
@@ -215,9 +215,9 @@ def _size(xp: Namespace, tables: TieTables, shift: Numbers) -> Numbers:
 
 
 def _arms(xp: Namespace, tables: TieTables, places: Numbers) -> Numbers:
-    """Return X (5, P, joints, samples), with its x and y once more, as `around` has it."""
+    """Return X (5, P, joints, samples), with its x and y once more, as `extend_xy` has it."""
     first, second = places[:, : tables.pairs], _seconds(xp, tables, places)
-    return around(xp, tables.first * first[:, :, None] - tables.second * second[:, :, None])
+    return extend_xy(xp, tables.first * first[:, :, None] - tables.second * second[:, :, None])
 
 
 def _polynomial(factors: tuple[Numbers, ...], q: Numbers) -> Numbers:

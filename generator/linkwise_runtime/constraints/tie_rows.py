@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from ..answers.namespace import side_by_side
 from ..interface import Numbers
-from ..kinematics.frame_answers import Asked, FrameAnswers, in_pieces
-from ..kinematics.frame_arrays import Carried
+from ..kinematics.frame_answers import FrameAnswers, FrameRequest, in_pieces
+from ..kinematics.frame_arrays import FramePoses
 from ..packed_engine import OneSample
 from ..rule.kinematics import Poses
 from .chosen_constraints import ChosenConstraints
@@ -27,7 +27,7 @@ from .tie_arrays import (
     violation,
 )
 
-OnTies = Asked[TieTables]
+OnTies = FrameRequest[TieTables]
 
 
 class TieEnd(NamedTuple):
@@ -157,7 +157,7 @@ class RowsAtOne(RowsAt):
         places = poses[:, :3, 3] + (turns @ points)[..., 0]
         axes = (turns @ np.array([end.axes for end in self._ends], kind)).transpose(1, 2, 0)[..., None]
         # Where the frames are known, their joints are not needed.
-        found = Ends(Carried(cast(Poses, None), axes, cast(Numbers, None)), places.T[..., None])
+        found = Ends(FramePoses(cast(Poses, None), axes, cast(Numbers, None)), places.T[..., None])
         return paired(at.xp, at.tables, found, self._apart(at, jacobians))
 
     def _changes(self, at: OnTies, placed: Pairs | None) -> Changes | None:

@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..answers.inertia_solve import solved
+from ..answers.inertia_solve import solve_inertia
 from ..answers.namespace import namespace
 from ..arrays.array_backend import ArrayBackend
 from ..interface import Numbers
@@ -13,13 +13,13 @@ from ..structure import Structure
 from .chosen_constraints import ChosenConstraints
 from .closed_places import (
     ClosedPlace,
-    Followers,
+    DependentMap,
     RowNames,
     TiesAt,
-    borne,
+    checked_place,
     closed_place,
-    followed,
-    projected,
+    independent_torque,
+    tie_forces,
     times,
 )
 from .independent_joints import JointColumns, joint_columns
@@ -66,7 +66,7 @@ class TiedJoints:
     def closed_place(self, engine: ArrayBackend, q: Numbers, held_at: Numbers) -> ClosedPlace:
         """Return how joints follow once dependent joints close the ties; held_at: as in `closed`."""
         at = self.closed(engine, q, held_at)
-        return followed(at, self.columns(engine, at.q), self._names)
+        return checked_place(at, self.columns(engine, at.q), self._names)
 
     def motion(
         self, engine: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool
@@ -78,7 +78,7 @@ class TiedJoints:
         mass, bias = engine.answers.equations(place.q, qd, passive)
         force, own = tau - bias, place.bias(qd)
         qdd = place.velocity(self._solved(place, mass, force, own)) + own
-        return qdd, borne(place.found, (times(mass, qdd) - force)[..., None])[..., 0]
+        return qdd, tie_forces(place.found, (times(mass, qdd) - force)[..., None])[..., 0]
 
     def acceleration(
         self, engine: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool
@@ -95,12 +95,16 @@ class TiedJoints:
         found, rate = place.found, place.map_rate(qd)[..., None, :, :]
         mapped = found.map[..., None, :, :]
         acceleration, velocity = c2 @ mapped, c2 @ rate + c1 @ mapped
-        return _projected_cubes(found, acceleration), _projected_cubes(found, velocity), projected(found, g)
+        return (
+            _projected_cubes(found, acceleration),
+            _projected_cubes(found, velocity),
+            independent_torque(found, g),
+        )
 
     def _solved(self, place: ClosedPlace, mass: Numbers, force: Numbers, bias: Numbers) -> Numbers:
         found = place.found
-        driven = projected(found, (force - times(mass, bias))[..., None])[..., 0]
-        return solved(projected(found, mass @ found.map), driven, self.independent)
+        driven = independent_torque(found, (force - times(mass, bias))[..., None])[..., 0]
+        return solve_inertia(independent_torque(found, mass @ found.map), driven, self.independent)
 
 
 def without_gradient(like: Numbers) -> AbstractContextManager[object]:
@@ -108,9 +112,9 @@ def without_gradient(like: Numbers) -> AbstractContextManager[object]:
     return nullcontext() if isinstance(like, np.ndarray) else cast(Any, namespace(like)).no_grad()
 
 
-def _projected_cubes(found: Followers, parts: Numbers) -> Numbers:
+def _projected_cubes(found: DependentMap, parts: Numbers) -> Numbers:
     """Return G^T, over i, times parts (..., n, N, m)."""
     *batch, n, links, m = parts.shape
-    flat = projected(found, parts.reshape(*batch, n, links * m))
+    flat = independent_torque(found, parts.reshape(*batch, n, links * m))
     cubes: Numbers = flat.reshape(*batch, m, links, m)
     return cubes

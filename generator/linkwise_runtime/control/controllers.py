@@ -13,7 +13,7 @@ from ..interface import Array, Numbers
 from ..packed_engine import TorqueOfOne
 from ..targets import FrameImpedance, Target
 from .frame_impedance import OF_FRAME, FrameTargets
-from .gains import WantedShares, stiffness_of, wanted
+from .gains import TargetShares, stiffness_of, target_shares
 from .joint_impedance import (
     ORDERS,
     Errors,
@@ -239,8 +239,8 @@ class Cancellation(Controller, Generic[Array]):
         if accelerated is None:
             accelerated = self._joints.acceleration(engine, state, _errors(given))
         # tau + M_S qdd + C_S qd + g + p
-        cancelled = times(state.inertia - state.wanted_inertia, accelerated)
-        cancelled = cancelled + times(state.coriolis - state.wanted_damping, moved) + state.rest
+        cancelled = times(state.inertia - state.target_inertia, accelerated)
+        cancelled = cancelled + times(state.coriolis - state.target_damping, moved) + state.rest
         return cast("Array", cancelled + given["task"] if "task" in given else cancelled)
 
     def acceleration(
@@ -265,8 +265,8 @@ def partial_impedance(
     _check_free(robot)
     structure = robot.structure
     targets = JointTargets(
-        wanted("inertia", inertia, structure, True),
-        wanted("damping", damping, structure, False),
+        target_shares("inertia", inertia, structure, True),
+        target_shares("damping", damping, structure, False),
         stiffness_of(stiffness, structure),
         True,
         bool(passive),
@@ -287,7 +287,7 @@ def cancellation(
     kept = {order: np.ones((structure.n, structure.N, structure.n)) for order in ORDERS}
     for i, j, k, order in chosen:
         kept[order][i, j, k] = 0.0
-    acceleration, velocity = (WantedShares(kept[m], None, None, False, False) for m in (2, 1))
+    acceleration, velocity = (TargetShares(kept[m], None, None, False, False) for m in (2, 1))
     width = friction_width_of(friction_width, passive)
     targets = JointTargets(acceleration, velocity, None, False, bool(passive), width)
     names = structure.joint_names, structure.link_names

@@ -29,7 +29,7 @@ from ..targets import ROWS, FrameImpedance, Natural
 from .frame_rotation import rates_of_turning, rotation_vector
 from .gains import Gain
 from .joint_impedance import JointState, times
-from .wanted_solve import WantedInertia, solved_wanted
+from .target_solve import TargetInertia, solve_target
 
 SIX = "turns about and moves along the world's x, y, z, whichever rows are controlled"
 OF_FRAME = {
@@ -63,8 +63,8 @@ class FrameState(NamedTuple):
     """L (..., r, r)."""
     dual: Numbers
     """Jd (..., n, r)."""
-    wanted_inertia: Numbers
-    wanted_damping: Numbers
+    target_inertia: Numbers
+    target_damping: Numbers
     rate: Numbers
     """nu - nu_d (..., r)."""
     place: Numbers | None
@@ -128,13 +128,13 @@ class FrameTargets:
             engine.structure.joint_names,
             beside=", and torques for a frame perhaps by fewer digits",
         )
-        about = WantedInertia("the mass matrix is not positive", vague)
-        moved = solved_wanted(about, joints.inertia, xp.swapaxes(j, -1, -2), sizes)
+        about = TargetInertia("the mass matrix is not positive", vague)
+        moved = solve_target(about, joints.inertia, xp.swapaxes(j, -1, -2), sizes)
         compliance = j @ moved
         ones = engine.constant(np.eye(len(self.rows)), q) + 0.0 * compliance
         hardly = f"frame {self.frame!r} can hardly move along rows each by itself"
-        about = WantedInertia(self._unmovable(), Told(hardly, self.names, of_frame=True))
-        inertia = solved_wanted(about, compliance, ones, _reach(whole, sizes)[..., rows])
+        about = TargetInertia(self._unmovable(), Told(hardly, self.names, of_frame=True))
+        inertia = solve_target(about, compliance, ones, _reach(whole, sizes)[..., rows])
         dual = moved @ inertia
         natural = (inertia @ (xp.swapaxes(moved, -1, -2) @ joints.coriolis - rate)) @ dual
         place, turning = self._place(engine, q, given.get("target.pose"))
@@ -161,7 +161,7 @@ class FrameTargets:
     ) -> Numbers:
         """Return qdd (..., n), nearest to the one given, with which the frame moves as asked."""
         xp = engine.xp
-        pull = -times(state.wanted_damping, state.rate)
+        pull = -times(state.target_damping, state.rate)
         if state.place is not None and state.turning is not None:
             pull = pull - times(xp.swapaxes(state.turning, -1, -2), self._pull(engine, state.place))
         if external is not None:
@@ -171,15 +171,15 @@ class FrameTargets:
         natural = self.inertia.kept * state.inertia.diagonal(0, -2, -1)
         told = self.inertia.added is None  # a share of L is known as well as L
         singular = self._unmovable() if told else f"{what} is not positive"
-        about = WantedInertia(singular, vague)
-        moved = solved_wanted(about, state.wanted_inertia, pull[..., None], natural, told=told)[..., 0]
+        about = TargetInertia(singular, vague)
+        moved = solve_target(about, state.target_inertia, pull[..., None], natural, told=told)[..., 0]
         if state.wanted is not None:
             moved = moved + state.wanted
         return qdd + times(state.dual, moved - state.bias - times(state.jacobian, qdd))
 
     def stored(self, engine: ArrayBackend, state: FrameState) -> Numbers:
         """Return the stored energy (nu~' M_e nu~ + x' K_e x) / 2, (...), with nu~ = nu - nu_d."""
-        energy = (state.rate * times(state.wanted_inertia, state.rate)).sum(-1) / 2.0
+        energy = (state.rate * times(state.target_inertia, state.rate)).sum(-1) / 2.0
         if state.place is None:
             return energy
         return energy + (state.place * self._pull(engine, state.place)).sum(-1) / 2.0

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ..answers.namespace import array_of, hidden
+from ..answers.namespace import array_of, is_traced
 from ..chosen_names import sample_of
 from ..interface import Library, Numbers
 
@@ -30,7 +30,7 @@ def rotation_vector(library: Library, turn: Numbers, wanted: Numbers) -> Numbers
     near = (square < SMALL * SMALL) & (cosine > 0.0)
     sine = xp.where(near, xp.ones_like(square), square) ** 0.5
     angle = xp.arctan2(sine, cosine)
-    if not hidden(turn):
+    if not is_traced(turn):
         ones = library.constant(np.eye(3), wanted)
         _refuse("target.pose is no rotation", abs(wanted @ wanted.mT - ones) > SKEWED)
         mirrored = xp.linalg.det(wanted) < 0.0

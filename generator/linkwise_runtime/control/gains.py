@@ -14,7 +14,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.namespace import array_of, hidden
+from ..answers.namespace import array_of, is_traced
 from ..arguments import as_weights, has_tensors, shape_of
 from ..chosen_names import known_kind, short
 from ..interface import Library, Numbers
@@ -74,7 +74,7 @@ class Gain:
         Raises ValueError for a tensor that is not positive any more.
         """
         if self.learned:
-            if not hidden(self._given):
+            if not is_traced(self._given):
                 self.numbers = self._checked(self._given, self.numbers)
             given = library.weights(self.name, self._given, like)
             return _square(given, library.constant(np.eye(len(self.names)), like))
@@ -131,7 +131,7 @@ def _check_positive(name: str, matrix: Real, names: Sequence[str], definite: boo
         )
 
 
-class WantedShares(NamedTuple):
+class TargetShares(NamedTuple):
     """Targets for the coefficients of one order."""
 
     kept: float | Numbers
@@ -158,7 +158,7 @@ class WantedShares(NamedTuple):
         return kept if self.added is None else kept + self.added.matrix(library, like)
 
 
-def wanted(name: str, given: object, structure: Structure, definite: bool) -> WantedShares:
+def target_shares(name: str, given: object, structure: Structure, definite: bool) -> TargetShares:
     """Return targets in the forms that `Dynamics.partial_impedance` accepts; raises as it says.
 
     definite: whether a sum that is given must be positive definite and symmetric, as inertia must
@@ -167,14 +167,14 @@ def wanted(name: str, given: object, structure: Structure, definite: bool) -> Wa
     if isinstance(given, Natural):
         plus = f"{name}.plus"
         added = None if given.plus is None else Gain(plus, given.plus, names, symmetric=definite)
-        return WantedShares(*_scaled(f"{name}.scale", given.scale, structure), added, False, True)
+        return TargetShares(*_scaled(f"{name}.scale", given.scale, structure), added, False, True)
     if isinstance(given, Mapping):
         kept, values = entries_apart(name, given, structure)
-        return WantedShares(kept, None, Gain(name, values, names, any_sign=True), False, False)
+        return TargetShares(kept, None, Gain(name, values, names, any_sign=True), False, False)
     added = Gain(name, given, names, structure.N, definite, symmetric=definite)
     check_paths(name, given, structure)
     whole = len(shape_of(given)) < 3
-    return WantedShares(0.0, np.zeros(structure.N), added, whole, True)
+    return TargetShares(0.0, np.zeros(structure.N), added, whole, True)
 
 
 def stiffness_of(given: object, structure: Structure) -> Gain | None:

@@ -18,8 +18,8 @@ from ..chosen_names import short
 from ..interface import Numbers
 from ..passive_joints import passive_torques, smooth_friction
 from ..structure import Structure
-from .gains import Gain, WantedShares
-from .wanted_solve import WantedInertia, solved_wanted
+from .gains import Gain, TargetShares
+from .target_solve import TargetInertia, solve_target
 
 ORDERS = (1, 2)
 """Orders of motion propagation torques that can be cancelled: 1, of velocity, and 2, of acceleration."""
@@ -30,8 +30,8 @@ Entry = tuple[int, int, int, int]
 class JointTargets(NamedTuple):
     """Targets of the joints."""
 
-    inertia: WantedShares
-    damping: WantedShares
+    inertia: TargetShares
+    damping: TargetShares
     stiffness: Gain | None
     positive: bool
     """True if M* must be positive definite; else it must be regular, as where motions are cancelled."""
@@ -50,9 +50,9 @@ class JointState(NamedTuple):
     """C (..., n, n)."""
     rest: Numbers
     """g + p (..., n)."""
-    wanted_inertia: Numbers
+    target_inertia: Numbers
     """M* (..., n, n)."""
-    wanted_damping: Numbers
+    target_damping: Numbers
     """B* (..., n, n)."""
 
 
@@ -96,7 +96,7 @@ class JointImpedance:
 
     def pull(self, engine: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
         """Return -B* ed - K* e, (..., n)."""
-        pull = -times(state.wanted_damping, errors.rate)
+        pull = -times(state.target_damping, errors.rate)
         if self.targets.stiffness is None or errors.place is None:
             return pull
         return pull - times(self.targets.stiffness.matrix(engine, errors.place), errors.place)
@@ -116,10 +116,10 @@ class JointImpedance:
         if positive:
             whose = "the mass matrix" if self.targets.inertia.natural else "the wanted inertia"
         singular = "the wanted inertia is not positive" if positive else f"{whose} is singular"
-        about = WantedInertia(singular, Told(f"{whose} is nearly singular", names))
+        about = TargetInertia(singular, Told(f"{whose} is nearly singular", names))
         natural = state.inertia.diagonal(0, -2, -1)
         told = told and self.targets.inertia.natural
-        solved = solved_wanted(about, state.wanted_inertia, pull[..., None], natural, positive, told)
+        solved = solve_target(about, state.target_inertia, pull[..., None], natural, positive, told)
         moved = solved[..., 0]
         return moved if errors.wanted is None else errors.wanted + moved
 
@@ -138,7 +138,7 @@ class JointImpedance:
 
     def stored(self, engine: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
         """Return the stored energy (ed' M* ed + e' K* e) / 2, (...)."""
-        energy = (errors.rate * times(state.wanted_inertia, errors.rate)).sum(-1) / 2.0
+        energy = (errors.rate * times(state.target_inertia, errors.rate)).sum(-1) / 2.0
         if self.targets.stiffness is None or errors.place is None:
             return energy
         stiffness = self.targets.stiffness.matrix(engine, errors.place)
@@ -150,7 +150,7 @@ def times(matrix: Numbers, vector: Numbers) -> Numbers:
     return (matrix @ vector[..., None])[..., 0]
 
 
-def dissipates(inertia: WantedShares, damping: WantedShares) -> bool:
+def dissipates(inertia: TargetShares, damping: TargetShares) -> bool:
     """Return whether c2 and c1 of each link are kept alike.
 
     dM*/dt - 2 B* is then skew-symmetric, except for what is added.

@@ -15,13 +15,13 @@ from ..rule.kinematics import Twists
 from ..rule.rule_tables import converted
 from ..rule.tree_arrays import TreeArrays, formula_sources, own_numbers
 from .frame_arrays import (
-    Carried,
+    FramePoses,
     FrameTables,
     acceleration_of,
-    carried,
     centre_jacobian,
     centre_jacobian_rate,
     centre_of_mass,
+    forward_kinematics,
     frame_tables,
     homogeneous,
     jacobian,
@@ -67,7 +67,7 @@ OwnNumbers = tuple[TreeArrays, Numbers]
 """Numbers of a tree, and the place of each among these and those of formulas."""
 
 
-class Asked(NamedTuple, Generic[Tables]):
+class FrameRequest(NamedTuple, Generic[Tables]):
     """Data that a call computes with: constants, the tree's numbers, motion (n, samples) each."""
 
     xp: Namespace
@@ -77,33 +77,33 @@ class Asked(NamedTuple, Generic[Tables]):
     vectors: Vectors
     """Vectors beside the motion, (3, 1, samples) each."""
 
-    def some(self, samples: slice) -> "Asked[Tables]":
+    def some(self, samples: slice) -> "FrameRequest[Tables]":
         """Return the data for some of the samples; numbers that all samples share are kept."""
         numbers = (a[..., samples] if a.shape[-1] > 1 else a for a in self.numbers)
         vectors = {name: a[..., samples] for name, a in self.vectors.items()}
         motion = [a[:, samples] for a in self.motion]
-        return Asked(self.xp, self.tables, TreeArrays(*numbers), motion, vectors)
+        return FrameRequest(self.xp, self.tables, TreeArrays(*numbers), motion, vectors)
 
 
-OnFrames = Asked[FrameTables]
+OnFrames = FrameRequest[FrameTables]
 
 
-def _frame(at: OnFrames, from_world: bool = False) -> Carried:
+def _frame(at: OnFrames, from_world: bool = False) -> FramePoses:
     """Return the place of the frame asked for, or of all frames."""
-    return carried(at.xp, at.tables, at.numbers, at.numbers.offsets, at.motion[0], from_world)
+    return forward_kinematics(at.xp, at.tables, at.numbers, at.numbers.offsets, at.motion[0], from_world)
 
 
-def _centres(at: OnFrames, from_world: bool = False) -> Carried:
+def _centres(at: OnFrames, from_world: bool = False) -> FramePoses:
     """Return the places of the links' centres of mass."""
-    return carried(at.xp, at.tables, at.numbers, at.numbers.centres, at.motion[0], from_world)
+    return forward_kinematics(at.xp, at.tables, at.numbers, at.numbers.centres, at.motion[0], from_world)
 
 
-def _place(at: OnFrames, found: Carried) -> Numbers:
+def _place(at: OnFrames, found: FramePoses) -> Numbers:
     """Return the place of the point, the frame's origin unless given."""
     return point_at(found, at.vectors.get("point"))
 
 
-def _moving(at: OnFrames, found: Carried) -> Twists:
+def _moving(at: OnFrames, found: FramePoses) -> Twists:
     """Return the motion of the joints."""
     qd, *qdd = at.motion[1:]
     return moving(at.xp, at.tables, at.numbers, found, qd, qdd[0] if qdd else None)
@@ -219,7 +219,7 @@ class FrameAnswers:
         listed: Callable[[object], Tables],
         motion: Sequence[Numbers],
         vectors: Vectors = NONE,
-    ) -> Asked[Tables]:
+    ) -> FrameRequest[Tables]:
         """Return the constants, numbers and motion of a call, with samples innermost.
 
         tables: those of parts, for each dtype and device; listed: makes the one of a part, in float64
@@ -234,7 +234,7 @@ class FrameAnswers:
         numbers = self._numbers(self._own[key], q)
         flat = [xp.swapaxes(a.reshape(-1, a.shape[-1]), 0, 1) for a in motion]
         placed = {name: xp.swapaxes(a.reshape(-1, 3), 0, 1)[:, None] for name, a in vectors.items()}
-        return Asked(xp, tables[part, key], numbers, flat, placed)
+        return FrameRequest(xp, tables[part, key], numbers, flat, placed)
 
     def _listed(self, part: object) -> FrameTables:
         n = self.engine.structure.n
@@ -246,8 +246,8 @@ class FrameAnswers:
 def in_pieces(
     engine: PackedEngine,
     motion: Sequence[Numbers],
-    at: Asked[Tables],
-    answer: Callable[[Asked[Tables]], Numbers],
+    at: FrameRequest[Tables],
+    answer: Callable[[FrameRequest[Tables]], Numbers],
     count: int,
 ) -> Numbers:
     """Return answers (samples, count), computed for as many samples at once as the back end wants."""

@@ -24,13 +24,13 @@ from ..rule.kinematics import (
     KinematicTables,
     Poses,
     Twists,
-    around,
     cross,
+    extend_xy,
+    gather,
     joint_screws,
     kinematic_tables,
     poses,
     product,
-    taken,
     twists,
 )
 from ..rule.tree_arrays import TreeArrays
@@ -53,7 +53,7 @@ class FrameTables(NamedTuple):
     columns: tuple[Numbers, ...]
     """Joints of each coordinate, the first of each, then the second of each, ...; the ground where there is
     none."""
-    carried: Numbers
+    moved_frames: Numbers
     """Matrix (joints, frames) with ones where a joint moves a frame."""
 
     @property
@@ -91,9 +91,9 @@ def _tables(
         for joint in (tree.joints[f] for f in chosen)
     )
     part, ground = kinematic_tables(replace(tree, joints=joints)), len(chosen)
-    carried = np.zeros((ground + 1, len(carriers)))
+    moved_frames = np.zeros((ground + 1, len(carriers)))
     for frame, chain in enumerate(chains):
-        carried[[at[joint] for joint in chain], frame] = 1.0
+        moved_frames[[at[joint] for joint in chain], frame] = 1.0
     return FrameTables(
         part,
         part._replace(behind=np.ones_like(part.behind)),
@@ -102,7 +102,7 @@ def _tables(
         np.array(frames),
         rotations.transpose(1, 2, 0)[..., None],
         tuple(_columns([joint.coordinate for joint in joints], n)),
-        carried,
+        moved_frames,
     )
 
 
@@ -114,7 +114,7 @@ def _columns(coordinates: Sequence[int], n: int) -> Sequence[NDArray[np.intp]]:
     ]
 
 
-class Carried(NamedTuple):
+class FramePoses(NamedTuple):
     """Poses of the joints, and of frames on them."""
 
     joints: Poses
@@ -124,47 +124,47 @@ class Carried(NamedTuple):
     """Origins of the frames, (3, frames, samples)."""
 
 
-def carried(
+def forward_kinematics(
     xp: Namespace,
     tables: FrameTables,
     numbers: TreeArrays,
     offsets: Numbers,
     q: Numbers,
     from_world: bool = False,
-) -> Carried:
+) -> FramePoses:
     """Return the poses of frames, by forward kinematics.
 
     offsets: those of all the tree's frames, or links, in the axes of their carriers, (3, count, samples); q:
     (n, samples); from_world: whether places are counted from the world's origin
     """
     joints = tables.from_world if from_world else tables.joints
-    placed = poses(xp, joints, taken(numbers.translations, tables.chosen), taken(q, joints.coordinates))
-    axes = taken(placed.axes, tables.carriers)
-    places = taken(placed.places, tables.carriers) + turned(axes, taken(offsets, tables.frames))
-    return Carried(placed, product(axes, tables.rotations), places)
+    placed = poses(xp, joints, gather(numbers.translations, tables.chosen), gather(q, joints.coordinates))
+    axes = gather(placed.axes, tables.carriers)
+    places = gather(placed.places, tables.carriers) + rotate_vectors(axes, gather(offsets, tables.frames))
+    return FramePoses(placed, product(axes, tables.rotations), places)
 
 
-def point_at(found: Carried, point: Numbers | None) -> Numbers:
+def point_at(found: FramePoses, point: Numbers | None) -> Numbers:
     """Return the places of points (3, frames, samples), which are given in the axes of the frames."""
-    return found.places if point is None else found.places + turned(found.axes, point)
+    return found.places if point is None else found.places + rotate_vectors(found.axes, point)
 
 
-def homogeneous(xp: Namespace, found: Carried) -> Numbers:
+def homogeneous(xp: Namespace, found: FramePoses) -> Numbers:
     """Return matrices (4, 4, frames, samples) from the frames' coordinates to the world's."""
     upper = xp.concat([found.axes, found.places[:, None]], 1)
     zero = xp.zeros_like(upper[:1, :1])
     return xp.concat([upper, xp.concat([zero, zero, zero, zero + 1.0], 1)], 0)
 
 
-def jacobian(xp: Namespace, tables: FrameTables, found: Carried, x: Numbers) -> Numbers:
+def jacobian(xp: Namespace, tables: FrameTables, found: FramePoses, x: Numbers) -> Numbers:
     """Return the Jacobian (6, n, samples) of a point at x (3, 1, samples) of one frame."""
     screws = joint_screws(xp, tables.joints, found.joints)
     z, s = screws[:, 0], screws[:, 1]
-    return by_coordinate(tables, xp.concat([z[:3], s[:3] + cross(z, around(xp, x))], 0))
+    return by_coordinate(tables, xp.concat([z[:3], s[:3] + cross(z, extend_xy(xp, x))], 0))
 
 
 def load_torque(
-    xp: Namespace, tables: FrameTables, found: Carried, x: Numbers, force: Numbers, moment: Numbers | None
+    xp: Namespace, tables: FrameTables, found: FramePoses, x: Numbers, force: Numbers, moment: Numbers | None
 ) -> Numbers:
     """Return the torques (n, samples) that a load on a point at x of one frame requires of the coordinates.
 
@@ -172,7 +172,7 @@ def load_torque(
     """
     screws = joint_screws(xp, tables.joints, found.joints)
     z, s = screws[:, 0], screws[:, 1]
-    work = ((s[:3] + cross(z, around(xp, x))) * force).sum(0)
+    work = ((s[:3] + cross(z, extend_xy(xp, x))) * force).sum(0)
     if moment is not None:
         work = work + (z[:3] * moment).sum(0)
     return -by_coordinate(tables, work)
@@ -182,14 +182,14 @@ def moving(
     xp: Namespace,
     tables: FrameTables,
     numbers: TreeArrays,
-    found: Carried,
+    found: FramePoses,
     qd: Numbers,
     qdd: Numbers | None = None,
 ) -> Twists:
     """Return the screws and motion of the joints, without gravity; qd, qdd: (n, samples), no qdd for none."""
     joints = tables.joints
-    velocity = taken(qd, joints.coordinates)
-    acceleration = 0.0 * velocity if qdd is None else taken(qdd, joints.coordinates)
+    velocity = gather(qd, joints.coordinates)
+    acceleration = 0.0 * velocity if qdd is None else gather(qdd, joints.coordinates)
     return twists(xp, joints, found.joints, 0.0 * numbers.gravity, velocity, acceleration)
 
 
@@ -197,7 +197,7 @@ def jacobian_rate(xp: Namespace, tables: FrameTables, moved: Twists, x: Numbers)
     """Return the rate of `jacobian`, (6, n, samples)."""
     zd, sd = moved.rates[:, 0], moved.rates[:, 1]
     xd = point_velocity(xp, of_frames(tables, moved.twists), x)
-    linear = sd[:3] + cross(zd, around(xp, x)) + cross(moved.screws[:, 0], around(xp, xd))
+    linear = sd[:3] + cross(zd, extend_xy(xp, x)) + cross(moved.screws[:, 0], extend_xy(xp, xd))
     return by_coordinate(tables, xp.concat([zd[:3], linear], 0))
 
 
@@ -210,32 +210,32 @@ def velocity_of(xp: Namespace, tables: FrameTables, moved: Twists, x: Numbers) -
 def acceleration_of(xp: Namespace, tables: FrameTables, moved: Twists, x: Numbers) -> Numbers:
     """Return (alpha, xdd) of points, (6, frames, samples): xdd = a + alpha x x + omega x xd."""
     twist, change = (of_frames(tables, a) for a in (moved.twists, moved.accelerations))
-    xd = around(xp, point_velocity(xp, twist, x))
-    linear = change[:3, 1] + cross(change[:, 0], around(xp, x)) + cross(twist[:, 0], xd)
+    xd = extend_xy(xp, point_velocity(xp, twist, x))
+    linear = change[:3, 1] + cross(change[:, 0], extend_xy(xp, x)) + cross(twist[:, 0], xd)
     return xp.concat([change[:3, 0], linear], 0)
 
 
-def centre_of_mass(masses: Numbers, found: Carried) -> Numbers:
+def centre_of_mass(masses: Numbers, found: FramePoses) -> Numbers:
     """Return the centre of mass of all links, (3, samples)."""
     return (_shares(masses) * found.places).sum(1)
 
 
-def centre_jacobian(xp: Namespace, tables: FrameTables, masses: Numbers, found: Carried) -> Numbers:
+def centre_jacobian(xp: Namespace, tables: FrameTables, masses: Numbers, found: FramePoses) -> Numbers:
     """Return the Jacobian of the centre of mass, (3, n, samples)."""
     screws = joint_screws(xp, tables.joints, found.joints)
     mass, moment = _behind(tables, masses, found.places)
-    return by_coordinate(tables, mass * screws[:3, 1] + cross(screws[:, 0], around(xp, moment)))
+    return by_coordinate(tables, mass * screws[:3, 1] + cross(screws[:, 0], extend_xy(xp, moment)))
 
 
 def centre_jacobian_rate(
-    xp: Namespace, tables: FrameTables, masses: Numbers, found: Carried, moved: Twists
+    xp: Namespace, tables: FrameTables, masses: Numbers, found: FramePoses, moved: Twists
 ) -> Numbers:
     """Return the rate of `centre_jacobian`, (3, n, samples)."""
     speeds = point_velocity(xp, of_frames(tables, moved.twists), found.places)
     mass, moment = _behind(tables, masses, found.places)
-    change = around(xp, _behind(tables, masses, speeds)[1])
+    change = extend_xy(xp, _behind(tables, masses, speeds)[1])
     zd, sd = moved.rates[:, 0], moved.rates[:, 1]
-    linear = mass * sd[:3] + cross(zd, around(xp, moment)) + cross(moved.screws[:, 0], change)
+    linear = mass * sd[:3] + cross(zd, extend_xy(xp, moment)) + cross(moved.screws[:, 0], change)
     return by_coordinate(tables, linear)
 
 
@@ -247,20 +247,20 @@ def _shares(masses: Numbers) -> Numbers:
 def _behind(tables: FrameTables, masses: Numbers, vectors: Numbers) -> tuple[Numbers, Numbers]:
     """Return sums over the links that each joint moves: of shares m_j / m, and of these times vectors."""
     shares = _shares(masses)
-    return tables.carried @ shares, tables.carried @ (shares * vectors)
+    return tables.moved_frames @ shares, tables.moved_frames @ (shares * vectors)
 
 
 def of_frames(tables: FrameTables, twists: Numbers) -> Numbers:
     """Return the twists of the joints that carry the frames."""
-    return taken(twists, tables.carriers)
+    return gather(twists, tables.carriers)
 
 
 def point_velocity(xp: Namespace, twist: Numbers, x: Numbers) -> Numbers:
     """Return the velocity of a point at x, v + omega x x."""
-    return twist[:3, 1] + cross(twist[:, 0], around(xp, x))
+    return twist[:3, 1] + cross(twist[:, 0], extend_xy(xp, x))
 
 
-def turned(axes: Numbers, vector: Numbers) -> Numbers:
+def rotate_vectors(axes: Numbers, vector: Numbers) -> Numbers:
     """Return matrices (3, 3, ...) times vectors (3, ...)."""
     return axes[:, 0] * vector[0] + axes[:, 1] * vector[1] + axes[:, 2] * vector[2]
 
@@ -268,7 +268,7 @@ def turned(axes: Numbers, vector: Numbers) -> Numbers:
 def by_coordinate(tables: FrameTables, columns: Numbers) -> Numbers:
     """Return columns (..., joints, samples) summed over the joints of each coordinate, (..., n, samples)."""
     first, *others = tables.columns
-    total = taken(columns, first)
+    total = gather(columns, first)
     for joints in others:
-        total = total + taken(columns, joints)
+        total = total + gather(columns, joints)
     return total

@@ -13,7 +13,12 @@ from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import TreeArrays
 from ..structure import Structure
 from .energy_interface import Energies, Parameters, numbers_of
-from .functional_sweeps import decomposition_followed, energies, position_gradient_followed, torque_followed
+from .functional_sweeps import (
+    decomposition_functional,
+    energies,
+    position_gradient_functional,
+    torque_functional,
+)
 from .graph_calls import graph_of, graph_parts_of
 from .recording import transformed
 from .sweeps import decomposition, position_gradient, torque
@@ -78,17 +83,17 @@ class AutogradBackend(TorchBackend):
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
-        parts: Sequence[Tensor] = self._of_links((decomposition, decomposition_followed), q, qd, qdd)
+        parts: Sequence[Tensor] = self._of_links((decomposition, decomposition_functional), q, qd, qdd)
         return parts
 
     def torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """Return tau (..., count) in the order of `Layout.torque`."""
-        tau: Tensor = self._of_links((torque, torque_followed), q, qd, qdd)
+        tau: Tensor = self._of_links((torque, torque_functional), q, qd, qdd)
         return tau
 
     def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """Return c0 (..., count) in the order of `Layout.velocity`."""
-        c0: Tensor = self._of_links((position_gradient, position_gradient_followed), q, qd, qdd)
+        c0: Tensor = self._of_links((position_gradient, position_gradient_functional), q, qd, qdd)
         return c0
 
     def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:

@@ -36,7 +36,7 @@ def energies(links: Links, q: Tensor, qd: Tensor, p: Parameters) -> tuple[Tensor
     return kinetic, potential
 
 
-def decomposition_followed(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> list[Tensor]:
+def decomposition_functional(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> list[Tensor]:
     """Return c2 (i <= k), c1, g, tau and h1, packed link by link: (..., count) each."""
     sweep, rest = _Sweep(links, p), torch.zeros_like(q)
     mass = sweep.rows(lambda v: sweep.slopes(q, v)[1], qd)
@@ -53,13 +53,13 @@ def decomposition_followed(links: Links, p: Parameters, q: Tensor, qd: Tensor, q
     ]
 
 
-def torque_followed(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+def torque_functional(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
     """Return tau of every link over its path, shape (..., count)."""
     sweep = _Sweep(links, p)
     return sweep.packed(sweep.torques(q, qd, qdd))
 
 
-def position_gradient_followed(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
+def position_gradient_functional(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
     """Return d(tau_i)/d(q_k) of every link over its path, row by row, shape (..., count)."""
     sweep = _Sweep(links, p)
     slope = sweep.rows(lambda x: sweep.torques(x, qd, qdd), q)

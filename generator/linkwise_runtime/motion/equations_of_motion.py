@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..answers.namespace import array_of, hidden
+from ..answers.namespace import array_of, is_traced
 from ..arguments import NOTHING, Beside
 from ..arrays.array_backend import ArrayBackend
 from ..chosen_names import listed, sample_of
@@ -41,7 +41,7 @@ class TiedMotion:
         """Begin at `start`, where contacts also took hold."""
         self._ties, self._engine, self._held_at = ties, engine, start.q
         self._last: tuple[Numbers, ClosedPlace] = start.q, start
-        self._dead = 0.0 if hidden(start.q) else DEAD * float(least_left(start.triangle).min(initial=1.0))
+        self._dead = 0.0 if is_traced(start.q) else DEAD * float(least_left(start.triangle).min(initial=1.0))
 
     def place(self, t: float, q: Numbers) -> ClosedPlace:
         """Return the closed place beside q (..., n), whose dependent joints are closed first.
@@ -63,13 +63,13 @@ class TiedMotion:
         self._last = q, found
         return found
 
-    def settled(self, t: float, q: Numbers) -> Numbers:
+    def close_ties(self, t: float, q: Numbers) -> Numbers:
         """Return q (..., n) with its dependent joints where the constraints want them."""
         place = self.place(t, q)
         self._last = place.q, place
         return place.q
 
-    def accelerated(self, t: float, q: Numbers, qd: Numbers, tau: Numbers, passive: bool) -> Numbers:
+    def acceleration(self, t: float, q: Numbers, qd: Numbers, tau: Numbers, passive: bool) -> Numbers:
         """Return the accelerations of the independent joints, (..., m)."""
         place = self.place(t, q)
         return self._ties.acceleration(self._engine, place, qd, tau, passive)
@@ -77,7 +77,7 @@ class TiedMotion:
     def _leap(self, q: Numbers) -> str | None:
         """Return a message if independent joints leap away from where they were, else None."""
         place = self._last[1]
-        if hidden(q):
+        if is_traced(q):
             return None
         far = np.abs(array_of(place.own(q - place.q)))
         if not far.max(initial=0.0) > LEAP:
@@ -104,7 +104,7 @@ class TiedMotion:
 
     def _dead_point(self, place: ClosedPlace, near: float = 1.0) -> str | None:
         """Return why independent joints go no further than a place; None where they do."""
-        if hidden(place.q):
+        if is_traced(place.q):
             return None
         left = least_left(place.triangle)
         if not left.min(initial=1.0) < near * self._dead:
@@ -178,14 +178,14 @@ class EquationsOfMotion:
     ) -> Numbers:
         """Return accelerations of all joints, or of the independent ones at the place for `asked`."""
         if self.ties is not None:
-            return self.ties.accelerated(t, asked, qd, given, passive)
+            return self.ties.acceleration(t, asked, qd, given, passive)
         answers = self.engine.answers
         solve = answers.forward_dynamics if passive else answers.forward_dynamics_of_links
         return solve(q, qd, given)[0]
 
-    def settled(self, t: float, state: State) -> State:
+    def close_ties(self, t: float, state: State) -> State:
         """Return the state with its dependent joints where the constraints want them."""
-        return state if self.ties is None else state._replace(q=self.ties.settled(t, state.q))
+        return state if self.ties is None else state._replace(q=self.ties.close_ties(t, state.q))
 
     def torques(self, t: float, q: Numbers, qd: Numbers) -> Numbers:
         """Return the torques of the actuators, (..., n)."""

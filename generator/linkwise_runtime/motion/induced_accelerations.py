@@ -16,10 +16,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..answers.inertia_solve import solved_columns
+from ..answers.inertia_solve import solve_inertia_columns
 from ..arrays.array_backend import ArrayBackend
 from ..chosen_names import short
-from ..constraints.closed_places import ClosedPlace, borne
+from ..constraints.closed_places import ClosedPlace, tie_forces
 from ..constraints.robot_constraints import Constraints, TiedRobot
 from ..interface import Numbers
 from ..kinematics.frame_answers import LINKS, frame_index, vectors_beside
@@ -49,9 +49,9 @@ class FreeResponse:
 
     def accelerations(self, forces: Numbers) -> Numbers:
         """Return the accelerations (..., n, X) that columns of forces (..., n, X) cause."""
-        return solved_columns(self.mass, forces, self.structure.joint_names)
+        return solve_inertia_columns(self.mass, forces, self.structure.joint_names)
 
-    def needed(self, forces: Numbers) -> Numbers:
+    def actuator_torques(self, forces: Numbers) -> Numbers:
         """Return the torques of the actuators that carry forces (..., n, X): all of them."""
         return forces
 
@@ -82,9 +82,9 @@ class TiedResponse:
         """Return the accelerations (..., n, X) that columns of forces (..., n, X) cause."""
         g = self.place.found.map
         projected = g.mT @ self.mass @ g
-        return g @ solved_columns(projected, g.mT @ forces, self.constraints.independent)
+        return g @ solve_inertia_columns(projected, g.mT @ forces, self.constraints.independent)
 
-    def needed(self, forces: Numbers) -> Numbers:
+    def actuator_torques(self, forces: Numbers) -> Numbers:
         """Return the torques of actuators at independent joints that carry forces (..., n, X)."""
         own = np.eye(self.mass.shape[-1])[:, list(self.constraints.ties.chosen.independent)]
         return self.engine.constant(own, self.mass) @ (self.place.found.map.mT @ forces)
@@ -96,7 +96,7 @@ class TiedResponse:
     def reactions(self, forces: Numbers | None, accelerations: Numbers) -> Numbers:
         """Return lambda (..., C, X), for columns of forces, or None, and their accelerations."""
         torque = self.mass @ accelerations
-        return borne(self.place.found, torque if forces is None else torque - forces)
+        return tie_forces(self.place.found, torque if forces is None else torque - forces)
 
 
 Response = FreeResponse | TiedResponse
@@ -209,7 +209,7 @@ def _sources(robot: DrivenRobot, asked: Driven, point: object) -> DrivenSources:
         if place is not None:
             last = place.velocity(place.own(last)) + place.bias(qd)
         needed = (others.mass @ last[..., None])[..., 0] - others.columns.sum(-1)
-        last = response.needed(needed[..., None])[..., 0]
+        last = response.actuator_torques(needed[..., None])[..., 0]
     identity = engine.constant(np.eye(robot.n), q)
     placed = dict(zip(points, vectors[len(loads.beside) :], strict=True))
     return DrivenSources(engine, q, qd, placed, with_actuators(others, last, identity), response)

@@ -122,7 +122,7 @@ class Simulated(NamedTuple):
     constraints: object
 
 
-def simulated(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
+def simulate_motion(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
     """Return the answer of `Dynamics.simulate`."""
     constraints = constraints_of(robot, asked.constraints)
     q, qd = asked.q, asked.qd
@@ -147,7 +147,7 @@ def simulated(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
         EquationsOfMotion(engine, tau, given, passive, None), start, rate, constraints
     )
     if asked.method == "RK4":
-        states = in_fixed_steps(equations.rates, equations.settled, state, times, step)
+        states = in_fixed_steps(equations.rates, equations.close_ties, state, times, step)
     elif asked.method in ADAPTIVE:
         if not isinstance(start, np.ndarray):
             raise TypeError(

@@ -91,7 +91,7 @@ class Poses(NamedTuple):
 class Twists(NamedTuple):
     """Screws and motion about the first hinge of each path.
 
-    Vectors end with their x and y once more, see `around`.
+    Vectors end with their x and y once more, see `extend_xy`.
     """
 
     screws: Numbers
@@ -127,7 +127,7 @@ def kinematic_tables(tree: JointTree) -> KinematicTables:
         np.stack([y, -x, none], 1),
         z,
         parents,
-        tuple(doubled(parents)),
+        tuple(doubling_ancestors(parents)),
         np.array([*hinge_before(tree), False])[:, None].astype(float),
         curve_tables(tree),
     )
@@ -161,14 +161,14 @@ def hinge_before(tree: JointTree) -> list[bool]:
     return [any(hinges[f] for f in tree.chain(joint.parent)) for joint in tree.joints]
 
 
-def doubled(parents: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
+def doubling_ancestors(parents: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
     """Yield the frames 1, 2, 4, ... joints before each; the ground, the last one, stays where it is."""
     while (parents != len(parents) - 1).any():
         yield parents
         parents = parents[parents]
 
 
-def displaced(tables: CurveTables, position: Numbers) -> tuple[Numbers, Slopes]:
+def curve_displacement(tables: CurveTables, position: Numbers) -> tuple[Numbers, Slopes]:
     """Return d, which each joint's ratio multiplies, and its slopes, for q of every frame's coordinate."""
     piece = tables.first + (position >= tables.ends).sum(0)
     at = position - tables.starts[piece]
@@ -185,18 +185,18 @@ def poses(xp: Namespace, tables: KinematicTables, translations: Numbers, positio
     translations: of every frame in its parent's axes, (3, frames, samples); position: q of every frame's
     coordinate, (frames, samples)
     """
-    way, slopes = (position, None) if tables.curves is None else displaced(tables.curves, position)
+    way, slopes = (position, None) if tables.curves is None else curve_displacement(tables.curves, position)
     angle = tables.turns * way
     # Stacked, so that a compiler keeps them; else it computes them again for every entry of the axes.
     cosine, sine = xp.stack([xp.cos(angle), xp.sin(angle)], 0)
     axes = tables.still + tables.cosine * cosine + tables.sine * sine
     for parents in tables.steps:
-        axes = product(taken(axes, parents), axes)
+        axes = product(gather(axes, parents), axes)
     # Each joint is p_f - p_parent = R_parent t from the one before; along a path these add up.
     step = translations
     if tables.slides is not None:
         step = step + tables.axes * (tables.slides * way)
-    before = taken(axes, tables.parents)
+    before = gather(axes, tables.parents)
     step = before[:, 0] * step[0] + before[:, 1] * step[1] + before[:, 2] * step[2]
     return Poses(axes, _summed(tables, tables.behind * step), slopes)
 
@@ -211,10 +211,10 @@ def _straight_screws(xp: Namespace, tables: KinematicTables, poses: Poses) -> Nu
     """Return z and s of each joint times its ratio, without slopes, (5, 2, frames, samples)."""
     axis = poses.axes[:, 2]
     z = axis * tables.turns
-    s = cross(around(xp, poses.places), around(xp, z))
+    s = cross(extend_xy(xp, poses.places), extend_xy(xp, z))
     if tables.slides is not None:
         s = s + axis * tables.slides
-    return around(xp, xp.stack([z, s], 1))
+    return extend_xy(xp, xp.stack([z, s], 1))
 
 
 def twists(
@@ -244,7 +244,7 @@ def twists(
         second = motion_cross(xp, moved, bends) * velocity + straight * own
         rates = rates + bends * velocity
     change = _summed(tables, screws * acceleration + rates * velocity)
-    weight = around(xp, xp.stack([0.0 * gravity, gravity], 1))
+    weight = extend_xy(xp, xp.stack([0.0 * gravity, gravity], 1))
     return Twists(screws, rates, moved, change - weight, second, bends)
 
 
@@ -254,11 +254,11 @@ def _summed(tables: KinematicTables, a: Numbers) -> Numbers:
     The ground's entries must be zero.
     """
     for parents in tables.steps:
-        a = a + taken(a, parents)
+        a = a + gather(a, parents)
     return a
 
 
-def taken(a: Numbers, index: Positions, axis: int = -2) -> Numbers:
+def gather(a: Numbers, index: Positions, axis: int = -2) -> Numbers:
     """Return some entries of an axis, counted from the end: -2 is joints in (..., joints, samples)."""
     if isinstance(index, slice):
         return a[(..., index) + (slice(None),) * (-1 - axis)]
@@ -274,7 +274,7 @@ def product(a: Numbers, b: Numbers) -> Numbers:
     return a[:, 0:1] * b[0:1] + a[:, 1:2] * b[1:2] + a[:, 2:3] * b[2:3]
 
 
-def around(xp: Namespace, a: Numbers) -> Numbers:
+def extend_xy(xp: Namespace, a: Numbers) -> Numbers:
     """Return a vector with its x and y once more, (5, ...), for `cross`."""
     return xp.concat([a, a[:2]], 0)
 
@@ -287,4 +287,4 @@ def cross(a: Numbers, b: Numbers) -> Numbers:
 def motion_cross(xp: Namespace, a: Numbers, b: Numbers) -> Numbers:
     """Return (omega, v) x (z, s) = (omega x z, omega x s + v x z) of pairs of vectors (5, 2, ...)."""
     both = cross(a[:, 0:1], b)
-    return around(xp, xp.stack([both[:, 0], both[:, 1] + cross(a[:, 1], b[:, 0])], 1))
+    return extend_xy(xp, xp.stack([both[:, 0], both[:, 1] + cross(a[:, 1], b[:, 0])], 1))

@@ -31,7 +31,7 @@ from ..arguments import has_tensors
 from ..interface import Namespace, Numbers
 from ..quantities import PARAMETERS
 from .joint_tree import Bodies, JointTree, Own
-from .kinematics import KinematicTables, Twists, around, cross, poses, taken, twists
+from .kinematics import KinematicTables, Twists, cross, extend_xy, gather, poses, twists
 from .rule_layout import joined, members
 from .tree_arrays import TreeArrays
 
@@ -114,10 +114,10 @@ def torque_rows(
 ) -> list[Numbers]:
     """Return Y of tau, (samples, pairs * 10), for q, qd and qdd (n, samples)."""
     moved, turn, link, _ = _moved(xp, frames, tables, numbers, motion)
-    rate = turn(taken(moved.accelerations, tables.frames))
+    rate = turn(gather(moved.accelerations, tables.frames))
     # a = vd + omega-dot x p + omega x v: `turn` adds the part of the origin's place p.
     a = rate[1] + cross(link.omega, link.v)
-    return [_rows(xp, link, around(xp, a), around(xp, rate[0]), link.omega)]
+    return [_rows(xp, link, extend_xy(xp, a), extend_xy(xp, rate[0]), link.omega)]
 
 
 def coefficient_rows(
@@ -129,15 +129,15 @@ def coefficient_rows(
 ) -> list[Numbers]:
     """Return Y of c2, c1 and g, (samples, entries * 10) each, for q, qd and qdd (n, samples)."""
     moved, turn, link, gravity = _moved(xp, frames, tables, numbers, motion)
-    zd, fixed = (around(xp, a) for a in turn(_of_pairs(moved.rates, tables)))
+    zd, fixed = (extend_xy(xp, a) for a in turn(_of_pairs(moved.rates, tables)))
     # About the moving origin: u-dot = sd + zd x p + z x v.
-    ud = fixed + around(xp, cross(link.z, link.v))
+    ud = fixed + extend_xy(xp, cross(link.z, link.v))
     none = 0.0 * link.z
     i, k = tables.upper
-    second = _rows(xp, _taken(link, i), taken(link.u, k), taken(link.z, k), taken(none, k))
+    second = _rows(xp, _taken(link, i), gather(link.u, k), gather(link.z, k), gather(none, k))
     i, k = tables.every
-    first = _rows(xp, _taken(link, i), taken(ud, k), taken(zd, k), taken(link.z, k))
-    return [second, first, _rows(xp, link, around(xp, -gravity), none, none)]
+    first = _rows(xp, _taken(link, i), gather(ud, k), gather(zd, k), gather(link.z, k))
+    return [second, first, _rows(xp, link, extend_xy(xp, -gravity), none, none)]
 
 
 def _moved(
@@ -148,11 +148,11 @@ def _moved(
     motion: Sequence[Numbers],
 ) -> tuple[Twists, Turn, LinkAxes, Numbers]:
     """Return twists, the function that turns screws, the pairs in the links' axes, and gravity there."""
-    position, velocity, acceleration = (taken(a, frames.coordinates) for a in motion)
+    position, velocity, acceleration = (gather(a, frames.coordinates) for a in motion)
     placed = poses(xp, frames, numbers.translations, position)
     moved = twists(xp, frames, placed, numbers.gravity, velocity, acceleration)
-    axes = taken(placed.axes, tables.frames)
-    place = around(xp, taken(placed.places, tables.frames))
+    axes = gather(placed.axes, tables.frames)
+    place = extend_xy(xp, gather(placed.places, tables.frames))
 
     def turned(a: Numbers) -> Numbers:
         return (axes * a[:, None]).sum(0)
@@ -162,8 +162,8 @@ def _moved(
         return turned(z[:3]), turned(s[:3] + cross(z, place))
 
     z, u, omega, v = (
-        around(xp, a)
-        for screw in (_of_pairs(moved.screws, tables), taken(moved.twists, tables.frames))
+        extend_xy(xp, a)
+        for screw in (_of_pairs(moved.screws, tables), gather(moved.twists, tables.frames))
         for a in turn(screw)
     )
     return moved, turn, LinkAxes(z, u, omega, v), turned(numbers.gravity + 0.0 * z[:3])
@@ -171,12 +171,12 @@ def _moved(
 
 def _of_pairs(screws: Numbers, tables: RegressorTables) -> Numbers:
     """Return the screws of frames for each pair, summed over the joints that follow its coordinate."""
-    first, *others = (taken(screws, joints) for joints in tables.joints)
+    first, *others = (gather(screws, joints) for joints in tables.joints)
     return sum(others, first)
 
 
 def _taken(link: LinkAxes, pairs: Numbers) -> LinkAxes:
-    return LinkAxes(*(taken(a, pairs) for a in link))
+    return LinkAxes(*(gather(a, pairs) for a in link))
 
 
 def _rows(xp: Namespace, link: LinkAxes, a: Numbers, alpha: Numbers, beta: Numbers) -> Numbers:
@@ -186,7 +186,7 @@ def _rows(xp: Namespace, link: LinkAxes, a: Numbers, alpha: Numbers, beta: Numbe
     """
     z, u = link.z, link.u
     y = cross(z, link.omega)
-    h = cross(a, z) + cross(u, alpha) + cross(around(xp, cross(u, beta)), link.omega)
+    h = cross(a, z) + cross(u, alpha) + cross(extend_xy(xp, cross(u, beta)), link.omega)
     half = 0.5 * (y * beta[:3]).sum(0)
     terms = z[:3, None] * alpha[None, :3] + y[:, None] * beta[None, :3]
     inertia = [

@@ -30,12 +30,12 @@ from .kinematics import (
     Poses,
     Positions,
     Twists,
-    around,
     cross,
+    extend_xy,
+    gather,
     motion_cross,
     poses,
     product,
-    taken,
     twists,
 )
 from .tree_arrays import TreeArrays
@@ -109,10 +109,10 @@ def link_states(
 ) -> LinkStates:
     """Return the moments and wrenches of the links; gravity: (3, 1, samples)."""
     joints = tables.joints
-    twist, change = taken(moved.twists, joints), taken(moved.accelerations, joints)
+    twist, change = gather(moved.twists, joints), gather(moved.accelerations, joints)
     moments = _moments(xp, tables, numbers, poses, twist)
-    whole = accelerated(xp, moments, change[:, 0], change[:, 1]) + turning(xp, moments, twist[:, 0])
-    moment = cross(moments.h, around(xp, gravity))
+    whole = inertial_wrench(xp, moments, change[:, 0], change[:, 1]) + turning(xp, moments, twist[:, 0])
+    moment = cross(moments.h, extend_xy(xp, gravity))
     weight = xp.concat([moment, xp.broadcast_to(moments.m * gravity, moment.shape)], 0)
     return LinkStates(moments, xp.stack([whole, -weight], 1))
 
@@ -122,7 +122,7 @@ def _moments(
 ) -> LinkMoments:
     """Return the moments of the links, from their frames and twists (5, 2, N, samples)."""
     omega, v, m, c = twist[:, 0], twist[:, 1], numbers.masses, numbers.centres
-    axes, place = taken(poses.axes, tables.joints), taken(poses.places, tables.joints)
+    axes, place = gather(poses.axes, tables.joints), gather(poses.places, tables.joints)
     centre = _centres(axes, place, c)
     h = m * centre
     # About o: E = R (1/2 tr(J) - J) R^T + h c^T, I = tr(E) - E with tr(E) = 1/2 tr(J) + h . c.
@@ -130,15 +130,15 @@ def _moments(
     e = product(turned, xp.swapaxes(axes, 0, 1)) + h[:, None] * centre[None]
     inertia = (numbers.half_traces + (h * centre).sum(0)) * tables.eye - e
     # P = m v + omega x h
-    first = around(xp, h)
+    first = extend_xy(xp, h)
     momentum = m * v[:3] + cross(omega, first)
     # B = -[omega]x E - v h^T + (h . v) 1; column k of the first part is E_k x omega.
-    columns = xp.swapaxes(cross(around(xp, e), omega[:, None]), 0, 1)
+    columns = xp.swapaxes(cross(extend_xy(xp, e), omega[:, None]), 0, 1)
     b = columns - h[:, None] * v[None, :3] + (h * v[:3]).sum(0) * tables.eye
-    return LinkMoments(m, first, inertia, around(xp, momentum), b)
+    return LinkMoments(m, first, inertia, extend_xy(xp, momentum), b)
 
 
-def accelerated(xp: Namespace, link: LinkMoments, z: Numbers, s: Numbers) -> Numbers:
+def inertial_wrench(xp: Namespace, link: LinkMoments, z: Numbers, s: Numbers) -> Numbers:
     """Return N = h x s + I z over f = m s + z x h, (6, ...), of vectors (5, ...)."""
     moment = cross(link.h, s) + applied(link.inertia, z)
     return xp.concat([moment, link.m * s[:3] + cross(z, link.h)], 0)
@@ -155,7 +155,7 @@ def applied(matrix: Numbers, z: Numbers) -> Numbers:
 
 
 def link_matrices(xp: Namespace, tables: LinkTables, numbers: LinkNumbers, link: LinkMoments) -> Numbers:
-    """Return matrices of `accelerated` and `turning`, columns first: (9, 6, N, samples).
+    """Return matrices of `inertial_wrench` and `turning`, columns first: (9, 6, N, samples).
 
     The columns multiply (z, s) for the one and z for the other.
     """
@@ -218,19 +218,19 @@ def link_energies(
 
     joints: joint of each link; q, qd: (n, samples)
     """
-    position, velocity = taken(q, tables.coordinates), taken(qd, tables.coordinates)
+    position, velocity = gather(q, tables.coordinates), gather(qd, tables.coordinates)
     placed = poses(xp, tables, numbers.translations, position)
     moved = twists(xp, tables, placed, numbers.gravity, velocity, 0.0 * velocity)
-    twist, axes = taken(moved.twists, joints), taken(placed.axes, joints)
-    omega, centre = twist[:, 0], _centres(axes, taken(placed.places, joints), numbers.centres)
-    speed = twist[:3, 1] + cross(omega, around(xp, centre))
+    twist, axes = gather(moved.twists, joints), gather(placed.axes, joints)
+    omega, centre = twist[:, 0], _centres(axes, gather(placed.places, joints), numbers.centres)
+    speed = twist[:3, 1] + cross(omega, extend_xy(xp, centre))
     own = (axes * omega[:3, None]).sum(0)
     spin = (own[:, None] * numbers.inertias * own[None]).sum((0, 1))
     kinetic = 0.5 * (numbers.masses * (speed * speed).sum(0) + spin)
     # Counted from the world's origin, not from the first hinge of each path.
     whole = tables._replace(behind=xp.ones_like(tables.behind))
     places = poses(xp, whole, numbers.translations, position).places
-    height = _centres(axes, taken(places, joints), numbers.centres)
+    height = _centres(axes, gather(places, joints), numbers.centres)
     return [kinetic, -numbers.masses * (numbers.gravity * height).sum(0)]
 
 

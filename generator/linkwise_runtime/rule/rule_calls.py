@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..interface import Dtype, Library, Numbers
 from ..quantities import PARAMETERS
 from .joint_tree import Bodies, JointTree, Own
-from .kinematics import poses, taken, twists
+from .kinematics import gather, poses, twists
 from .regressors import coefficient_rows, torque_rows
 from .rigid_rule import LinkNumbers, link_energies, link_numbers, link_states
 from .rule_layout import RuleLayout, rule_layout
@@ -100,7 +100,7 @@ class RigidRule:
             if own is None:
                 return [gradient]
             with_zero = library.xp.concat([own, 0.0 * own[:, :1]], 1)
-            return [gradient + taken(with_zero, diagonal, -1)]
+            return [gradient + gather(with_zero, diagonal, -1)]
 
         return self._answers(library, motion, p, bodies, answer)[0]
 
@@ -181,7 +181,7 @@ class RigidRule:
             flat = [a.reshape(samples, n) for a in motion]
             parts = answer(spatial_moment(library.xp, tables, matrices, flat))
         else:
-            links = link_numbers(library.xp, tables.links.eye, *numbers.carried) if given else tables.numbers
+            links = link_numbers(library.xp, tables.links.eye, *numbers.bodies) if given else tables.numbers
 
             def innermost(own: Sequence[Numbers], some: TreeArrays, carried: LinkNumbers) -> list[Numbers]:
                 return answer(_moment(library, tables, own, some, carried))
@@ -236,7 +236,7 @@ def _moment(
 ) -> Moment | FusedMoment:
     """Return the motion of joints and links for q, qd and qdd (n, samples)."""
     xp, frames = library.xp, tables.frames
-    position, velocity, acceleration = (taken(a, frames.coordinates) for a in motion)
+    position, velocity, acceleration = (gather(a, frames.coordinates) for a in motion)
     placed = poses(xp, frames, numbers.translations, position)
     moved = twists(xp, frames, placed, numbers.gravity, velocity, acceleration)
     states = link_states(xp, tables.links, links, placed, moved, numbers.gravity)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..interface import Namespace, Numbers
-from .kinematics import Twists, taken
+from .kinematics import Twists, gather
 from .rigid_rule import (
     LinkNumbers,
     LinkStates,
@@ -84,7 +84,7 @@ def _products(xp: Namespace, at: Moment, matrices: Numbers, columns: Numbers) ->
     samples, size, kinds = left.shape[0], left.shape[1], right.shape[2]
     answers = []
     for links, path in at.tables.groups:
-        block, s, behind = (taken(a, i, -1) for a, i in ((left, links), (axes, path), (right, path)))
+        block, s, behind = (gather(a, i, -1) for a, i in ((left, links), (axes, path), (right, path)))
         count, depth = block.shape[-1], s.shape[-1]
         rows = xp.swapaxes(block.reshape(samples, size, 6 * count), 1, 2)
         wrench = rows @ behind.reshape(samples, size, kinds * depth)
@@ -114,9 +114,9 @@ def packed(xp: Namespace, values: Numbers, positions: Sequence[Numbers]) -> Numb
     """
     if len(positions) > 1:
         values = xp.concat([values, 0.0 * values[:, :1]], 1)
-    found = taken(values, positions[0], -1)
+    found = gather(values, positions[0], -1)
     for index in positions[1:]:
-        found = found + taken(values, index, -1)
+        found = found + gather(values, index, -1)
     return found
 
 
@@ -131,8 +131,8 @@ class FusedMoment(NamedTuple):
     def coefficients(self) -> list[Numbers]:
         """Return packed c2 and c1."""
         link, (z, s), (zd, sd) = self._links(), *map(self._pairs, (self.moved.screws, self.moved.rates))
-        c1 = _sum(link.accelerated(zd, sd), link.turning(z))
-        kept = self.xp.stack([*link.accelerated(z, s), *c1], 0)
+        c1 = _sum(link.inertial_wrench(zd, sd), link.turning(z))
+        kept = self.xp.stack([*link.inertial_wrench(z, s), *c1], 0)
         entries = self.tables.entries[:2]
         return [self._gathered(w, rows) for w, rows in zip((kept[:6], kept[6:]), entries, strict=True)]
 
@@ -142,8 +142,8 @@ class FusedMoment(NamedTuple):
         (z, s), (zd, _), (zdd, sdd) = map(
             self._pairs, (moved.screws, moved.rates, second_rates(self.xp, moved))
         )
-        after = _sum(link.accelerated(zdd, sdd), [2.0 * a for a in link.turning(zd)])
-        wrench = taken(self.states.wrenches[:, 0], self.tables.pairs[0])
+        after = _sum(link.inertial_wrench(zdd, sdd), [2.0 * a for a in link.turning(zd)])
+        wrench = gather(self.states.wrenches[:, 0], self.tables.pairs[0])
         n, f = wrench[:3], wrench[3:]
         before = _sum(after, [*_sum(_cross(z, n), _cross(s, f)), *_cross(z, f)])
         kept = self.xp.stack([self.xp.concat(both, 0) for both in zip(after, before, strict=True)], 0)
@@ -164,21 +164,21 @@ class FusedMoment(NamedTuple):
 
     def _links(self) -> "_Links":
         """Return the moments of each pair's link."""
-        m, h, inertia, momentum, b = (taken(a, self.tables.pairs[0]) for a in self.states.moments)
+        m, h, inertia, momentum, b = (gather(a, self.tables.pairs[0]) for a in self.states.moments)
         # Of a symmetric matrix each entry is read once.
         upper = [[inertia[min(i, k), max(i, k)] for i in range(3)] for k in range(3)]
         return _Links(m, h[:3], upper, momentum[:3], b)
 
     def _pairs(self, screws: Numbers) -> tuple[Numbers, Numbers]:
         """Return z and s of each pair's joint, from pairs of vectors (5, 2, frames, samples)."""
-        found = taken(screws, self.tables.pairs[1])
+        found = gather(screws, self.tables.pairs[1])
         return found[:3, 0], found[:3, 1]
 
     def _gathered(self, wrenches: Numbers, entries: Sequence[tuple[Numbers, Numbers]]) -> Numbers:
         """Return sums of S_e . (wrench), of wrenches (6, rows, samples), as (samples, count)."""
         screws = self.moved.screws
         parts = [
-            taken(screws[axis % 3, axis // 3], e) * taken(wrenches[axis], row)
+            gather(screws[axis % 3, axis // 3], e) * gather(wrenches[axis], row)
             for e, row in entries
             for axis in range(6)
         ]
@@ -194,7 +194,7 @@ class _Links(NamedTuple):
     momentum: Vector
     b: Columns
 
-    def accelerated(self, z: Vector, s: Vector) -> Vector:
+    def inertial_wrench(self, z: Vector, s: Vector) -> Vector:
         """Return N = h x s + I z over f = m s + z x h."""
         moment = _sum(_cross(self.h, s), _applied(self.inertia, z))
         return [*moment, *_sum([self.m * a for a in s], _cross(z, self.h))]

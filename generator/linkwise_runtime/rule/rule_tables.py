@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..interface import Library, Namespace, Numbers
 from .joint_tree import JointTree
-from .kinematics import KinematicTables, Positions, doubled, hinge_before, kinematic_tables
+from .kinematics import KinematicTables, Positions, doubling_ancestors, hinge_before, kinematic_tables
 from .regressors import RegressorTables, regressor_tables
 from .rigid_rule import LinkNumbers, LinkTables, link_numbers
 from .rule_layout import RuleLayout, pair_layout
@@ -120,7 +120,7 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
         kinematic_tables(tree),
         links,
         own,
-        link_numbers(xp, eye, *own.carried),
+        link_numbers(xp, eye, *own.bodies),
         spatial,
         spatial_numbers(xp, spatial, own),
         formula_sources(tree),
@@ -173,7 +173,7 @@ def spatial_tables(tree: JointTree, joints: Positions, own: Positions) -> Spatia
         np.array([_twice(part) for part in _turned(rotation)])[:, None],
         rotation[:, :, 2] * behind,
         behind,
-        tuple(doubled(parents)),
+        tuple(doubling_ancestors(parents)),
         units,
         chains,
         joints,

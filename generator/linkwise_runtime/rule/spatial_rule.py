@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..interface import Namespace, Numbers
-from .kinematics import Slopes, displaced, taken
+from .kinematics import Slopes, curve_displacement, gather
 from .rule_products import packed
 from .rule_tables import RuleTables, SpatialNumbers, as_matrices
 
@@ -86,7 +86,7 @@ class SpatialMoment(NamedTuple):
 
     def _matrices(self) -> Numbers:
         """Return [I B] of each link, with only those columns of B that meet z, (samples, N, 6, 9)."""
-        own = self.inertias @ taken(self.crosses, self.tables.spatial.joints, -3)
+        own = self.inertias @ gather(self.crosses, self.tables.spatial.joints, -3)
         b = 0.5 * (self._wrench_cross(self.momenta) - own - own.mT)
         return self.xp.concat([self.inertias, b[..., 3:]], -1)
 
@@ -108,11 +108,11 @@ class SpatialMoment(NamedTuple):
         right = xp.stack([xp.concat(list(parts), -1) for parts in columns], 1)
         samples, kinds, _, size = right.shape
         for links, path in self.tables.groups:
-            block, behind = taken(matrices, links, -3), taken(right, path, -2)
+            block, behind = gather(matrices, links, -3), gather(right, path, -2)
             count, depth = block.shape[1], behind.shape[2]
             rows = xp.swapaxes(block, 1, 2).reshape(samples, 6 * count, size)
             wrench = rows @ behind.reshape(samples, kinds * depth, size).mT
-            answer = taken(self.screws, path) @ wrench.reshape(samples, 6, count * kinds * depth)
+            answer = gather(self.screws, path) @ wrench.reshape(samples, 6, count * kinds * depth)
             answers.append(answer.reshape(samples, depth * count * kinds * depth))
         return xp.concat(answers, 1) if len(answers) > 1 else answers[0]
 
@@ -122,11 +122,11 @@ def spatial_moment(
 ) -> SpatialMoment:
     """Return the motion of joints and links for q, qd and qdd, (samples, n) each."""
     spatial = tables.spatial
-    way, slopes = _moved(xp, tables, taken(motion[0], spatial.coordinates, -1))
+    way, slopes = _moved(xp, tables, gather(motion[0], spatial.coordinates, -1))
     x = _placed(xp, tables, numbers, way)
-    s = straight = taken((x[:, :-1] @ spatial.units)[..., 0], spatial.swapped, -1)
-    velocity = taken(motion[1], spatial.own, -1)[..., None]
-    acceleration = taken(motion[2], spatial.own, -1)[..., None]
+    s = straight = gather((x[:, :-1] @ spatial.units)[..., 0], spatial.swapped, -1)
+    velocity = gather(motion[1], spatial.own, -1)[..., None]
+    acceleration = gather(motion[2], spatial.own, -1)[..., None]
     if slopes is not None:
         slope, bend, jerk = (a[:, :-1, None] for a in slopes)
         s = straight * slope
@@ -143,12 +143,12 @@ def spatial_moment(
         rate = rate + bends * velocity
     a = spatial.chains @ (s * acceleration + rate * velocity) - numbers.gravity
     links = spatial.joints
-    x = taken(x, links, -3)
+    x = gather(x, links, -3)
     inertia = x @ numbers.inertias @ x.mT
-    momentum = _applied(inertia, taken(v, links))
+    momentum = _applied(inertia, gather(v, links))
     # V x* is minus the transpose of V x.
-    turning = _applied(taken(crosses, links, -3).mT, momentum)
-    wrench = _applied(inertia, taken(a, links)) - turning
+    turning = _applied(gather(crosses, links, -3).mT, momentum)
+    wrench = _applied(inertia, gather(a, links)) - turning
     weight = _applied(inertia, -numbers.gravity)
     return SpatialMoment(xp, tables, s, rate, a, crosses, inertia, momentum, wrench, weight, second, bends)
 
@@ -157,7 +157,7 @@ def _moved(xp: Namespace, tables: RuleTables, position: Numbers) -> tuple[Number
     """Return the displacements of all joints and their slopes, (samples, frames), for q of each."""
     if tables.frames.curves is None:
         return position, None
-    way, slopes = displaced(tables.frames.curves, xp.swapaxes(position, 0, 1))
+    way, slopes = curve_displacement(tables.frames.curves, xp.swapaxes(position, 0, 1))
     slope, bend, jerk = (xp.swapaxes(a, 0, 1) for a in slopes)
     return xp.swapaxes(way, 0, 1), (slope, bend, jerk)
 
@@ -170,7 +170,7 @@ def _placed(xp: Namespace, tables: RuleTables, numbers: SpatialNumbers, position
     if tables.spatial.slides is not None:
         x = x + numbers.frames[3] * (tables.spatial.slides * position)[..., None, None]
     for parents in tables.spatial.steps:
-        x = taken(x, parents, -3) @ x
+        x = gather(x, parents, -3) @ x
     return x
 
 

@@ -36,7 +36,7 @@ class TreeArrays(NamedTuple):
     """Origins of the frames that have names, in the axes of what carries them, (3, frames, samples)."""
 
     @property
-    def carried(self) -> tuple[Numbers, Numbers, Numbers]:
+    def bodies(self) -> tuple[Numbers, Numbers, Numbers]:
         """Masses, centres and inertias of the links."""
         return self.masses, self.centres, self.inertias
 

@@ -11,7 +11,7 @@ from speed.package import PEERS, Package, build_flags, compiler, pairs, run
 
 MIX = 32
 """Instructions of arithmetic in one round of peers/limits.c."""
-KERNEL = re.compile(r"<link_\d+_decomposition_block\w*>:")
+DECOMPOSITION = re.compile(r"<link_\d+_decomposition_block\w*>:")
 """Functions that compute the decomposition of blocks, in straight lines."""
 
 
@@ -28,22 +28,22 @@ class Mix:
 
 
 def mix(package: Package) -> Mix:
-    """Instructions of the compiled kernels; half sums, half products where they cannot be counted."""
+    """Instructions of the compiled closed forms; half sums, half products where they cannot be counted."""
     counts = {"fma": 0, "mul": 0, "add": 0, "sub": 0}
     if shutil.which("objdump"):
         command = ["objdump", "-d", "--no-show-raw-insn", str(package.libraries["double"])]
         text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
         for function in text.split("\n\n"):
-            if KERNEL.search(function):
+            if DECOMPOSITION.search(function):
                 for kind in re.findall(r"\tv?(?:fn?(m)(?:add|sub)\w*|(mul|add|sub))[sp]d\b", function):
                     counts["fma" if kind[0] else kind[1]] += 1
     every = sum(counts.values())
     return Mix(counts["fma"] / every, counts["mul"] / every) if every else Mix(0.0, 0.5)
 
 
-def limits(work: Path, kernels: Mix, sizes: Iterable[int]) -> dict[str, float]:
+def limits(work: Path, forms: Mix, sizes: Iterable[int]) -> dict[str, float]:
     """GFlop/s in registers, in the mix of the emitted code, and GB/s of writing arrays of the given bytes."""
     program = work / "limits"
-    flags = ["-std=gnu99", *build_flags(), *kernels.flags()]
+    flags = ["-std=gnu99", *build_flags(), *forms.flags()]
     run([compiler() or "cc", *flags, str(PEERS / "limits.c"), "-o", str(program)])
     return pairs(run([str(program), *(str(size) for size in sorted(set(sizes)))]))

@@ -40,7 +40,7 @@ def limits_text(results: Results) -> str:
     return (
         f"Limits, one thread: {results.limits['flops']:.0f} GFlop/s in float64,"
         f" {results.limits['flopsf']:.0f} in float32, of instructions that are {given}, as in Panda's"
-        " kernels, the others being sums; memory: of writing the results past the cache or through it,"
+        " closed forms, the others being sums; memory: of writing the results past the cache or through it,"
         " whatever is faster. Shares of arithmetic at each batch, of the lower of the two at the largest."
     )
 

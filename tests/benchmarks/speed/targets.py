@@ -66,7 +66,7 @@ def control(results: Results) -> Iterator[Target]:
 
 
 def operations(results: Results) -> Iterator[Target]:
-    """Additions and multiplications of straight kernels: numbers that no machine changes."""
+    """Additions and multiplications of closed forms: numbers that no machine changes."""
     counted = {facts["robot"]: facts["operations"] for facts in results.packages}
     for robot, most in (("panda", 4300), ("chain20_straight", 70000), ("planar3", 200), ("planar10", 3300)):
         yield Target(f"{robot}, operations", counted.get(robot), most)
@@ -95,17 +95,17 @@ def from_python(results: Results) -> Iterator[Target]:
 
 
 def dense_batches(results: Results) -> Iterator[Target]:
-    """Dense calls against the kernel and writing the bytes: into memory in use where there is `out`."""
-    kernel = results.find("panda", "C", "float64", "rows")
+    """Dense calls against packed ones and writing the bytes: into memory in use where there is `out`."""
+    packed = results.find("panda", "C", "float64", "rows")
     for call in ("coefficients", "propagation"):
         found = results.find("panda", "native", "float64", "rows", call=call)
         for batch in sorted(b for b in found if b > 1) or [1024]:
             for name, way in ((call, "fresh"), (f"{call} out", "warm")):
                 figure = results.figure("panda", "native", "float64", "rows", batch, 1, call=name)
                 least = None
-                if figure and batch in kernel:
-                    least = kernel[batch] + results.writing(figure, way)
-                what = f"Panda, native from Python, batch {batch:,}, {name} / kernel and {way} memory"
+                if figure and batch in packed:
+                    least = packed[batch] + results.writing(figure, way)
+                what = f"Panda, native from Python, batch {batch:,}, {name} / packed and {way} memory"
                 yield Target(what, ratio(figure.ns if figure else None, least), 1.5)
 
 

@@ -1,25 +1,25 @@
-"""Calls of kernels, and the place that each writes to: the decisions behind a robot's C file."""
+"""Calls of the links' functions, and the place that each writes to: the decisions behind a robot's C file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from linkwise.emit.c.kernel_function import KernelFunction
+from linkwise.emit.c.form_function import CFormFunction
 from linkwise.emit.c.prototypes import NUMBERS, pointers
 from linkwise.emit.c.sizes import EntryCounts, Span, whole
 
 
 @dataclass(frozen=True)
-class LinkKernels:
-    """The kernels of one link."""
+class LinkFormFunctions:
+    """The functions of one link's closed forms."""
 
-    decomposition: KernelFunction
-    torque: KernelFunction
-    position_gradient: KernelFunction
+    decomposition: CFormFunction
+    torque: CFormFunction
+    position_gradient: CFormFunction
 
 
 @dataclass(frozen=True)
 class Motions:
-    """Struct that kernels read: its fields, and its values.
+    """Struct that the links' functions read: its fields, and its values.
 
     These are of one sample, of block t of a tile whose rows were gathered, of block t of a tile in blocks.
     """
@@ -42,7 +42,7 @@ class Moves:
 
 @dataclass(frozen=True)
 class LinkCalls:
-    """Calls of one link's kernels for one sample, and for the position gradient of a block.
+    """Calls of one link's functions for one sample, and for the position gradient of a block.
 
     `links` is this one as functions of dense.h take it: first, counted from 0, and the one after the last.
     """
@@ -90,27 +90,29 @@ def motions(inputs: Sequence[str]) -> Motions:
     )
 
 
-def link_calls(link: Span, kernels: LinkKernels) -> LinkCalls:
-    """Return the calls of one link's kernels."""
+def link_calls(link: Span, functions: LinkFormFunctions) -> LinkCalls:
+    """Return the calls of one link's functions."""
     arrays = {array: array for array in link.size.arrays}
     return LinkCalls(
         link.first,
         pointers("real", link.size.arrays),
-        call(kernels.decomposition, "one", "m.", arrays),
-        call(kernels.decomposition, "one", "m.", arrays, link.start),
-        call(kernels.torque, "one", "m.", {"tau": "tau"}, link.start),
-        call(kernels.position_gradient, "", "m[t].", {"c0": "c0_block"}),
+        call(functions.decomposition, "one", "m.", arrays),
+        call(functions.decomposition, "one", "m.", arrays, link.start),
+        call(functions.torque, "one", "m.", {"tau": "tau"}, link.start),
+        call(functions.position_gradient, "", "m[t].", {"c0": "c0_block"}),
         _moves("c0", link).scatter,
         _counted_from_0(link),
         f"to_dense_one({link.first - 1}, &m, &r, to)",
     )
 
 
-def group_calls(links: Sequence[Span], kernels: Sequence[LinkKernels], arrays: Sequence[str]) -> GroupCalls:
-    """Return the calls of the kernels of `links`; `arrays` are those of the robot."""
+def group_calls(
+    links: Sequence[Span], functions: Sequence[LinkFormFunctions], arrays: Sequence[str]
+) -> GroupCalls:
+    """Return the calls of the functions of `links`; `arrays` are those of the robot."""
     group = whole(links)
     into = {array: f"r[t].{array}" for array in arrays}
-    mine = [(kernels[link.first - 1], link.start - group.start) for link in links]
+    mine = [(functions[link.first - 1], link.start - group.start) for link in links]
     one = group.first == group.last
     decomposition = tuple(call(k.decomposition, "block", "m[t].", into, start) for k, start in mine)
     torque = tuple(call(k.torque, "block", "m[t].", {"tau": "r[t].tau"}, start) for k, start in mine)
@@ -129,13 +131,13 @@ def group_calls(links: Sequence[Span], kernels: Sequence[LinkKernels], arrays: S
 
 
 def call(
-    function: KernelFunction,
+    function: CFormFunction,
     width: str,
     motion: str,
     into: Mapping[str, str],
     start: EntryCounts | None = None,
 ) -> str:
-    """Return a call of a kernel for one sample, a block, or, without width, as SIZED says.
+    """Return a call of a function for one sample, a block, or, without width, as SIZED says.
 
     Outputs may begin at a later entry, `start`.
     """

@@ -37,15 +37,15 @@ def code_size(name: str, files: Mapping[str, str]) -> CodeSize | None:
     """Return the estimate in double and in float for a package's files; None for one without C."""
     if f"c/{name}.c" not in files:
         return None
-    kernels = [text for path, text in files.items() if re.fullmatch(r"c/link_\d+\.h", path)]
+    links_code = [text for path, text in files.items() if re.fullmatch(r"c/link_\d+\.h", path)]
     tree, header = COMMENT.sub("", files.get(f"c/{name}_tree.h", "")), files[f"c/{name}.h"]
-    operations = sum(len(OPERATOR.findall(COMMENT_OR_INDEX.sub("", text))) for text in kernels)
+    operations = sum(len(OPERATOR.findall(COMMENT_OR_INDEX.sub("", text))) for text in links_code)
     links = len(LINK.findall(header)) // 2  # of double and float
     settings, numbers = len(WORD.findall(tree)), len(NUMBER.findall(tree))
     tables = SHORTS.findall(tree) + SHORTS.findall(COMMENT.sub("", files[f"c/{name}.c"]))
     above = sum(len(table.split(",")) - 1 for table in tables)
-    base = ENERGIES if not tree else STRAIGHT if kernels else LOOPS
-    free = (FREE_STRAIGHT if kernels else FREE_LOOPS) if "frame_partial_impedance(" in header else (0, 0)
+    base = ENERGIES if not tree else STRAIGHT if links_code else LOOPS
+    free = (FREE_STRAIGHT if links_code else FREE_LOOPS) if "frame_partial_impedance(" in header else (0, 0)
     double, single = (
         base[at]
         + free[at]

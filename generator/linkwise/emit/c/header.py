@@ -72,20 +72,20 @@ def link_lines(system: System, links: Sequence[Span]) -> Iterator[str]:
         ]
         for link in links
     ]
-    return aligned([head, *rows])
+    return align_columns([head, *rows])
 
 
 def joint_lines(system: System) -> Iterator[str]:
     """Return a table: each joint, its unit and its name."""
     rows = [[str(k), c.unit, c_comment(c.name)] for k, c in enumerate(system.coordinates, 1)]
-    return aligned([["joint", "unit", "name"], *rows])
+    return align_columns([["joint", "unit", "name"], *rows])
 
 
 def tie_lines(system: System) -> list[str]:
     """Return a table: what ties joints, by name, and what each holds; empty for an open tree."""
     found = constraints_of(system.robot) if isinstance(system, RigidSystem) else ()
     rows = [[c_comment(word) for word in row] for row in found]
-    return list(aligned(rows)) if rows else []
+    return list(align_columns(rows)) if rows else []
 
 
 def limit_tables(system: System) -> Iterator[LimitTable]:
@@ -110,7 +110,7 @@ def frame_lines(system: RigidSystem) -> Iterator[tuple[str, str]]:
 def parameter_lines(system: System) -> list[str]:
     """Return a table: each run-time parameter and the value that the description has."""
     rows = [[c_comment(s.name), repr(float(value))] for s, value in system.parameters.items()]
-    return list(aligned(rows))
+    return list(align_columns(rows))
 
 
 def index_tables(system: System, links: Sequence[Span]) -> Iterator[IndexTable]:
@@ -128,7 +128,7 @@ def index_tables(system: System, links: Sequence[Span]) -> Iterator[IndexTable]:
             yield IndexTable(array, array.upper(), 2 if array == "g" else 3, tuple(commas))
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def align_columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
     """Yield lines with their columns below each other."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:

@@ -1,11 +1,11 @@
-"""Arithmetic operations of a kernel in loops: those that rule.h, shares.h and gradient.h write down.
+"""Arithmetic operations of loops: those that rule.h, shares.h and gradient.h write down.
 
 Additions, subtractions and multiplications for each sample, fused ones counted as two. What depends on the
 robot alone, such as half the trace of an inertia, is not counted, nor are sines and cosines. A test counts
 them in the C of one sample.
 """
 
-from linkwise.emit.c.robot_tables import columns, curve_tables, placed
+from linkwise.emit.c.robot_tables import columns, curve_tables, place_matters
 from linkwise.robot.robot import Joint
 from linkwise.symbolic.system import RigidSystem
 
@@ -74,7 +74,9 @@ def _motion(system: RigidSystem) -> int:
 def _frames(system: RigidSystem) -> list[int]:
     """Return the operations of each frame."""
     joints, curves = [link.joint for link in system.robot.links], curve_tables(system)
-    costs = [FRAME + _by_kind(joint, matters) for joint, matters in zip(joints, placed(system), strict=True)]
+    costs = [
+        FRAME + _by_kind(joint, matters) for joint, matters in zip(joints, place_matters(system), strict=True)
+    ]
     if curves:
         bent = SHIFT + POWER * curves.powers
         costs = [BEND + cost + bent * bool(j.curve) for cost, j in zip(costs, joints, strict=True)]

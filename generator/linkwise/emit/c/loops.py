@@ -1,15 +1,15 @@
-"""A kernel in loops in C: the robot in tables, and fixed files that work on them."""
+"""Loops in C: the robot in tables, and fixed files that work on them."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 from linkwise_runtime.version import VERSION
 
-from linkwise.dynamics.kernel import parameter_names
+from linkwise.dynamics.link_forms import parameter_names
 from linkwise.emit.c import header
 from linkwise.emit.c.loop_costs import decomposition_cost, gradient_cost, torque_cost
 from linkwise.emit.c.prototypes import at_position, pointers, under_torque
-from linkwise.emit.c.robot_files import free, given, header_view, path_fields, rows_from_s, totals
+from linkwise.emit.c.robot_files import free, header_view, input_arrays, path_fields, rows_from_s, totals
 from linkwise.emit.c.robot_tables import path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
 from linkwise.emit.c.stack import loops_stack, small_stack
@@ -46,7 +46,7 @@ def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
 
 def _robot_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
     """Return the fields of NAME.c but for its name."""
-    robot, motion = whole(links), given(system)
+    robot, motion = whole(links), input_arrays(system)
     return path_fields(system) | {
         "n": len(system.coordinates),
         "links": len(links),

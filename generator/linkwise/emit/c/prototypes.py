@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
 
-from linkwise.emit.c.kernel_function import KernelFunction
+from linkwise.emit.c.form_function import CFormFunction
 from linkwise.emit.c.sizes import Span
 
 NUMBERS = {"c2": "C2", "c1": "C1", "g": "G", "tau": "G", "h1": "H1", "c0": "C1"}
@@ -104,9 +104,9 @@ def functions(inputs: Sequence[str], robot: Span, links: Sequence[Span]) -> Iter
         )
 
 
-def cost(kernels: Iterable[KernelFunction]) -> int:
+def cost(forms: Iterable[CFormFunction]) -> int:
     """Return the additions, multiplications and divisions per sample of all these functions."""
-    return sum(kernel.arithmetic for kernel in kernels)
+    return sum(function.arithmetic for function in forms)
 
 
 def _motion(parameters: bool, shape: str, arrays: str = "q, qd, qdd") -> str:

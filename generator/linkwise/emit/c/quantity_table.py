@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from itertools import product
 
-from linkwise.emit.c.header import aligned
+from linkwise.emit.c.header import align_columns
 from linkwise.package.potential_word import potential_word
 from linkwise.symbolic.system import EnergySystem, System
 
@@ -47,7 +47,7 @@ def quantity_lines(system: System, linear: bool) -> Iterator[str]:
     if linear:
         what = "what energies linear in qd add to c1, as on a base that is moved"
         rows.append(["h1(i, j, k)", *dampings, what])
-    return aligned(rows)
+    return align_columns(rows)
 
 
 def causes(system: System) -> str:

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any
 
-from linkwise.dynamics.kernel import parameter_names
+from linkwise.dynamics.link_forms import parameter_names
 from linkwise.emit.c import header
-from linkwise.emit.c.calls import LinkKernels, group_calls, link_calls, motions, total
+from linkwise.emit.c.calls import LinkFormFunctions, group_calls, link_calls, motions, total
 from linkwise.emit.c.prototypes import at_position, cost, functions, pointers, under_torque
 from linkwise.emit.c.quantity_table import causes, potential, quantity_lines
 from linkwise.emit.c.sizes import EntryCounts, Span, groups, most_counts, tile, waiting_counts, whole
@@ -14,7 +14,9 @@ from linkwise.escape import c_string
 from linkwise.symbolic.system import RigidSystem, System
 
 
-def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKernels]) -> dict[str, Any]:
+def robot_view(
+    system: System, links: Sequence[Span], functions: Sequence[LinkFormFunctions]
+) -> dict[str, Any]:
     """Return the fields of NAME.c but for its name."""
     robot = whole(links)
     arrays = robot.size.arrays
@@ -23,15 +25,15 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
     parts = tuple(groups(links))
     waiting = waiting_counts(links)
     names = list(parameter_names(system).values())
-    motion = given(system)
-    calls = [link_calls(link, k) for link, k in zip(links, kernels, strict=True)]
+    motion = input_arrays(system)
+    calls = [link_calls(link, own) for link, own in zip(links, functions, strict=True)]
     return path_fields(system) | {
         "n": n,
         "linear": ", ".join("1" if link.size.h1 else "0" for link in links),
         "totals": totals(robot.size),
         "total": robot.size.total,
         "parameters": [(name, place) for place, name in enumerate(names)],
-        "kernels": f"link_1.h to link_{len(links)}.h" if len(links) > 1 else "link_1.h",
+        "link_files": f"link_1.h to link_{len(links)}.h" if len(links) > 1 else "link_1.h",
         "inputs": pointers("const real", motion),
         "outputs": pointers("real", arrays),
         "motions": motions(motion),
@@ -45,7 +47,7 @@ def robot_view(system: System, links: Sequence[Span], kernels: Sequence[LinkKern
         "inputs_at_position": pointers("const real", at_position(motion)),
         "inputs_under_torque": pointers("const real", under_torque(motion)),
         "links": calls,
-        "groups": [group_calls(part, kernels, arrays) for part in parts],
+        "groups": [group_calls(part, functions, arrays) for part in parts],
         "tile": tile(waiting),
         "room": [(array, waiting.of(array)) for array in arrays],
         "room_of_one": [(array, one.of(array)) for array in arrays],
@@ -97,26 +99,26 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "free": free(system),
         "passive": isinstance(system, RigidSystem) and bool(system.robot.passive),
         "frames": list(header.frame_lines(system)) if isinstance(system, RigidSystem) else [],
-        "functions": list(functions(given(system), robot, links)),
+        "functions": list(functions(input_arrays(system), robot, links)),
     }
 
 
-def costs(kernels: Sequence[LinkKernels]) -> dict[str, int]:
+def costs(functions: Sequence[LinkFormFunctions]) -> dict[str, int]:
     """Return the arithmetic operations of a sample in NAME.h."""
     return {
-        "decomposition_cost": cost(k.decomposition for k in kernels),
-        "torque_cost": cost(k.torque for k in kernels),
-        "gradient_cost": cost(k.position_gradient for k in kernels),
+        "decomposition_cost": cost(own.decomposition for own in functions),
+        "torque_cost": cost(own.torque for own in functions),
+        "gradient_cost": cost(own.position_gradient for own in functions),
     }
 
 
-def most_kept(kernels: Sequence[LinkKernels]) -> int:
-    """Return how many values a kernel keeps at a time, at most: inputs, and a fourth of its statements."""
-    functions = (f for k in kernels for f in (k.decomposition, k.torque, k.position_gradient))
-    return max(len(f.inputs) + len(f.statements) // 4 for f in functions)
+def most_kept(functions: Sequence[LinkFormFunctions]) -> int:
+    """Return how many values a function keeps at a time, at most: inputs, and a fourth of its statements."""
+    every = (f for own in functions for f in (own.decomposition, own.torque, own.position_gradient))
+    return max(len(f.inputs) + len(f.statements) // 4 for f in every)
 
 
-def given(system: System) -> tuple[str, ...]:
+def input_arrays(system: System) -> tuple[str, ...]:
     """Return the arrays that every function takes."""
     return ("q", "qd", "qdd", "p") if system.parameters else ("q", "qd", "qdd")
 

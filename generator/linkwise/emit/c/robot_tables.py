@@ -1,4 +1,4 @@
-"""Tables in C of a tree of rigid bodies, which a kernel in loops reads."""
+"""Tables in C of a tree of rigid bodies, which loops read."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
@@ -8,7 +8,7 @@ from typing import Any
 import sympy as sp
 from linkwise_runtime.passive_joints import PassiveJoint, passive_sums
 
-from linkwise.dynamics.kernel import lowering, parameter_names
+from linkwise.dynamics.link_forms import lowering, parameter_names
 from linkwise.emit.c.sizes import EntryCounts, Span
 from linkwise.emit.printer import CPrinter
 from linkwise.emit.straight_line import straight_line
@@ -105,7 +105,7 @@ def formulas(system: RigidSystem, numbers: Iterable[tuple[str, Scalar]]) -> list
     ]
 
 
-def placed(system: RigidSystem) -> list[bool]:
+def place_matters(system: RigidSystem) -> list[bool]:
     """Return whether the place of each frame matters.
 
     A frame that nothing before it turns may as well be at the origin.
@@ -119,7 +119,7 @@ def placed(system: RigidSystem) -> list[bool]:
 
 
 def _joints(system: RigidSystem) -> Iterator[str]:
-    matters = placed(system)
+    matters = place_matters(system)
     for number, link in enumerate(system.robot.links, 1):
         joint = link.joint
         up = 0 if link.parent is None else link.parent + 1

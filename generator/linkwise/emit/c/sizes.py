@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from linkwise.dynamics.kernel import Kernel
+from linkwise.dynamics.link_forms import LinkForms
 
 ARRAYS = ("c2", "c1", "g", "tau", "h1")
 """Arrays of the decomposition in the order of the API; c0 has as many values as c1."""
@@ -12,10 +12,10 @@ GROUP = 384
 """Most values of a sample that wait in blocks at a time."""
 
 TILE = 8
-"""Blocks that one kernel works on before the next does.
+"""Blocks that one link's functions work on before the next link's do.
 
-The kernels of a robot of seven joints are some 40 kB of code, more than a first-level cache holds: so they
-come from the second-level cache once per tile, in which its results, 192 KiB at most, wait too.
+The links' functions of a robot of seven joints are some 40 kB of code, more than a first-level cache holds:
+so they come from the second-level cache once per tile, in which its results, 192 KiB at most, wait too.
 """
 
 
@@ -66,12 +66,11 @@ class Span:
     start: EntryCounts
 
 
-def link_spans(kernels: Sequence[Kernel]) -> tuple[Span, ...]:
+def link_spans(links: Sequence[LinkForms]) -> tuple[Span, ...]:
     """Return each link by itself, in order."""
     spans: list[Span] = []
     start = EntryCounts()
-    for number, kernel in enumerate(kernels, 1):
-        forms = kernel.forms[0]
+    for number, forms in enumerate(links, 1):
         c2, c1, g, h1 = forms.acceleration, forms.velocity, forms.gravity, forms.velocity_linear
         size = EntryCounts(len(c2), len(c1), len(g), len(h1))
         spans.append(Span(number, number, size, start))

@@ -1,7 +1,7 @@
 """Bytes of stack that a package's C takes, and robots that are too large for it.
 
 Blocks of samples wait on the stack, in arrays whose sizes follow from the robot. A value of a block takes 64
-bytes, 8 samples in double or 16 in float. Beside them a kernel keeps some kB of its own.
+bytes, 8 samples in double or 16 in float. Beside them a function keeps some kB of its own.
 """
 
 from collections.abc import Callable
@@ -46,7 +46,7 @@ class SmallStack:
 def small_stack(system: System, links: tuple[Span, ...], kept: int) -> SmallStack:
     """Return the bytes that functions take where samples are computed one by one.
 
-    `links` are results, and `kept` numbers that a kernel of closed forms may have to keep.
+    `links` are results, and `kept` numbers that a function of closed forms may have to keep.
     """
     motion = _motion_values(system, links, kept)
     control = max(motion, _control_values(system, links))
@@ -77,7 +77,7 @@ def _moved(system: RigidSystem) -> int:
 
 
 def loops_stack(system: RigidSystem) -> int:
-    """Return the bytes that the functions of a kernel in loops take at most."""
+    """Return the bytes that the functions of loops take at most."""
     n, frames, longest = len(system.coordinates), len(system.robot.links), _longest(system)
     # motion: frames with 24 numbers each, and columns; wrenches; q, qd, qdd and angles, sines, cosines.
     moved = _moved(system)

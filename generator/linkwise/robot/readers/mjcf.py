@@ -14,7 +14,7 @@ from linkwise.own_process import Ended, OutOfTime, ProcessLimits, in_own_process
 from linkwise.robot import transforms
 from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection, Description, Site
 from linkwise.robot.notes import WARNED, Note
-from linkwise.robot.readers.mjcf_compiled import compiled
+from linkwise.robot.readers.mjcf_compiled import compile_model
 from linkwise.robot.readers.mjcf_equality import equalities
 from linkwise.robot.readers.mjcf_files import mjcf_files
 from linkwise.robot.readers.mjcf_options import switched_off
@@ -39,7 +39,7 @@ def read_mjcf(path: Path, text: bytes | None = None) -> Description:
     """
     mujoco, files = extra("mujoco"), mjcf_files(path)
     try:
-        return in_own_process(lambda: _described(mujoco, path, *compiled(mujoco, files, text)), LIMITS)
+        return in_own_process(lambda: _described(mujoco, path, *compile_model(mujoco, files, text)), LIMITS)
     except MemoryError:
         fault = f"takes more than {LIMITS.memory >> 20} MiB of memory"
     except OutOfTime:

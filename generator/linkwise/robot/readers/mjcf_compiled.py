@@ -13,7 +13,7 @@ FACES = [0, 2, 1, 0, 3, 2, 0, 1, 3, 1, 2, 3]
 """Faces of a tetrahedron with these corners."""
 
 
-def compiled(mujoco: Any, files: MjcfFiles, text: bytes | None = None) -> tuple[Any, list[str]]:
+def compile_model(mujoco: Any, files: MjcfFiles, text: bytes | None = None) -> tuple[Any, list[str]]:
     """Return the model, and MuJoCo's warnings, which it would write into a file in the working directory.
 
     text: replaces the content of the first document

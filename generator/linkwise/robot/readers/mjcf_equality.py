@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from linkwise.robot import transforms
-from linkwise.robot.couplings import composed
+from linkwise.robot.couplings import compose_polynomial
 from linkwise.robot.description import IDENTITY, Anchor, AnchoredTie, JointCoupling, Loop
 from linkwise.robot.notes import Note
 from linkwise.robot.readers.mjcf_options import switched_off
@@ -133,9 +133,9 @@ def _coupling(mujoco: Any, model: Any, equality: _Equality, joints: list[str]) -
     found[0] = found[0][0], (-rest - powers[0], follower[0][1])
     for length, at in masters:
         slopes = (0.0, *(-c for c in powers[1:]))
-        shifted = composed(slopes, 1.0, -at)
+        shifted = compose_polynomial(slopes, 1.0, -at)
         for number, (j, factor) in enumerate(length):
-            own = composed(shifted, factor, 0.0)
+            own = compose_polynomial(shifted, factor, 0.0)
             found.append((joints[j], own if number == 0 else (0.0, *own[1:])))
     return JointCoupling(equality.name, tuple(found), equality.kind == "joint")
 

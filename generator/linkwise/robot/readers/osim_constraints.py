@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
 from linkwise.robot.description import Anchor, AnchoredTie, Loop
-from linkwise.robot.readers.osim_coordinates import COUPLER, enforced
+from linkwise.robot.readers.osim_coordinates import COUPLER, is_enforced
 from linkwise.robot.readers.osim_document import members
 from linkwise.robot.readers.osim_elements import name_of, numbers_of, text_of
 from linkwise.robot.readers.osim_frames import Frames, Placed, offset_of
@@ -20,7 +20,7 @@ KINDS: dict[str, TieKind] = {
 def ties(model: Element, frames: Frames) -> Iterator[AnchoredTie]:
     """Yield the constraints between two bodies."""
     for constraint in members(model, "ConstraintSet"):
-        if constraint.tag in KINDS and enforced(constraint):
+        if constraint.tag in KINDS and is_enforced(constraint):
             first, second = (_end(constraint, number, frames) for number in (1, 2))
             place = f"constraint {name_of(constraint)!r}"
             (length,) = numbers_of(constraint, "constant_distance", "0", place, 1)
@@ -30,7 +30,7 @@ def ties(model: Element, frames: Frames) -> Iterator[AnchoredTie]:
 def unmodelled(model: Element) -> Iterator[Loop]:
     """Yield the constraints of other kinds, which are not modelled."""
     for constraint in members(model, "ConstraintSet"):
-        if constraint.tag not in (COUPLER, *KINDS) and enforced(constraint):
+        if constraint.tag not in (COUPLER, *KINDS) and is_enforced(constraint):
             yield Loop(
                 f"the model has the {constraint.tag} {name_of(constraint)!r}",
                 "remove it, or switch it off there",

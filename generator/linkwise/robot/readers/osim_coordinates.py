@@ -49,14 +49,14 @@ def coordinate_rules(
         if yes(coordinate, "prescribed"):
             notes.append(Note("ignored", name, "that its motion is prescribed: it moves as a log says"))
     for coupler in members(model, "ConstraintSet"):
-        if coupler.tag == COUPLER and enforced(coupler):
+        if coupler.tag == COUPLER and is_enforced(coupler):
             dependent, rule = _coupled(coupler, own)
             notes.append(Note("mimic", dependent, f"a function of {rule.free}" if rule.free else "held"))
             own[dependent] = rule
     return {name: _resolved(name, own) for name in own}, tuple(notes)
 
 
-def enforced(constraint: Element) -> bool:
+def is_enforced(constraint: Element) -> bool:
     """Return whether a constraint holds, that is, is switched on."""
     return yes(constraint, "isEnforced", True) and not yes(constraint, "isDisabled")
 

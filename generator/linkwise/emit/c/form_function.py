@@ -1,10 +1,9 @@
-"""A C function over W samples, from the nodes that it computes."""
+"""Closed forms as a C function over W samples, from the nodes that it computes."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from linkwise.dynamics.coefficients import LinkForms
-from linkwise.dynamics.kernel import Kernel, parameter_names
+from linkwise.dynamics.link_forms import LinkForms, parameter_names
 from linkwise.emit.printer import CPrinter
 from linkwise.emit.straight_line import Code, straight_line
 from linkwise.expression.count import count_operations
@@ -12,7 +11,7 @@ from linkwise.expression.expression_graph import Node
 from linkwise.symbolic.system import System
 
 READS = ("q", "qd", "qdd", "sine", "cosine", "p")
-"""Arrays that a kernel may read, in the order of its parameters."""
+"""Arrays that a function may read, in the order of its parameters."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class Output:
 
 
 @dataclass(frozen=True)
-class KernelFunction:
+class CFormFunction:
     """One C function over W samples: the lines that fetch its inputs, and those that compute and store.
 
     It takes the arrays that it reads and those that it writes, and no others. `arithmetic` is its number of
@@ -50,13 +49,12 @@ class KernelFunction:
         return ",\n    ".join(filter(None, (", ".join(reads), ", ".join(writes))))
 
 
-def turned(kernel: Kernel) -> dict[Node, str]:
-    """Return the names of the sines and cosines of the coordinates, which kernels are given."""
-    g = kernel.graph
-    return {g.call(f, q): f"{f}{k + 1}" for k, q in enumerate(kernel.inputs.q) for f in ("sin", "cos")}
+def sine_cosine_names(forms: LinkForms) -> dict[Node, str]:
+    """Return the names of the sines and cosines of the coordinates, which functions are given."""
+    return {q.call(f).node: f"{f}{k + 1}" for k, q in enumerate(forms.inputs.q) for f in ("sin", "cos")}
 
 
-def decomposition_outputs(kernel: Kernel, forms: LinkForms, number: int) -> list[Output]:
+def decomposition_outputs(forms: LinkForms, number: int) -> list[Output]:
     """Return the outputs of the full decomposition of link `number`."""
     return [
         *outputs("c2", forms.acceleration, number),
@@ -80,21 +78,21 @@ def outputs(
         yield Output(array, entry, f"{array}({', '.join(map(str, indices))})", node)
 
 
-def kernel_function(
+def form_function(
     system: System,
-    kernel: Kernel,
+    forms: LinkForms,
     name: str,
     what: str,
     results: Sequence[Output],
-) -> KernelFunction:
+) -> CFormFunction:
     """Return the C function that stores `results`; sines and cosines are inputs."""
-    given = turned(kernel)
+    given = sine_cosine_names(forms)
     nodes = [output.node for output in results]
-    code = straight_line(kernel.graph, nodes, CPrinter(), given)
+    code = straight_line(forms.graph, nodes, CPrinter(), given)
     inputs = tuple((symbol, source) for symbol, source in symbols(system).items() if symbol in code.symbols)
     used = {source.split("[")[0] for _, source in inputs}
     sines = sum(source.startswith(("sine", "cosine")) for _, source in inputs)
-    count = count_operations(kernel.graph, nodes, given)
+    count = count_operations(forms.graph, nodes, given)
     kinds = [
         (count.additions + count.multiplications, "additions and multiplications"),
         (count.divisions, "divisions"),
@@ -102,7 +100,7 @@ def kernel_function(
     ]
     cost = ", ".join(f"{times} {kind}" for times, kind in kinds if times or kind.startswith("add"))
     cost += f", {sines} sines and cosines apart" if sines else ""
-    return KernelFunction(
+    return CFormFunction(
         name,
         what,
         cost,
@@ -115,7 +113,7 @@ def kernel_function(
 
 
 def symbols(system: System) -> dict[str, str]:
-    """Return the source in C of each symbol that a kernel may use."""
+    """Return the source in C of each symbol that a function may use."""
     arrays = {"q": "q", "qd": "qd", "qdd": "qdd", "sin": "sine", "cos": "cosine"}
     sources = {
         f"{prefix}{k + 1}": f"{array}[{k} * W + b]"

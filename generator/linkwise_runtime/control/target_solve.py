@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.inertia_solve import ROUNDINGS, Told, warn_of_vague
-from ..answers.namespace import array_of, epsilon_of, hidden, namespace
+from ..answers.namespace import array_of, epsilon_of, is_traced, namespace
 from ..chosen_names import sample_of
 from ..interface import Namespace, Numbers
 from ..targets import ROWS
@@ -18,7 +18,7 @@ SMALL = 1e3
 """Factor of the square root of rounding: where no pivot is less, at least half of the digits are known."""
 
 
-class WantedInertia(NamedTuple):
+class TargetInertia(NamedTuple):
     """Matrix that is solved for, as messages name it."""
 
     singular: str
@@ -30,8 +30,8 @@ class WantedInertia(NamedTuple):
         return ROUNDINGS * (len(ROWS) if self.vague.of_frame else len(self.vague.names))
 
 
-def solved_wanted(
-    about: WantedInertia,
+def solve_target(
+    about: TargetInertia,
     wanted: Numbers,
     force: Numbers,
     natural: Numbers,
@@ -54,7 +54,7 @@ def solved_wanted(
     size = own if positive else xp.maximum(own, natural)
     size = xp.where(size > 0.0, size, xp.ones_like(size)) ** 0.5
     scaled = wanted / (size[..., :, None] * size[..., None, :])
-    if not hidden(wanted):
+    if not is_traced(wanted):
         diagonals = array_of(wanted).diagonal(0, -2, -1), array_of(natural)
         _check(about, array_of(scaled), diagonals, positive, told)
     right = force / size[..., None]
@@ -64,7 +64,7 @@ def solved_wanted(
 
 
 def _check(
-    about: WantedInertia,
+    about: TargetInertia,
     scaled: NDArray[np.floating],
     diagonals: tuple[NDArray[np.floating], NDArray[np.floating]],
     positive: bool,
@@ -94,7 +94,7 @@ def _check(
         warn_of_vague(known, mobility, about.vague)
 
 
-def _refuse(about: WantedInertia, sample: tuple[int, ...], rows: NDArray[np.bool_]) -> None:
+def _refuse(about: TargetInertia, sample: tuple[int, ...], rows: NDArray[np.bool_]) -> None:
     along = ", ".join(about.vague.names[r] for r in np.flatnonzero(rows).tolist())
     raise ValueError(f"{about.singular}{sample_of(sample)}: along {along}")
 
