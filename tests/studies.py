@@ -4,7 +4,7 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 
 import numpy as np
-from linkwise.study.trial_work import TrialOutcome, TrialTask, run_trial
+from linkwise.study.trial import TrialOutcome, TrialTask, run_trial
 from motion_logs import JOINTS, write_csv
 
 HEAD = """schema = 1

@@ -839,7 +839,7 @@ def test_off_the_path_not_even_rounding_passes(tmp_path: Path, monkeypatch: pyte
     write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["numpy"]), package)
     assert marks(package)["numpy: tau_ij = 0 off the path"] == "ok"
     zeros = "np.zeros((*batch, values.shape[-1] + 1), values.dtype)"
-    tables = import_module("linkwise_runtime.answers.packed_tables")
+    tables = import_module("linkwise_runtime.answers.packed")
     change_code(monkeypatch, tables, zeros, f"{zeros} + 1e-18")
     assert marks(package)["numpy: tau_ij = 0 off the path"] == "FAIL"
 

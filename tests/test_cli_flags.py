@@ -12,7 +12,7 @@ from linkwise.analysis.job import Wanted
 from linkwise.analysis.phases import Phase
 from linkwise.cli.app import app
 from linkwise.option import chosen, written
-from linkwise.study.trial_entries import AnalysisKeys
+from linkwise.study.file import AnalysisKeys
 from typer.testing import CliRunner
 
 READING: dict[str, Any] = {

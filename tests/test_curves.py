@@ -19,7 +19,7 @@ from linkwise.analysis.show.page import poses
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 from linkwise.robot.curve import Curve
-from linkwise.robot.readers.osim_functions import piecewise_linear, simm_spline
+from linkwise.robot.readers.osim.functions import piecewise_linear, simm_spline
 
 KNEE = f"{DATA / 'knee.osim'} loops"
 SPLINE = simm_spline((-2.0, -0.5, 0.1, 1.0), (0.3, -0.1, 0.4, 0.9))

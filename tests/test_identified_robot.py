@@ -11,7 +11,7 @@ from conftest import DATA
 from linkwise import LinkwiseError, generate, read_robot, read_system, write_package
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.cli.app import app
-from linkwise.identification.shared_mass import shared_mass
+from linkwise.identification.pseudo_inertia import shared_mass
 from motion_logs import write_csv
 from test_identify import other_bodies, own_parameters, swings
 from typer.testing import CliRunner

@@ -18,10 +18,11 @@ import numpy as np
 import pytest
 from conftest import needs_compiler
 from linkwise.package.load import import_package
-from linkwise_runtime.native import native_build, native_cache, native_compiler, native_process
-from linkwise_runtime.native.native_build import Sources, library
-from linkwise_runtime.native.native_cache import cache_directory, is_whole, locked
-from linkwise_runtime.native.native_library import function
+from linkwise_runtime.native import build, cache, process
+from linkwise_runtime.native import compiler as compilers
+from linkwise_runtime.native.build import Sources, library
+from linkwise_runtime.native.cache import cache_directory, is_whole, locked
+from linkwise_runtime.native.library import function
 
 pytestmark = needs_compiler
 
@@ -153,13 +154,13 @@ def test_c_generated_anew_is_not_mixed_with_the_python_that_was_loaded(
 def test_what_changes_while_it_is_compiled_is_not_kept(
     tiny: Sources, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run_all = native_build.run_all
+    run_all = build.run_all
 
-    def slowly(commands: Sequence[Sequence[str]], tell: native_process.Tell) -> None:
+    def slowly(commands: Sequence[Sequence[str]], tell: process.Tell) -> None:
         run_all(commands, tell)
         tiny.file("double").write_text(TINY.replace("1.0", "2.0"))
 
-    monkeypatch.setattr(native_build, "run_all", slowly)
+    monkeypatch.setattr(build, "run_all", slowly)
     with pytest.raises(RuntimeError, match="tiny was generated anew after it was loaded"):
         library(tiny, "double")
     assert not list(cache_directory().glob("*.so"))
@@ -175,9 +176,9 @@ def test_another_source_compiler_or_processor_has_a_library_of_its_own(
     monkeypatch.setenv("CC", "cc -O1")
     made.append(library(tiny, "double"))
     with monkeypatch.context() as newer:
-        newer.setattr(native_compiler.Compiler, "version", lambda _: "cc 99")
+        newer.setattr(compilers.Compiler, "version", lambda _: "cc 99")
         made.append(library(tiny, "double"))
-    monkeypatch.setattr(native_build, "processor", lambda: "of another machine")
+    monkeypatch.setattr(build, "processor", lambda: "of another machine")
     made.append(library(tiny, "double"))
     assert len(set(made)) == 5
 
@@ -316,8 +317,8 @@ def test_a_compiler_that_does_not_compile_is_named(
     compiler.write_text(script)
     compiler.chmod(mode)
     monkeypatch.setenv("CC", str(compiler))
-    monkeypatch.setattr(native_compiler, "ANSWERS", 0.5)
-    monkeypatch.setattr(native_process, "PATIENCE", 0.5)
+    monkeypatch.setattr(compilers, "ANSWERS", 0.5)
+    monkeypatch.setattr(process, "PATIENCE", 0.5)
     with pytest.raises(RuntimeError, match=message) as error:
         library(tiny, "double")
     assert str(compiler) in one_line(error)
@@ -325,12 +326,12 @@ def test_a_compiler_that_does_not_compile_is_named(
 
 
 def test_files_of_ones_own_and_of_root_are_taken() -> None:
-    assert set(native_cache._trusted()) == {os.getuid(), 0}
+    assert set(cache._trusted()) == {os.getuid(), 0}
 
 
 def test_sources_that_cannot_be_read_are_named(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match=f"^cannot read {tmp_path / 'gone'}: .*; generate it again$"):
-        native_build.digest_of(tmp_path / "gone")
+        build.digest_of(tmp_path / "gone")
 
 
 def test_a_pipe_among_the_sources_is_not_waited_for(tiny: Sources) -> None:
@@ -413,7 +414,7 @@ def test_parts_count_as_they_are_done(tmp_path: Path) -> None:
         (tmp_path / str(heard[-1])).touch()
 
     waiting = "until [ -e {}/{} ]; do sleep 0.02; done"
-    native_process.run_all([["sh", "-c", waiting.format(tmp_path, count)] for count in (2, 0, 1)], tell)
+    process.run_all([["sh", "-c", waiting.format(tmp_path, count)] for count in (2, 0, 1)], tell)
     assert list(dict.fromkeys(heard)) == [0, 1, 2]
 
 
@@ -424,7 +425,7 @@ def test_a_compiler_that_is_given_up_is_ended(
     compiler.write_text(f"{ANSWER}sleep 60 &\necho $! >> {tmp_path}/started\nwait")
     compiler.chmod(0o755)
     monkeypatch.setenv("CC", str(compiler))
-    monkeypatch.setattr(native_process, "PATIENCE", 0.5)
+    monkeypatch.setattr(process, "PATIENCE", 0.5)
     with pytest.raises(RuntimeError, match="not done"):
         library(tiny, "double")
     started = (tmp_path / "started").read_text().split()

@@ -32,7 +32,7 @@ CALLS: dict[str, Callable[..., Any]] = {
 
 
 def module_of(package: ModuleType) -> Any:
-    return import_module("linkwise_runtime.native.native_module")
+    return import_module("linkwise_runtime.native.compiled_calls")
 
 
 @contextmanager

@@ -16,8 +16,8 @@ import pytest
 from answers import random_states, relative_error
 from compiled import name_of
 from conftest import needs_compiler
-from linkwise_runtime.native.native_build import PARTS
-from linkwise_runtime.native.native_compiler import FLAGS, MinGW
+from linkwise_runtime.native.build import PARTS
+from linkwise_runtime.native.compiler import FLAGS, MinGW
 from needed import needs
 
 pytestmark = pytest.mark.ship

@@ -17,11 +17,11 @@ from linkwise import LinkwiseError, generate, read_system
 from linkwise.cli import depfile
 from linkwise.cli.depfile import depfile_text
 from linkwise.emit.assemble import DEVICES, checked_identifier
-from linkwise_runtime.native.native_build import STACK, Sources, library, require_stack
-from linkwise_runtime.native.native_cache import cache_directory, is_whole, locked
-from linkwise_runtime.native.native_compiler import FLAGS, AppleCompiler, find_compiler
-from linkwise_runtime.native.native_process import answer, run_all
-from linkwise_runtime.native.native_system import MacOS, Windows
+from linkwise_runtime.native.build import STACK, Sources, library, require_stack
+from linkwise_runtime.native.cache import cache_directory, is_whole, locked
+from linkwise_runtime.native.compiler import FLAGS, AppleCompiler, find_compiler
+from linkwise_runtime.native.process import answer, run_all
+from linkwise_runtime.native.system import MacOS, Windows
 from other_system import UNFIT, locks
 from search_path import before
 

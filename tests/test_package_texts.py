@@ -63,8 +63,8 @@ FOREIGN: dict[str, tuple[str, str, str, str]] = {
     "a part of the runtime that runs programs": (
         "energies/link_1.py",
         "from typing import Any",
-        "from typing import Any\nfrom linkwise_runtime.native.native_process import run_all",
-        "imports run_all from linkwise_runtime.native.native_process",
+        "from typing import Any\nfrom linkwise_runtime.native.process import run_all",
+        "imports run_all from linkwise_runtime.native.process",
     ),
     "a call between names": ("names.py", "ROBOT = ", "print()\nROBOT = ", "names print"),
     "a comprehension in the tree": ("tree.py", "TREE = ", "[0 for TREE in ()]\nTREE = ", "has ListComp"),

@@ -8,8 +8,7 @@ from command_line import run_linkwise
 from conftest import DATA
 from linkwise import LinkwiseError, kept_package, read_robot
 from linkwise.robot import effects
-from linkwise.robot.readers.osim_document import as_xml
-from linkwise.robot.readers.osim_names import refuse_misspelt_names
+from linkwise.robot.readers.osim.document import as_xml, refuse_misspelt_names
 from urdf_text import chain, joint, link, robot
 
 URDF = chain(joint("ab", "a", "b"), joint("bc", "b", "c", inner='<dynamics damping="1"/>'))

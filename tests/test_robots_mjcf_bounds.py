@@ -10,8 +10,8 @@ import pytest
 from linkwise import LinkwiseError, read_system
 from linkwise.own_process import ProcessLimits
 from linkwise.robot import read_robot
-from linkwise.robot.readers import mjcf
-from linkwise.robot.readers.mjcf_files import mjcf_files
+from linkwise.robot.readers.mjcf import reader
+from linkwise.robot.readers.mjcf.files import mjcf_files
 
 pytest.importorskip("mujoco")
 
@@ -133,7 +133,7 @@ ENDLESS = '<replicate count="30000"><body><joint/><geom size="0.1"/></body></rep
 
 
 def test_compiler_that_does_not_end_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mjcf, "LIMITS", ProcessLimits(1, 1 << 30))
+    monkeypatch.setattr(reader, "LIMITS", ProcessLimits(1, 1 << 30))
     path = written(tmp_path, ground=ENDLESS)
     before = os.times()
     with pytest.raises(
@@ -153,6 +153,6 @@ def test_compiler_that_takes_too_much_memory_is_refused_it(size: str, tmp_path: 
 
 
 def test_compiler_that_crashes_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mjcf, "compile_model", lambda *_: os.kill(os.getpid(), signal.SIGSEGV))
+    monkeypatch.setattr(reader, "compile_model", lambda *_: os.kill(os.getpid(), signal.SIGSEGV))
     with pytest.raises(LinkwiseError, match=r"MuJoCo's compiler does not survive it: it ended .* by SIGSEGV"):
         read_system(written(tmp_path))

@@ -9,9 +9,9 @@ import pytest
 from linkwise import LinkwiseError, Options, generate, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise.robot import effects
-from linkwise.robot.readers.mjcf import TYPES
-from linkwise.robot.readers.mjcf_options import SWITCHED_OFF, SWITCHED_ON, switched_off
-from linkwise.robot.readers.mjcf_unmodelled import ACTING, ARRAYS, COUNTS
+from linkwise.robot.readers.mjcf.forces import SWITCHED_OFF, SWITCHED_ON, switched_off
+from linkwise.robot.readers.mjcf.reader import TYPES
+from linkwise.robot.readers.mjcf.unmodelled import ACTING, ARRAYS, COUNTS
 
 mujoco = pytest.importorskip("mujoco")
 

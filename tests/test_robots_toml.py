@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from linkwise.robot.description import Description
-from linkwise.robot.readers.toml import JOINT, LINK, TOP, read_toml
+from linkwise.robot.readers.toml.reader import JOINT, LINK, TOP, read_toml
 
 PAGE = Path(__file__).parents[1] / "docs/robots.md"
 ROWS = re.findall(r"^\| (\w+) \| `(\w+)` \| `(.+?)` \|", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)

@@ -11,7 +11,7 @@ from answers import relative_error
 from conftest import needs_compiler
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
-from linkwise_runtime.arrays.array_kernels import Crossing, largest_batch
+from linkwise_runtime.arrays.backend import Crossing, largest_batch
 from test_parameters import TOML
 
 torch = pytest.importorskip("torch")

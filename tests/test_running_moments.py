@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from linkwise.study.running_moments import STATISTICS, RunningMoments
+from linkwise.study.summary import STATISTICS, RunningMoments
 
 ROWS = np.random.default_rng(0).normal(size=(3, 1500)) * [[1.0], [1e-3], [20.0]] + [[0.5], [1e4], [-3.0]]
 EXPECTED = {

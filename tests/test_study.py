@@ -15,9 +15,9 @@ from linkwise.analysis.loads import Load
 from linkwise.analysis.settings import Lowpass
 from linkwise.study import run_study
 from linkwise.study.comparisons import compared
-from linkwise.study.study_file import read_study
-from linkwise.study.study_plan import Comparison
-from linkwise.study.trial_summary import TrialSummary
+from linkwise.study.file import read_study
+from linkwise.study.plan import Comparison
+from linkwise.study.summary import TrialSummary
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from studies import CHOICES, CYCLES, HEAD, NAMES, QUICK, TRIALS, Here, write_study

@@ -10,7 +10,7 @@ import pytest
 import urdf_text
 from linkwise import LinkwiseError
 from linkwise.study import run_study
-from linkwise.study.trial_patterns import expanded
+from linkwise.study.patterns import expanded
 from motion_logs import JOINTS
 from studies import CHOICES, CYCLES, HEAD, QUICK, TRIALS, Here, write_study
 

@@ -9,10 +9,10 @@ import pytest
 import urdf_text
 from linkwise import generate, read_system, write_package
 from linkwise.study import run_study
-from linkwise.study.study_file import read_study
-from linkwise.study.study_folder import trial_folders
-from linkwise.study.trial_files import trial_files
-from linkwise.study.trial_ledger import done_before
+from linkwise.study.file import read_study
+from linkwise.study.folder import trial_folders
+from linkwise.study.inputs import trial_files
+from linkwise.study.ledger import done_before
 from motion_logs import write_csv
 from studies import CHOICES, HEAD, QUICK, Here
 
@@ -118,7 +118,7 @@ def test_a_trial_of_another_built_in_robot_is_done_again(tmp_path: Path) -> None
 
 
 def test_a_trial_is_done_again_by_another_linkwise(done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("linkwise.study.trial_key.fingerprint", lambda: "of another")
+    monkeypatch.setattr("linkwise.study.inputs.fingerprint", lambda: "of another")
     assert still_done(done) == ""
 
 

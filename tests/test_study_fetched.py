@@ -8,8 +8,8 @@ from threading import Thread
 
 import pytest
 from linkwise import LinkwiseError
-from linkwise.study import run_study, study_paths
-from linkwise.study.study_paths import opened_here
+from linkwise.study import paths, run_study
+from linkwise.study.paths import opened_here
 from studies import HEAD, Here, write_study
 
 PART = b"#" * (1 << 16)
@@ -90,7 +90,7 @@ def test_a_robot_that_is_said_to_be_too_large_is_not_fetched(flood: Flood) -> No
 def test_of_a_log_no_more_is_fetched_than_its_store_says(
     name: str, told: str, flood: Flood, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study_paths, "UNSAID", 1_000_000)
+    monkeypatch.setattr(paths, "UNSAID", 1_000_000)
     address = f"http://127.0.0.1:{flood.server_port}/{name}"
     with pytest.raises(LinkwiseError) as caught, opened_here(address):
         pass
@@ -114,7 +114,7 @@ class Silent:
 
 
 def test_what_a_store_sends_without_a_word_is_counted_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(study_paths, "_system", lambda path: (Silent(), path))
+    monkeypatch.setattr(paths, "_system", lambda path: (Silent(), path))
     told = "more comes than 10 bytes, as the store says it has"
     with pytest.raises(LinkwiseError, match=told), opened_here("s3://lab/a.csv"):
         pass

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from linkwise.study.band_figure import band_figures
 from linkwise.study.comparisons import Cluster, Compared
-from linkwise.study.running_moments import STATISTICS
-from linkwise.study.study_plan import Comparison, PaperFigure
-from linkwise.study.subject_spread import Spread
-from linkwise.study.trial_summary import TrialSummary
+from linkwise.study.plan import Comparison, PaperFigure
+from linkwise.study.spread import Spread
+from linkwise.study.summary import STATISTICS, TrialSummary
 
 LEVELS = {"slow": [[1.0, 2.0, 3.0], [3.0, 4.0, 8.0]], "fast": [[5.0, 5.0, 5.0], [6.0, 9.0, 5.0]]}
 """Curves of two subjects by condition."""

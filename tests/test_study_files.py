@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 from linkwise.analysis.analysis_choices import AnalysisChoices
-from linkwise.study.study_plan import StudyPlan, Trial
-from linkwise.study.trial_key import trial_key
+from linkwise.study.inputs import trial_key
+from linkwise.study.plan import StudyPlan, Trial
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from linkwise import LinkwiseError
 from linkwise.study import ProcessPool, run_study
-from linkwise.study.study_folder import held_study
-from linkwise.study.trial_work import TrialOutcome, TrialTask
+from linkwise.study.folder import held_study
+from linkwise.study.trial import TrialOutcome, TrialTask
 from search_path import before
 from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
 

@@ -191,7 +191,7 @@ def test_numbers_have_the_digits_by_which_they_differ(
         tests, told = compared(*given)
         return [replace(test, clusters=(part,)) for test in tests], told
 
-    monkeypatch.setattr("linkwise.study.study_results.compared", of_that_part)
+    monkeypatch.setattr("linkwise.study.results.compared", of_that_part)
     compare = f"{COMPARE}alpha = {alpha}\n"
     file = write_study(tmp_path, HEAD, QUICK, CHOICES, CYCLES, compare, TRIALS, subjects=3, trials=1)
     run_study(file, tmp_path / "out", Here())

@@ -3,8 +3,7 @@
 import pytest
 from linkwise import LinkwiseError
 from linkwise.own_process import ProcessLimits, in_own_process
-from linkwise.study.column_patterns import fitting
-from linkwise.study.path_fields import FieldedPath
+from linkwise.study.patterns import FieldedPath, fitting
 
 NAMES = ["tau/knee", "tau/knee/foot", "q/knee", "a" * 60, "a/" * 30]
 

@@ -11,9 +11,9 @@ from linkwise import LinkwiseError
 from linkwise.study import run_study
 from linkwise.study.band_figure import band_figures
 from linkwise.study.comparisons import Compared, compared
-from linkwise.study.study_plan import Comparison, PaperFigure
-from linkwise.study.subject_spread import spread, values_of
-from linkwise.study.trial_summary import TrialSummary
+from linkwise.study.plan import Comparison, PaperFigure
+from linkwise.study.spread import spread, values_of
+from linkwise.study.summary import TrialSummary
 from scipy import stats
 from studies import CHOICES, HEAD, QUICK, Here, write_study
 

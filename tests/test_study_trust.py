@@ -18,8 +18,8 @@ from linkwise import LinkwiseError, generate, kept_package, read_system, write_p
 from linkwise.errors import LinkwiseWarning
 from linkwise.progress import silent
 from linkwise.study import run_study
-from linkwise.study.study_file import read_study
-from linkwise.study.study_robots import check_robots
+from linkwise.study.file import read_study
+from linkwise.study.robots import check_robots
 from studies import CHOICES, HEAD, QUICK, TRIALS, Here, write_study
 
 ENERGIES = (DATA / "cart_pendulum.py").read_text()

@@ -119,7 +119,7 @@ def test_what_cancelling_leaves_is_not_shown(
         system = energy_system("slide", [RX, y], [LinkEnergy("a", 1.3 * sum(v**2 for v in rates) / 2, 0)])
     small = re.compile("e-1[4-9]|e-[2-9]")
     assert not small.search(generate(system, ["formulas"])["formulas.txt"])
-    monkeypatch.setattr("linkwise.emit.residue.ROUNDING", 0.0)
+    monkeypatch.setattr("linkwise.emit.formulas.ROUNDING", 0.0)
     assert small.search(generate(system, ["formulas"])["formulas.txt"])
 
 

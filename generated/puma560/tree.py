@@ -4,7 +4,7 @@ linkwise_runtime/rule/joint_tree.py says what each entry means.
 """
 
 from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame, TreeJoint, TreeLink
-from linkwise_runtime.rule.rule_calls import RigidRule
+from linkwise_runtime.rule.calls import RigidRule
 
 TREE = JointTree(
     gravity=(0.0, 0.0, -9.81),

@@ -14,7 +14,7 @@ from linkwise_runtime.version import require
 
 require("0.1.0")
 
-from linkwise_runtime.arrays.array_backend import ArrayBackend
+from linkwise_runtime.arrays.backend import ArrayBackend, refuse_choice, refuse_learning
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.quantities import (
     AppliedLoad,
@@ -129,7 +129,6 @@ def _numpy(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: A
     from .forms import LINKS
     from linkwise_runtime.arrays.numpy_backend import NumpyBackend
     from .tree import RULE
-    from linkwise_runtime.arrays.array_kernels import refuse_learning
 
     refuse_learning("numpy", requires_grad)
     return NumpyBackend(ROBOT, LINKS, values, RULE, kernel, bodies)
@@ -139,7 +138,6 @@ def _torch(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: A
     from .forms import LINKS
     from linkwise_runtime.arrays.torch_backend import TorchBackend
     from .tree import RULE
-    from linkwise_runtime.arrays.array_kernels import refuse_learning
 
     refuse_learning("torch", requires_grad)
     return TorchBackend(ROBOT, LINKS, values, RULE, kernel, bodies)
@@ -149,7 +147,6 @@ def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad
     from .energies import LAGRANGIANS
     from linkwise_runtime.lagrangians.dynamics_module import backend_of_links
     from .tree import RULE
-    from linkwise_runtime.arrays.array_kernels import refuse_choice
 
     refuse_choice("autograd", kernel, bodies)
     return backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad, RULE)
@@ -158,10 +155,8 @@ def _autograd(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad
 def _native(values: Mapping[str, Any], kernel: str, bodies: Any, requires_grad: Any) -> ArrayBackend:
     from pathlib import Path
     from .forms import LINKS
-    from linkwise_runtime.native.native_backend import NativeBackend
+    from linkwise_runtime.native.backend import NativeBackend
     from .tree import RULE
-    from linkwise_runtime.arrays.array_kernels import refuse_choice
-    from linkwise_runtime.arrays.array_kernels import refuse_learning
 
     refuse_choice("native", kernel, bodies)
     refuse_learning("native", requires_grad)

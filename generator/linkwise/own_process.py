@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from linkwise_runtime.native.native_system import system_here
+from linkwise_runtime.native.system import system_here
 
 T = TypeVar("T")
 

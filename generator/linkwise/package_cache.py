@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from linkwise_runtime.native.native_cache import ELSEWHERE, cache_directory, locked
+from linkwise_runtime.native.cache import ELSEWHERE, cache_directory, locked
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed

@@ -18,7 +18,7 @@ from typing import Any, Literal, overload
 from numpy.typing import ArrayLike
 
 from .arguments import Beside, check_numbers
-from .arrays.array_backend import ArrayBackend
+from .arrays.backend import ArrayBackend
 from .call_table import CALLS
 from .constraints.robot_constraints import Constraints, constraints_of
 from .control.controllers import Cancellation, PartialImpedance, cancellation, partial_impedance

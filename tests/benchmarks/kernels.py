@@ -43,7 +43,7 @@ def compiled(case: Case, kernel: str, work: Path) -> tuple[Path, dict[str, int],
     chosen = ["--kernel", kernel, "--backend", "native", "--name", name, "--out", str(work)]
     subprocess.run([*command, *chosen], check=True, capture_output=True)
     generated = time.perf_counter() - start
-    build = importlib.import_module("linkwise_runtime.native.native_build")
+    build = importlib.import_module("linkwise_runtime.native.build")
     start = time.perf_counter()
     library = build.library(build.Sources(name, work / name / "c"), "double")
     took = time.perf_counter() - start

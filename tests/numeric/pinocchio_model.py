@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from linkwise.robot.readers.urdf import read_urdf
+from linkwise.robot.readers.urdf.reader import read_urdf
 
 BASE = {
     "base_x": pin.JointModelPX,

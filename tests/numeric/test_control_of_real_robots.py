@@ -12,7 +12,7 @@ from conftest import needs_compiler
 from impedance_in_c import frame_struct, joint_struct, left_jacobian, pointer_to, rotation_vector
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.manifest import Manifest
-from linkwise_runtime.passive_joints import passive_sums
+from linkwise_runtime.structure import passive_sums
 
 pytest.importorskip("pinocchio")
 

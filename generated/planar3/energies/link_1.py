@@ -10,7 +10,7 @@ from typing import Any
 from linkwise_runtime.lagrangians.energy_interface import Parameters, Values
 from linkwise_runtime.lagrangians.frame_motion import GROUND, Axes, along_z, potential_at, velocity_at
 from linkwise_runtime.lagrangians.lanes import carried
-from linkwise_runtime.lagrangians.rigid_lagrangian import RigidLagrangian, kinetic_energy
+from linkwise_runtime.lagrangians.partial_lagrangian import RigidLagrangian, kinetic_energy
 
 LINK = 'link1'
 

@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from linkwise_runtime.native.native_system import system_here
+from linkwise_runtime.native.system import system_here
 
 from linkwise.package.load import Array
 

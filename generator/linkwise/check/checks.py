@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
-from linkwise_runtime.native.native_build import PARTS, Sources, library
-from linkwise_runtime.native.native_system import system_here
+from linkwise_runtime.native.build import PARTS, Sources, library
+from linkwise_runtime.native.system import system_here
 
 from linkwise.check.as_generated import check_files, check_made, check_manifest, check_texts
 from linkwise.check.back_end_checks import CHECKS

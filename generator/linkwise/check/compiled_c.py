@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from linkwise_runtime.native.native_build import require_stack
-from linkwise_runtime.native.native_compiler import Compiler, find_compiler
-from linkwise_runtime.native.native_process import run_all
-from linkwise_runtime.native.native_system import system_here
+from linkwise_runtime.native.build import require_stack
+from linkwise_runtime.native.compiler import Compiler, find_compiler
+from linkwise_runtime.native.process import run_all
+from linkwise_runtime.native.system import system_here
 from numpy.typing import NDArray
 
 from linkwise.errors import LinkwiseError

@@ -28,7 +28,7 @@ from linkwise.report import (
     study_files,
 )
 from linkwise.robot import DESCRIPTIONS, Options, read_robot
-from linkwise.robot.size import MOST_JOINTS
+from linkwise.robot.coordinates import MOST_JOINTS
 from linkwise.symbolic.system import System, rigid_system
 
 CHECKED_TO = 14

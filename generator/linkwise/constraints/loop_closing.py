@@ -4,14 +4,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from linkwise_runtime.constraints.closed_places import open_by
-from linkwise_runtime.constraints.closing_search import (
+from linkwise_runtime.constraints.chosen_constraints import (
     TRIES,
     Closing,
     TieEquations,
     best_closing,
     random_starts,
 )
+from linkwise_runtime.constraints.closed_places import open_by
 from linkwise_runtime.constraints.held_frames import held_by
 from linkwise_runtime.rule.joint_tree import (
     JointTree,

@@ -174,7 +174,7 @@ BACKENDS: dict[str, BackendFiles] = {
             "the C code, compiled by this system's compiler",
             emits=(_tree,),
             loading=Loading(
-                "native.native_backend",
+                "native.backend",
                 'NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values, RULE)',
                 ("from pathlib import Path",),
                 speed=1,

@@ -1,13 +1,15 @@
-"""Closed forms to read: each τ_ij, fully expanded, as text and LaTeX, for robots small enough to read."""
+"""Closed forms to read: each τ_ij, fully expanded, as text and LaTeX, for robots small enough to read.
 
-from collections.abc import Callable, Iterable, Iterator
+What cancelling leaves in sums of rounded numbers, such as in sin² + cos² − 1, is removed.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
 import sympy as sp
 from sympy.simplify.fu import TR8
 
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.formula_page import formula_page
-from linkwise.emit.residue import without_residue
 from linkwise.expression.from_sympy import SYMPY_FUNCTIONS
 from linkwise.package.formula_symbols import MOTION, FormulaSymbol, motion_symbol, parameter_symbols
 from linkwise.symbolic.chain_rule import partial_torques
@@ -20,6 +22,9 @@ EXACT = 17
 """Digits that hold every float."""
 READABLE = (sp.Rational, sp.Float, type(sp.pi), type(sp.E), sp.Add, sp.Mul, sp.Pow, *SYMPY_FUNCTIONS)
 """Types that a number may be made of for readers of Python and of LaTeX to know it."""
+
+ROUNDING = 1e-12
+"""Share of the largest coefficient below which a coefficient is rounding."""
 
 
 def too_many_to_read(system: System) -> str:
@@ -89,3 +94,45 @@ def _latex_names(system: System, parameters: Iterable[FormulaSymbol]) -> dict[sp
     """Return the LaTeX of every symbol."""
     motion = [motion_symbol(kind, k) for kind in MOTION for k in range(1, len(system.coordinates) + 1)]
     return {sp.Symbol(symbol.text): symbol.latex for symbol in (*motion, *parameters)}
+
+
+def without_residue(
+    terms: Sequence[sp.Expr], bounded: Collection[sp.Symbol], values: Mapping[sp.Symbol, sp.Float]
+) -> Iterator[sp.Expr]:
+    """Yield the terms that are not negligible: those whose number is small beside others' are dropped.
+
+    A number gives the size of sines, cosines and powers of `bounded` symbols alone. Whatever else a term
+    holds, as exp(15 q) or 1/q, may have any size: the term is compared with others of the same factor, and
+    stays where there are none. Parameters may get other values than they have: what is dropped is small both
+    without them, as if all of them were one, and with their `values`.
+    """
+    weighed = [(term, *_weighed(term, bounded, values)) for term in terms]
+    largest: dict[sp.Expr, tuple[sp.Expr, sp.Expr]] = {}
+    for _, apart, number, size in weighed:
+        known = largest.get(apart, (0, 0))
+        largest[apart] = max(known[0], number), max(known[1], size)
+    for term, apart, number, size in weighed:
+        most = largest[apart]
+        if number > ROUNDING * most[0] or size > ROUNDING * most[1]:
+            yield term
+
+
+def _weighed(
+    term: sp.Expr, bounded: Collection[sp.Symbol], values: Mapping[sp.Symbol, sp.Float]
+) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """Return factors of any size, the coefficient, and this times the factors of parameters alone."""
+    number, rest = term.as_coeff_Mul()
+    size, apart = number, sp.S.One
+    for factor in sp.Mul.make_args(rest):
+        if factor.free_symbols <= values.keys():
+            size *= factor.xreplace(values)
+        elif not _is_bounded(factor, bounded):
+            apart *= factor
+    size = abs(sp.N(size))
+    return apart, abs(number), size if size.is_comparable else sp.S.Zero
+
+
+def _is_bounded(factor: sp.Expr, bounded: Collection[sp.Symbol]) -> bool:
+    base, exponent = factor.as_base_exp()
+    whole = exponent.is_Integer and exponent > 0
+    return bool(whole and (base in bounded or isinstance(base, (sp.sin, sp.cos))))

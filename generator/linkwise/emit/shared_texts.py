@@ -75,10 +75,15 @@ def init_text(
         return render("package/face.py.j2", {"version": VERSION})
     fastest_first = sorted(loadable.items(), key=lambda item: item[1].speed)
     makers = [Maker.of(backend, loading, rigid, kernel) for backend, loading in loadable.items()]
+    refused = {
+        "refuse_choice": any(not maker.chooses for maker in makers),
+        "refuse_learning": any(not maker.learns for maker in makers),
+    }
     view = {
         "version": VERSION,
         "package": package,
         "default": next(backend.name for backend in loadable),
+        "refusals": [name for name, is_needed in refused.items() if is_needed],
         "makers": makers,
         "own_faces": [maker for maker in makers if maker.face != "Dynamics"],
         "choosing": [backend.name for backend, loading in loadable.items() if loading.chooses],

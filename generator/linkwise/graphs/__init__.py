@@ -7,8 +7,7 @@ A generated package records them (`Dynamics.graph`); here `overlay` joins the gr
 from linkwise.graphs.dot_text import dot_text
 from linkwise.graphs.folding import FOLDS, folded
 from linkwise.graphs.graph_files import FORMATS, graph_files, graph_json
-from linkwise.graphs.graph_summary import graph_summary
-from linkwise.graphs.overlay import Overlay, overlay, part_label
+from linkwise.graphs.overlay import Overlay, graph_summary, overlay, part_label
 
 __all__ = [
     "FOLDS",

@@ -11,8 +11,7 @@ import numpy as np
 from linkwise_runtime.rule.joint_tree import TreeFrame
 
 from linkwise.errors import LinkwiseError
-from linkwise.identification.pseudo_inertia import central_of, pseudo_inertia, pseudo_inertia_of
-from linkwise.identification.shared_mass import shared_mass
+from linkwise.identification.pseudo_inertia import central_of, pseudo_inertia, pseudo_inertia_of, shared_mass
 from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array
 from linkwise.robot.description import Body, Description

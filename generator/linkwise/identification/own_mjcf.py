@@ -11,8 +11,8 @@ from linkwise.identification.own_file import Friction, LinkMass, NotWrittenBack,
 from linkwise.identification.placed_xml import Edit, PlacedXml, tag
 from linkwise.package.load import Array
 from linkwise.robot.description import Body
-from linkwise.robot.readers.mjcf import body_name, joint_name, read_mjcf
-from linkwise.robot.readers.mjcf_files import mjcf_files
+from linkwise.robot.readers.mjcf.files import mjcf_files
+from linkwise.robot.readers.mjcf.reader import body_name, joint_name, read_mjcf
 
 AXES = ("fullinertia", "quat", "axisangle", "euler", "xyaxes", "zaxis")
 """Attributes of <inertial> that `diaginertia` and `quat` replace."""

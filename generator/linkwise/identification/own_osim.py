@@ -5,9 +5,8 @@ from xml.etree.ElementTree import Element
 
 from linkwise.identification.own_file import Friction, LinkMass, OwnFile
 from linkwise.identification.placed_xml import Edit, PlacedXml
-from linkwise.robot.readers.osim import ENTRIES
-from linkwise.robot.readers.osim_document import as_xml, members
-from linkwise.robot.readers.osim_elements import name_of
+from linkwise.robot.readers.osim.document import as_xml, members, name_of
+from linkwise.robot.readers.osim.reader import ENTRIES
 
 
 class OwnOsim(OwnFile):

@@ -8,7 +8,7 @@ import numpy as np
 from linkwise.identification.own_file import Friction, LinkMass, OwnFile
 from linkwise.identification.own_urdf import moments
 from linkwise.identification.placed_xml import Edit, PlacedXml
-from linkwise.robot.readers.sdf_poses import pose_in
+from linkwise.robot.readers.sdf.poses import pose_in
 
 
 class OwnSdf(OwnFile):

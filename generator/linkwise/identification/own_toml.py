@@ -9,8 +9,8 @@ from linkwise.escape import listed
 from linkwise.extras import extra
 from linkwise.identification.own_file import Friction, LinkMass, NotWrittenBack, OwnFile
 from linkwise.package.load import Array
-from linkwise.robot.readers.toml import INERTIA
-from linkwise.robot.readers.toml_table import toml_data
+from linkwise.robot.readers.toml.reader import INERTIA
+from linkwise.robot.readers.toml.table import toml_data
 
 KEYS = ("mass", "com", "inertia")
 TABLE = re.compile(r"^(?=[ \t]*\[\[)", re.MULTILINE)

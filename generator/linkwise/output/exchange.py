@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-from linkwise_runtime.native.native_system import system_here
+from linkwise_runtime.native.system import system_here
 
 from linkwise.output.workplace import OLD, REST
 

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from linkwise_runtime.native.native_system import system_here
+from linkwise_runtime.native.system import system_here
 
 PREFIX = ".linkwise-"
 RANDOM = 8

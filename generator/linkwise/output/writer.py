@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from linkwise_runtime.native.native_system import system_here
+from linkwise_runtime.native.system import system_here
 
 from linkwise.errors import LinkwiseError
 from linkwise.input_file import kind_of

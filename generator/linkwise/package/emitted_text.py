@@ -55,12 +55,11 @@ ARITHMETIC = Grammar(
     imports=_table(
         "math: inf;typing: Any;collections.abc: Mapping;RUN.interface: ClosedForms"
         ";RUN.lagrangians.energy_interface: Parameters Values"
-        ";RUN.lagrangians.partial_lagrangian: PartialLagrangian"
+        ";RUN.lagrangians.partial_lagrangian: PartialLagrangian RigidLagrangian kinetic_energy"
         ";RUN.lagrangians.frame_motion: GROUND Axes JointCurve along_z potential_at velocity_at"
         ";RUN.lagrangians.lanes: carried"
-        ";RUN.lagrangians.rigid_lagrangian: RigidLagrangian kinetic_energy;RUN.file_joints: FileJoint"
-        ";RUN.parameter_values: ParametricBody;RUN.passive_joints: PassiveJoint"
-        ";RUN.structure: JointLimits Structure;RUN.rule.rule_calls: RigidRule"
+        ";RUN.file_joints: FileJoint;RUN.parameter_values: ParametricBody"
+        ";RUN.structure: JointLimits PassiveJoint Structure;RUN.rule.calls: RigidRule"
         ";RUN.rule.joint_tree: JointTree TreeCoupling TreeCurve TreeFrame TreeJoint TreeLink TreeTie"
     ),
     whole={"torch": "torch", "numpy": "np"},
@@ -80,14 +79,14 @@ LOADING = Grammar(
         "typing: TYPE_CHECKING Any Literal overload;collections.abc: Callable Iterable Mapping"
         ";pathlib: Path;names: ROBOT;tree: RULE;forms: LINKS;energies: LAGRANGIANS"
         ";RUN.version: require;RUN.targets: FrameImpedance Natural Target;RUN.dynamics: Dynamics"
-        ";RUN.arrays.array_backend: ArrayBackend;RUN.structure: Layout;RUN.rule.joint_tree: Bodies"
+        ";RUN.arrays.backend: ArrayBackend refuse_choice refuse_learning"
+        ";RUN.structure: Layout;RUN.rule.joint_tree: Bodies"
         ";RUN.quantities: AppliedLoad Coefficients Contact GradientPropagation InducedAccelerations Packed"
         " PassiveTorque Propagation Trajectory"
         ";RUN.rule.regressors: inertial_parameters"
         ";RUN.lagrangians.dynamics_module: DynamicsModule backend_of_links"
-        ";RUN.arrays.array_kernels: refuse_choice refuse_learning"
         ";RUN.arrays.numpy_backend: NumpyBackend;RUN.arrays.torch_backend: TorchBackend"
-        ";RUN.native.native_backend: NativeBackend"
+        ";RUN.native.backend: NativeBackend"
     ),
     whole={},
     builtins=frozenset(("tuple", "type", "bool", "str", "dict", "ValueError")),

@@ -5,23 +5,26 @@ from dataclasses import replace
 import sympy as sp
 
 from linkwise.errors import LinkwiseError
-from linkwise.robot.constrained import check_constraints, remaining_constraints
-from linkwise.robot.coordinates import AxisRule, movement
+from linkwise.robot.constraints import check_constraints, remaining_constraints
+from linkwise.robot.coordinates import AxisRule, check_joints, movement
 from linkwise.robot.description import Connection, Description
-from linkwise.robot.following_joints import followers
 from linkwise.robot.joint_types import Axis, expand, expansion_notes, named_pose
-from linkwise.robot.limits import check_locks, coordinate_limits
+from linkwise.robot.joints import (
+    check_locks,
+    checked_passive,
+    coordinate_limits,
+    followers,
+    moving_joints,
+    passive_axes,
+    passive_notes,
+)
 from linkwise.robot.links import moving_links
 from linkwise.robot.mass import check_bodies
 from linkwise.robot.mass_matrix import check_mass_matrix
-from linkwise.robot.moving_joints import moving_joints
-from linkwise.robot.naming import Named, Naming
 from linkwise.robot.notes import FREE, Note
 from linkwise.robot.options import Options
-from linkwise.robot.parameters import numeric
-from linkwise.robot.passive import checked_passive, passive_axes, passive_notes
+from linkwise.robot.parameters import Named, Naming, numeric
 from linkwise.robot.robot import Frame, Link, Parameter, Robot, Scalar, unusable
-from linkwise.robot.size import check_joints
 from linkwise.robot.ties import anchor_frames, tied_places
 from linkwise.robot.tree import check_loops, cut, depth_first
 

@@ -7,8 +7,8 @@ from linkwise.robot.coordinates import AxisRule
 from linkwise.robot.description import IDENTITY, ZERO3, Body, Connection, Site
 from linkwise.robot.joint_types import Axis
 from linkwise.robot.mass import Placed, merge
-from linkwise.robot.naming import Naming
 from linkwise.robot.notes import Note
+from linkwise.robot.parameters import Naming
 from linkwise.robot.robot import Frame, Joint, Link, Rotation, Vec3
 
 

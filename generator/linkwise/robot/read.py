@@ -11,21 +11,22 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import is_file, require_file
 from linkwise.robot.build import build
 from linkwise.robot.builtin.planar import planar
-from linkwise.robot.constrained import check_constraints
+from linkwise.robot.constraints import check_constraints
+from linkwise.robot.coordinates import MOST_JOINTS
 from linkwise.robot.description import Description
 from linkwise.robot.options import Options
 from linkwise.robot.parameters import numeric
-from linkwise.robot.readers import osim_document, toml_table
-from linkwise.robot.readers.mjcf import read_mjcf
-from linkwise.robot.readers.mjcf_files import mjcf_files
-from linkwise.robot.readers.osim import read_osim
-from linkwise.robot.readers.sdf import read_sdf
-from linkwise.robot.readers.toml import read_toml
-from linkwise.robot.readers.toml_constraints import with_constraint_file
-from linkwise.robot.readers.urdf import read_urdf, root_tag
+from linkwise.robot.readers.mjcf.files import mjcf_files
+from linkwise.robot.readers.mjcf.reader import read_mjcf
+from linkwise.robot.readers.osim import document
+from linkwise.robot.readers.osim.reader import read_osim
+from linkwise.robot.readers.sdf.reader import read_sdf
+from linkwise.robot.readers.toml import table
+from linkwise.robot.readers.toml.constraints import with_constraint_file
+from linkwise.robot.readers.toml.reader import read_toml
+from linkwise.robot.readers.urdf.reader import read_urdf, root_tag
 from linkwise.robot.readers.xml_file import LARGEST, XACRO
 from linkwise.robot.robot import Robot
-from linkwise.robot.size import MOST_JOINTS
 
 Reader: TypeAlias = Callable[[Path], Description]
 XML: dict[str, Reader] = {"mujoco": read_mjcf, "sdf": read_sdf}
@@ -47,7 +48,7 @@ READERS: dict[str, Reader] = {
 }
 """Readers of files, by the end of the file's name."""
 
-MOST_BYTES = {".toml": toml_table.LARGEST, ".osim": osim_document.LARGEST}
+MOST_BYTES = {".toml": table.LARGEST, ".osim": document.LARGEST}
 """Largest size in bytes, by the end of the name, of files with a limit other than that of most XML."""
 
 FILES = ("puma560", "torso")

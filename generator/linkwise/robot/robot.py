@@ -11,8 +11,8 @@ from linkwise_runtime.rule.joint_tree import TreeTie
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.curve import Curve
+from linkwise.robot.display import description_table, link_table
 from linkwise.robot.notes import Note
-from linkwise.robot.robot_display import description_table, link_table
 
 Scalar: TypeAlias = float | sp.Expr
 """A number, or a SymPy expression in named parameters."""

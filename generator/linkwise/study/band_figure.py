@@ -10,11 +10,11 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names
 from linkwise.extras import extra
 from linkwise.plotstyle import INK, colour, dash, drawn, saved, styled
-from linkwise.study.column_patterns import fitting
 from linkwise.study.comparisons import Compared
-from linkwise.study.study_plan import PaperFigure
-from linkwise.study.subject_spread import Spread, columns_of_trials, spread, values_of
-from linkwise.study.trial_summary import TrialSummary
+from linkwise.study.patterns import fitting
+from linkwise.study.plan import PaperFigure
+from linkwise.study.spread import Spread, columns_of_trials, spread, values_of
+from linkwise.study.summary import TrialSummary
 
 MOST = 12
 """Most panels of a figure."""

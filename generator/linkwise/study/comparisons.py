@@ -11,10 +11,10 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.escape import one_line
 from linkwise.extras import extra
 from linkwise.package.load import Array
-from linkwise.study.column_patterns import fitting
-from linkwise.study.study_plan import Comparison
-from linkwise.study.subject_spread import Spread, columns_of_trials, spread, values_of
-from linkwise.study.trial_summary import TrialSummary
+from linkwise.study.patterns import fitting
+from linkwise.study.plan import Comparison
+from linkwise.study.spread import Spread, columns_of_trials, spread, values_of
+from linkwise.study.summary import TrialSummary
 
 FEWEST = 3
 """Fewest subjects on a side that a test needs."""

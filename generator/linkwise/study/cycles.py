@@ -1,9 +1,13 @@
-"""Cycles of a trial, such as gait cycles: where each begins and ends, and its samples over 0 to 100 %."""
+"""Cycles of a trial, such as gait cycles: where each begins and ends, and its samples over 0 to 100 %.
+
+They are taken as samples arrive; at the end there are their mean and deviation.
+"""
 
 import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +19,10 @@ from linkwise.analysis.logs.log_checks import named_once
 from linkwise.errors import LinkwiseError, within
 from linkwise.extras import extra
 from linkwise.package.load import Array
-from linkwise.study.study_paths import opened_here
-from linkwise.study.study_plan import Cycles
+from linkwise.study.ledger import CURVES
+from linkwise.study.paths import opened_here
+from linkwise.study.plan import Cycles, StudyPlan
+from linkwise.study.summary import RunningMoments
 
 AT_ONCE = 1 << 18
 MARGIN = 3
@@ -134,3 +140,34 @@ class CycleSink:
             self.take(self._next, spline(np.linspace(start, end, self.points)))
             self._next += 1
         self._kept = [there.copy()]
+
+
+class TrialCycles:
+    """Receiver of samples that passes each cycle to `write`, with its number; none without cycles."""
+
+    def __init__(self, plan: StudyPlan, job: Job, write: Callable[[int, Array], None]) -> None:
+        self._write, self._names = write, [column.name for column in job.columns]
+        self._points = 0 if plan.cycles is None else plan.cycles.points
+        self._moments = RunningMoments(len(self._names) * self._points)
+        with within(job.source):
+            spans = [] if plan.cycles is None else cycle_spans(plan.cycles, job, plan.trials[0].name)
+        self.sink = CycleSink(spans, self._points, self._take)
+
+    @property
+    def count(self) -> int:
+        """Number of cycles so far."""
+        return self._moments.count
+
+    def _take(self, number: int, rows: Array) -> None:
+        self._write(number, rows)
+        shifted = rows.copy()
+        shifted[0] -= rows[0, 0]  # time, from the beginning of the cycle
+        self._moments(shifted.reshape(-1, 1))
+
+    def finish(self, draft: Path) -> None:
+        """Take the remaining cycles, and write the curves."""
+        if not self._points:
+            return
+        self.sink.finish()
+        curves = self._moments.table.reshape(-1, len(self._names), self._points)
+        np.savez(draft / CURVES, curves=curves[:2], names=self._names, cycles=self.count)

@@ -22,7 +22,7 @@ from multiprocessing.connection import Connection, wait
 from types import ModuleType
 
 from linkwise.output.workplace import ENDING, signals_held
-from linkwise.study.trial_work import TrialOutcome, TrialTask, run_trial
+from linkwise.study.trial import TrialOutcome, TrialTask, run_trial
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Variables that keep libraries from threads of their own: there is a process for every core."""

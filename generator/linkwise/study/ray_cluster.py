@@ -13,7 +13,7 @@ from typing import Any
 
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
-from linkwise.study.trial_work import TrialOutcome, TrialTask, run_trial
+from linkwise.study.trial import TrialOutcome, TrialTask, run_trial
 
 RETRIES = 3
 """Number of times that a trial is restarted after its worker or node died."""

@@ -12,8 +12,8 @@ import sympy as sp
 
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import short
+from linkwise.robot.coordinates import check_joints
 from linkwise.robot.robot import Coordinate, unusable
-from linkwise.robot.size import check_joints
 from linkwise.symbolic.passed_over import refuse_passed_over
 from linkwise.symbolic.system import EnergySystem, LinkEnergy
 

@@ -7,14 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from ..call_table import CALLS, PACKED
-from ..interface import Numbers
-from ..packed_engine import PackedEngine
-from ..passive_joints import passive_torques
+from ..interface import Numbers, is_traced, namespace, side_by_side
 from ..robot_axes import axes_of
-from ..structure import Structure
+from ..structure import Structure, passive_torques
 from .inertia_solve import solve_inertia
-from .namespace import is_traced, namespace, side_by_side
-from .packed_tables import PackedTables
+from .packed import PackedEngine, PackedTables
 
 AT_ONCE = 1 << 22
 """Most packed numbers of a chunk of samples, each at n unit velocities, or of one sample at some of them."""

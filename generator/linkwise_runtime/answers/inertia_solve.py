@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..chosen_names import listed, sample_of
-from ..interface import Numbers
-from .namespace import NUMPY, array_of, epsilon_of, is_traced, kind_of, namespace
+from ..interface import NUMPY, Numbers, array_of, epsilon_of, is_traced, kind_of, namespace
 
 if TYPE_CHECKING:
     from torch import Tensor  # type: ignore[import-not-found, unused-ignore]

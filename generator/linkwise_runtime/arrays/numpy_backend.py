@@ -20,11 +20,10 @@ from ..arguments import (
 )
 from ..interface import ClosedForms, EnergyForms, Entries, Namespace, Numbers
 from ..parameter_values import fits
+from ..rule.calls import RigidRule
 from ..rule.joint_tree import Bodies
-from ..rule.rule_calls import RigidRule
 from ..structure import Structure
-from .array_backend import ArrayBackend
-from .array_kernels import Crossing
+from .backend import ArrayBackend, Crossing
 
 Dtype = np.dtype[np.floating]
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
@@ -34,7 +33,7 @@ CROSSINGS = {
     "torque": Crossing(618, ((618, 32), (1441, 64), (1985, 128), (21901, 256))),
     "position_gradient": Crossing(1217, ((1217, 32), (2044, 64), (4990, 128), (29453, 512))),
 }
-"""Limits up to which the rule is faster, see `array_kernels`."""
+"""Limits up to which the rule is faster, see `Crossing`."""
 MATRICES = 128
 """Links times samples up to which the rule is faster in spatial matrices than with samples innermost."""
 

@@ -25,11 +25,10 @@ from ..arguments import (
 )
 from ..interface import ClosedForms, EnergyForms, Entries, Namespace, Numbers
 from ..parameter_values import fits
+from ..rule.calls import RigidRule
 from ..rule.joint_tree import Bodies, JointTree
-from ..rule.rule_calls import RigidRule
 from ..structure import Structure
-from .array_backend import ArrayBackend
-from .array_kernels import Crossing
+from .backend import ArrayBackend, Crossing
 from .torch_modules import CallModule, ReloadableRobot
 
 KINDS = {"float32": torch.float32, "float64": torch.float64}
@@ -39,7 +38,7 @@ CROSSINGS = {
     "torque": Crossing(618, ((618, 256), (1985, 512), (21901, 1024))),
     "position_gradient": Crossing(1217, ((1217, 128), (2044, 256), (4990, 512), (12905, 1024))),
 }
-"""Limits up to which the rule is faster on a processor, see `array_kernels`; elsewhere it always is."""
+"""Limits up to which the rule is faster on a processor, see `Crossing`; elsewhere it always is."""
 MATRICES = 128
 """Links times samples up to which the rule is faster in spatial matrices than with samples innermost."""
 

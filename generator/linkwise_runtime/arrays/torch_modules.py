@@ -12,7 +12,7 @@ from torch import Tensor
 from ..chosen_names import short
 from ..interface import Numbers
 from ..rule.joint_tree import Bodies
-from .array_backend import ArrayBackend
+from .backend import ArrayBackend
 
 MOTION = {"q", "qd", "qdd", "tau"}
 """Arguments of shape (..., n)."""

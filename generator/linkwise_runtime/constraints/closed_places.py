@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
-from ..answers.namespace import array_of, is_traced, namespace
 from ..chosen_names import plain, sample_of
-from ..interface import Numbers
+from ..interface import Numbers, array_of, is_traced, namespace
 from ..rule.kinematics import gather
-from .closing_search import OPEN
+from .chosen_constraints import OPEN
 from .independent_joints import JointColumns, check_factors, check_following, row_sizes
 from .tie_rows import RowsAt, TieRows
 

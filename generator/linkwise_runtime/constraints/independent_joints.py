@@ -1,6 +1,6 @@
 """Choice of independent joints, and positions where the others do not follow: rank and pivoting of A.
 
-Rows are comparable, as `closing_search` makes them. They are not divided by their own largest entry each, for
+Rows are comparable, as `TieEquations` makes them. They are not divided by their own largest entry each, for
 a row that a planar loop leaves at zero holds nothing but rounding. Columns are compared by what is left of
 them normal to those taken before.
 """
@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.inertia_solve import SHARE
-from ..answers.namespace import array_of, epsilon_of, is_traced, namespace
 from ..chosen_names import listed, plain, sample_of
-from ..interface import Numbers
+from ..interface import Numbers, array_of, epsilon_of, is_traced, namespace
 from ..rule.joint_tree import JointTree
 
 if TYPE_CHECKING:

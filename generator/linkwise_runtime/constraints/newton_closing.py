@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..answers.namespace import is_traced, namespace
 from ..chosen_names import listed, plain, sample_of
-from ..interface import Numbers
+from ..interface import Numbers, is_traced, namespace
 from ..rule.kinematics import gather
 from .closed_places import (
     ClosedPlace,

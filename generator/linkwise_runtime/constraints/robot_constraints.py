@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.answers import Answers
-from ..answers.namespace import array_of, is_traced, side_by_side
 from ..arguments import ANY, NOTHING, Beside, shape_of
-from ..arrays.array_backend import ArrayBackend
+from ..arrays.backend import ArrayBackend
 from ..door import Door
-from ..interface import Array, Numbers
+from ..interface import Array, Numbers, array_of, is_traced, side_by_side
 from ..labelled import labelled
 from ..quantities import Coefficients, ConstrainedMotion, Propagation
 from ..structure import Structure

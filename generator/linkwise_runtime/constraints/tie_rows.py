@@ -6,11 +6,10 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.namespace import side_by_side
-from ..interface import Numbers
+from ..answers.packed import OneSample
+from ..interface import Numbers, side_by_side
 from ..kinematics.frame_answers import FrameAnswers, FrameRequest, in_pieces
 from ..kinematics.frame_arrays import FramePoses
-from ..packed_engine import OneSample
 from ..rule.kinematics import Poses
 from .chosen_constraints import ChosenConstraints
 from .held_frames import TieTables

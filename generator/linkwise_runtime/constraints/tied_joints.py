@@ -6,9 +6,8 @@ from typing import Any, cast
 import numpy as np
 
 from ..answers.inertia_solve import solve_inertia
-from ..answers.namespace import namespace
-from ..arrays.array_backend import ArrayBackend
-from ..interface import Numbers
+from ..arrays.backend import ArrayBackend
+from ..interface import Numbers, namespace
 from ..structure import Structure
 from .chosen_constraints import ChosenConstraints
 from .closed_places import (

@@ -5,12 +5,12 @@ from typing import Any, Generic, Protocol, cast
 
 import numpy as np
 
+from ..answers.packed import TorqueOfOne
 from ..arguments import NOTHING, Beside
-from ..arrays.array_backend import ArrayBackend
+from ..arrays.backend import ArrayBackend
 from ..chosen_names import known_kind
 from ..constraints.robot_constraints import TiedRobot, made_again
 from ..interface import Array, Numbers
-from ..packed_engine import TorqueOfOne
 from ..targets import FrameImpedance, Target
 from .frame_impedance import OF_FRAME, FrameTargets
 from .gains import TargetShares, stiffness_of, target_shares

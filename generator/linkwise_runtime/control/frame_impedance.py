@@ -18,11 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..answers.inertia_solve import Told
-from ..answers.namespace import namespace
 from ..arguments import refuse_gradient
-from ..arrays.array_backend import ArrayBackend
+from ..arrays.backend import ArrayBackend
 from ..chosen_names import known_kind, short
-from ..interface import Library, Namespace, Numbers
+from ..interface import Library, Namespace, Numbers, namespace
 from ..kinematics.frame_answers import FrameAnswers, frame_index
 from ..rule.joint_tree import JointTree
 from ..targets import ROWS, FrameImpedance, Natural

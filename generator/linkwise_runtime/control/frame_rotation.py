@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 
-from ..answers.namespace import array_of, is_traced
 from ..chosen_names import sample_of
-from ..interface import Library, Numbers
+from ..interface import Library, Numbers, array_of, is_traced
 
 SMALL = 1e-2
 """Angle in rad below which series serve: their errors are some 1e-17."""

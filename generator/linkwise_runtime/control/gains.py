@@ -14,10 +14,9 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.namespace import array_of, is_traced
 from ..arguments import as_weights, has_tensors, shape_of
 from ..chosen_names import known_kind, short
-from ..interface import Library, Numbers
+from ..interface import Library, Numbers, array_of, is_traced
 from ..structure import Structure
 from ..targets import Natural
 

@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..answers.inertia_solve import Told
-from ..arrays.array_backend import ArrayBackend
+from ..arrays.backend import ArrayBackend
 from ..chosen_names import short
 from ..interface import Numbers
-from ..passive_joints import passive_torques, smooth_friction
-from ..structure import Structure
+from ..structure import Structure, passive_torques, smooth_friction
 from .gains import Gain, TargetShares
 from .target_solve import TargetInertia, solve_target
 

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.inertia_solve import ROUNDINGS, Told, warn_of_vague
-from ..answers.namespace import array_of, epsilon_of, is_traced, namespace
 from ..chosen_names import sample_of
-from ..interface import Namespace, Numbers
+from ..interface import Namespace, Numbers, array_of, epsilon_of, is_traced, namespace
 from ..targets import ROWS
 
 SMALL = 1e3

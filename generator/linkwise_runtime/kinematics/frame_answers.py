@@ -5,14 +5,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from ..answers.answers import answer_shapes
-from ..answers.namespace import side_by_side
+from ..answers.packed import PackedEngine
 from ..arguments import Beside
 from ..chosen_names import choice, known_as, short, whole_number
-from ..interface import Namespace, Numbers
-from ..packed_engine import PackedEngine
+from ..interface import Namespace, Numbers, side_by_side
 from ..rule.joint_tree import JointTree
 from ..rule.kinematics import Twists
-from ..rule.rule_tables import converted
+from ..rule.tables import converted
 from ..rule.tree_arrays import TreeArrays, formula_sources, own_numbers
 from .frame_arrays import (
     FramePoses,

@@ -12,7 +12,7 @@ from ..interface import Numbers
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import TreeArrays
 from ..structure import Structure
-from .energy_interface import Energies, Parameters, numbers_of
+from .energy_interface import Energies, Parameters, numbers_of, transformed
 from .functional_sweeps import (
     decomposition_functional,
     energies,
@@ -20,7 +20,6 @@ from .functional_sweeps import (
     torque_functional,
 )
 from .graph_calls import graph_of, graph_parts_of
-from .recording import transformed
 from .sweeps import decomposition, position_gradient, torque
 
 Call = Callable[..., Any]

@@ -24,9 +24,8 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from .energy_interface import Energies, Parameters
+from .energy_interface import Energies, Parameters, Recording, gradient, variable
 from .lanes import NOWHERE, Indices, LaneEntries, Leaf, Motion, Plan, Rows, pick
-from .recording import Recording, gradient, variable
 
 Links = Sequence[Energies]
 

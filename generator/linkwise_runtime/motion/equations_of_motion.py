@@ -14,14 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..answers.namespace import array_of, is_traced
 from ..arguments import NOTHING, Beside
-from ..arrays.array_backend import ArrayBackend
+from ..arrays.backend import ArrayBackend
 from ..chosen_names import listed, sample_of
 from ..constraints.closed_places import ClosedPlace
 from ..constraints.independent_joints import least_left, why_not_following
 from ..constraints.tied_joints import TiedJoints, without_gradient
-from ..interface import Numbers
+from ..interface import Numbers, array_of, is_traced
 from .source_forces import AppliedLoads, loads_of
 
 HALVES = 30

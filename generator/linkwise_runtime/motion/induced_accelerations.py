@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ..answers.inertia_solve import solve_inertia_columns
-from ..arrays.array_backend import ArrayBackend
+from ..arrays.backend import ArrayBackend
 from ..chosen_names import short
 from ..constraints.closed_places import ClosedPlace, tie_forces
 from ..constraints.robot_constraints import Constraints, TiedRobot

@@ -11,11 +11,10 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..answers.namespace import array_of, namespace
 from ..arguments import as_array, check_numbers, shape_of
 from ..chosen_names import short
 from ..constraints.robot_constraints import Constraints
-from ..interface import Numbers
+from ..interface import Numbers, array_of, namespace
 from ..quantities import Trajectory
 from .equations_of_motion import EquationsOfMotion, Given, ReadLoads, State, TiedMotion
 from .induced_accelerations import DrivenRobot, constraints_of

@@ -12,11 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..answers.namespace import namespace
 from ..arguments import Beside
-from ..arrays.array_backend import ArrayBackend
+from ..arrays.backend import ArrayBackend
 from ..chosen_names import known_kind
-from ..interface import Numbers
+from ..interface import Numbers, namespace
 from ..kinematics.frame_answers import frame_index, vectors_beside
 from ..kinematics.robot_kinematics import check_load
 from ..quantities import AppliedLoad

@@ -17,7 +17,7 @@ with y = z_i x omega, a product of inertia counting for both entries of the matr
     c1 of k:  a = rate of u_k                             alpha = rate of z_k   beta = z_k
     g:        a = minus gravity                           alpha = 0             beta = 0
 
-This is the rule of `rigid_rule` about that origin, sorted by mass, first moment h = mc and inertia. Arrays
+This is the rule of `rigid` about that origin, sorted by mass, first moment h = mc and inertia. Arrays
 are those of `kinematics`: samples innermost.
 """
 
@@ -32,7 +32,7 @@ from ..interface import Namespace, Numbers
 from ..quantities import PARAMETERS
 from .joint_tree import Bodies, JointTree, Own
 from .kinematics import KinematicTables, Twists, cross, extend_xy, gather, poses, twists
-from .rule_layout import joined, members
+from .layout import joined, members
 from .tree_arrays import TreeArrays
 
 

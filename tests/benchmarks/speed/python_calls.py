@@ -75,7 +75,7 @@ def loaded(package: Package) -> Iterator[tuple[str, Any]]:
 
 def without_compiled_module(module: ModuleType) -> Any:
     """`native` as it is where Python's headers are missing."""
-    binding = import_module("linkwise_runtime.native.native_module")
+    binding = import_module("linkwise_runtime.native.compiled_calls")
     with patch.object(binding, "headers", tuple):
         binding.compiled_calls.cache_clear()
         robot = module.load("native")

@@ -129,7 +129,7 @@ def _forces(path: Path) -> tuple[list[tuple[Element, Path]], list[str]]:
     """Return the forces that are on, each with its data file, and notes on what is left out."""
     # Imported here, as the readers need SymPy, which other loads can do without.
     from linkwise.analysis.loads.external_names import unread_names
-    from linkwise.robot.readers.osim_elements import yes
+    from linkwise.robot.readers.osim.document import yes
     from linkwise.robot.readers.xml_file import parse
 
     require_file(path)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from linkwise_runtime.native.native_compiler import FLAGS, TUNING
+from linkwise_runtime.native.compiler import FLAGS, TUNING
 
 from linkwise.constraints.constrained_system import constraints_of
 from linkwise.emit.c.sizes import Span

@@ -6,7 +6,7 @@ from itertools import accumulate
 from typing import Any
 
 import sympy as sp
-from linkwise_runtime.passive_joints import PassiveJoint, passive_sums
+from linkwise_runtime.structure import PassiveJoint, passive_sums
 
 from linkwise.dynamics.link_forms import lowering, parameter_names
 from linkwise.emit.c.sizes import EntryCounts, Span

@@ -1,0 +1,1 @@
+"""Readers of MJCF files, which MuJoCo's own compiler reads first."""

@@ -1,0 +1,1 @@
+"""Readers of robots in TOML, schema 1."""

@@ -1,0 +1,103 @@
+"""`study.html`: bands of a study's groups, its tests, and links to each trial's own page."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+
+from linkwise.analysis.show.page_curves import encoded, packed, plotly_parts
+from linkwise.escape import printable, script_data
+from linkwise.package.load import Array
+from linkwise.plotstyle import COLOURS, ON_DARK
+from linkwise.render import render
+from linkwise.study.comparisons import Compared
+from linkwise.study.folder import TRIALS
+from linkwise.study.ledger import PAGE, TrialRecord
+from linkwise.study.plan import StudyPlan
+from linkwise.study.spread import columns_of_trials, values_of
+from linkwise.study.summary import TrialSummary
+from linkwise.study.trial import TrialOutcome
+
+NUMBERS = 3_000_000
+"""Most numbers on a page, in float32; columns at the end are left out, and the page says so."""
+FIRST = ("tau/", "q/")
+"""Beginnings of the names of columns that are shown first."""
+TEMPLATE = "study/study.html.j2"
+
+
+def study_page(
+    plan: StudyPlan,
+    trials: Sequence[TrialSummary],
+    folders: Mapping[str, Path],
+    tests: Sequence[Compared],
+    broken: Sequence[TrialOutcome],
+) -> str:
+    """Return the page as HTML; its links are relative to the study's folder."""
+    columns, left_out = _columns(trials)
+    labels = {trial.name: dict(trial.labels) for trial in plan.trials}
+    data = {
+        "name": printable(plan.name),
+        "factors": list(plan.factors),
+        "points": 1 if plan.cycles is None else plan.cycles.points,
+        "columns": [{"name": printable(name), "unit": unit} for name, unit in columns.items()],
+        "values": encoded(_values(trials, list(columns)), "<f4"),
+        "trials": [_trial(trial, folders[trial.name]) for trial in trials],
+        "broken": [
+            {"name": printable(one.name), "labels": labels[one.name], "reason": printable(one.reason)}
+            for one in broken
+        ],
+        "tests": [_test(test) for test in tests],
+        "leftOut": left_out,
+        "colours": list(COLOURS),
+        "coloursDark": list(ON_DARK),
+    }
+    return render(TEMPLATE, {"title": plan.name, "data": packed(script_data(data)), **plotly_parts()})
+
+
+def _columns(trials: Sequence[TrialSummary]) -> tuple[dict[str, str], str]:
+    """Return columns by name with their units, torques first, and a note on those left out."""
+    known = columns_of_trials(trials)
+    points = max((len(curve) for trial in trials for curve in trial.curves.values()), default=1)
+    most = max(1, NUMBERS // (points * len(trials)))
+    order = sorted(
+        known, key=lambda name: next((k for k, start in enumerate(FIRST) if name.startswith(start)), 2)
+    )
+    kept = {name: known[name] for name in order[:most]}
+    if len(kept) == len(known):
+        return kept, ""
+    return kept, f"{len(kept)} of {len(known)} quantities are on this page; curves.parquet has all of them."
+
+
+def _values(trials: Sequence[TrialSummary], names: Sequence[str]) -> Array:
+    """Return values (trials, columns, points), NaN where a trial has no such column."""
+    by_name = {name: values_of(trials, name) for name in names}
+    points = max((len(curve) for some in by_name.values() for curve in some.values()), default=1)
+    out = np.full((len(trials), len(names), points), np.nan)
+    for at, trial in enumerate(trials):
+        for column, name in enumerate(names):
+            out[at, column] = by_name[name].get(trial.name, np.nan)
+    return out
+
+
+def _trial(trial: TrialSummary, folder: Path) -> dict[str, object]:
+    record = TrialRecord.read(folder)
+    return {
+        "name": printable(trial.name),
+        "labels": {factor: printable(level) for factor, level in trial.labels.items()},
+        "page": f"{TRIALS}/{quote(folder.name)}/{PAGE}" if (folder / PAGE).is_file() else "",
+        "samples": 0 if record is None else record.samples,
+        "cycles": trial.cycles,
+        "warnings": 0 if record is None else len(record.warnings),
+    }
+
+
+def _test(test: Compared) -> dict[str, object]:
+    return {
+        "column": printable(test.column),
+        "factor": test.comparison.factor,
+        "between": list(map(printable, test.comparison.between)),
+        "subjects": min(len(side.each) for side in test.sides),
+        "alpha": test.comparison.alpha,
+        "clusters": [[cluster.start, cluster.end, cluster.p] for cluster in test.clusters],
+    }

@@ -1,0 +1,168 @@
+"""`run_study`: from a study's file to a folder of trials and their combined results.
+
+The columns that the study asks for are checked against those of a trial before any begins.
+"""
+
+import json
+from collections.abc import Collection, Generator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Protocol
+
+from linkwise.analysis.result_rows import Column
+from linkwise.errors import LinkwiseError, within
+from linkwise.generator_fingerprint import fingerprint
+from linkwise.output import passing_folder, require_writable, write_files
+from linkwise.progress import Progress, silent
+from linkwise.study.band_figure import figure_columns
+from linkwise.study.comparisons import compared_columns
+from linkwise.study.file import read_study
+from linkwise.study.folder import StudyMark, held_study, refuse_unless_study, sweep_trials, trial_folders
+from linkwise.study.inputs import trial_here
+from linkwise.study.ledger import MARK, TrialRecord, done_before, is_trial
+from linkwise.study.paths import removed
+from linkwise.study.plan import StudyPlan
+from linkwise.study.process_pool import ProcessPool
+from linkwise.study.results import study_files
+from linkwise.study.robots import check_robots
+from linkwise.study.tables import kept_columns
+from linkwise.study.trial import TrialOutcome, TrialTask, prepared_trial
+
+
+class Engine(Protocol):
+    """Interface of an engine that runs trials, in any order."""
+
+    def outcomes(self, tasks: Sequence[TrialTask]) -> Generator[TrialOutcome]:
+        """Yield the outcomes of all tasks as they come; if closed before the end, drop the rest."""
+
+
+@dataclass(frozen=True)
+class StudyOutcome:
+    """Outcome of a study."""
+
+    plan: StudyPlan
+    done: tuple[str, ...]
+    """Names of the trials that have results."""
+    fresh: int
+    """Number of trials that were run now."""
+    samples: int
+    broken: tuple[TrialOutcome, ...]
+    warnings: tuple[str, ...]
+    files: tuple[Path, ...]
+
+
+def run_study(
+    file: str | Path,
+    out: str | Path,
+    engine: Engine | None = None,
+    progress: Progress = silent,
+    trust_python: bool = False,
+) -> StudyOutcome:
+    """Run the trials of a study that are not done yet, and write the combined results of all.
+
+    file: its TOML; out: its folder; engine: a `ProcessPool` with all cores if not given
+    trust_python: run robots that are Python files of this machine, which are refused otherwise
+    Raises LinkwiseError, before any trial begins, for an invalid file, robot or folder.
+    """
+    plan, out = read_study(Path(file), trust_python), Path(out)
+    refuse_unless_study(out, plan)
+    require_writable(out)
+    out = out.absolute()  # workers may run in other folders
+    warnings = check_robots(plan, progress)
+    before = done_before(plan, trial_folders(out, plan))
+    check_columns(plan, before)
+    with held_study(out):
+        return _done(plan, out, before, engine or ProcessPool(), progress, warnings)
+
+
+def _done(
+    plan: StudyPlan,
+    out: Path,
+    before: Mapping[str, TrialRecord],
+    engine: Engine,
+    progress: Progress,
+    warnings: tuple[str, ...],
+) -> StudyOutcome:
+    folders, former = trial_folders(out, plan), StudyMark.read(out)
+    if len(before) < len(plan.trials):
+        write_files(out, {MARK: StudyMark.begun(plan, former.files if former else ()).text()})
+    sweep_trials(out, folders)
+    tasks = [
+        TrialTask(replace(plan, trials=(trial,)), folders[trial.name])
+        for trial in plan.trials
+        if trial.name not in before
+    ]
+    outcomes: list[TrialOutcome] = []
+    progress("trials", len(before), len(plan.trials))
+    with closing(engine.outcomes(tasks)) as coming:
+        for outcome in coming:
+            outcomes.append(outcome)
+            if outcome.reason and is_trial(folders[outcome.name]):
+                removed(folders[outcome.name])  # its results are of other inputs
+            progress("trials", len(before) + len(outcomes), len(plan.trials))
+    broken = tuple(sorted((one for one in outcomes if one.reason), key=lambda one: one.name))
+    failed = {one.name for one in broken}
+    done = tuple(trial.name for trial in plan.trials if trial.name not in failed)
+    key = _key(plan, folders, done, broken)
+    there = former.files_in(out) if former else ()
+    if (
+        former
+        and former.key == key
+        and len(outcomes) == len(broken)
+        and all(file.is_file() for file in there)
+    ):
+        if outcomes:
+            write_files(out, {MARK: former.text()})
+        return StudyOutcome(plan, done, 0, 0, broken, warnings, there)
+    content, lacking = study_files(plan, {name: folders[name] for name in done}, broken, progress)
+    # What is missing, such as a library, may be there next time; until then it is reported each time.
+    mark = StudyMark.done(plan, broken, "" if lacking else key, list(content))
+    files = write_files(out, {**content, MARK: mark.text()})
+    for file in set(there) - set(files):
+        file.unlink(missing_ok=True)
+    samples, told = sum(one.samples for one in outcomes), (*warnings, *lacking)
+    return StudyOutcome(plan, done, len(outcomes) - len(broken), samples, broken, told, files)
+
+
+def _key(
+    plan: StudyPlan, folders: Mapping[str, Path], done: Sequence[str], broken: Sequence[TrialOutcome]
+) -> str:
+    """Return the hash of all that tables, tests, figures and the page depend on."""
+    records = [TrialRecord.read(folders[name]) for name in done]
+    keys = [record.key for record in records if record is not None]
+    return sha256(json.dumps([repr(plan), keys, repr(broken), fingerprint()]).encode()).hexdigest()
+
+
+def check_columns(plan: StudyPlan, before: Collection[str]) -> None:
+    """Raise LinkwiseError for columns that the first trial whose log can be read does not have.
+
+    before: names of trials that are done. If there are none, and no trial can begin, the study is at fault,
+    and the error of the first trial is raised.
+    """
+    with within(str(plan.file)):
+        columns = _columns(plan, before)
+        names = [column.name for column in columns]
+        if names:
+            kept_columns(columns, plan.columns)
+            for comparison in plan.comparisons:
+                compared_columns(comparison, names)
+            for figure in plan.figures:
+                figure_columns(figure, names)
+
+
+def _columns(plan: StudyPlan, before: Collection[str]) -> tuple[Column, ...]:
+    """Return the columns of the first trial that can be prepared; faults of others are reported later."""
+    reasons: list[LinkwiseError] = []
+    for trial in plan.trials:
+        if trial.name in before:
+            continue
+        try:
+            with within(f"trial {trial.name!r}"), trial_here(trial) as here, passing_folder() as buffer:
+                return prepared_trial(plan, here, buffer).columns
+        except LinkwiseError as reason:
+            reasons.append(reason)
+    if reasons and not before:
+        raise reasons[0]
+    return ()

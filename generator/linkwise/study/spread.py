@@ -1,0 +1,93 @@
+"""Means, deviations and ranges over subjects; a subject's value is the mean of its trials."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from linkwise.package.load import Array
+from linkwise.study.plan import SUBJECT
+from linkwise.study.summary import STATISTICS, TrialSummary
+
+MEAN = STATISTICS.index("mean")
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """Spread of values or curves over subjects, each the mean of its trials: arrays of one shape."""
+
+    subjects: tuple[str, ...]
+    every: Array
+    """Values of trials, (trials, …)."""
+    each: Array
+    """Means of subjects, (subjects, …)."""
+
+    @property
+    def mean(self) -> Array:
+        """Mean over subjects."""
+        mean: Array = self.each.mean(axis=0)
+        return mean
+
+    @property
+    def deviation(self) -> Array:
+        """Standard deviation over subjects, as of a sample; NaN for one subject."""
+        return _deviation(self.each)
+
+    @property
+    def rows(self) -> dict[str, Array]:
+        """Mean, deviation and range over subjects, then over all trials of any subject."""
+        return {
+            "mean": self.mean,
+            "std": self.deviation,
+            "min": self.each.min(axis=0),
+            "max": self.each.max(axis=0),
+            "trials_mean": self.every.mean(axis=0),
+            "trials_std": _deviation(self.every),
+            "trials_min": self.every.min(axis=0),
+            "trials_max": self.every.max(axis=0),
+        }
+
+
+def _deviation(values: Array) -> Array:
+    if len(values) < 2:
+        return np.full(values.shape[1:], np.nan)
+    deviation: Array = values.std(axis=0, ddof=1)
+    return deviation
+
+
+Group = tuple[tuple[str, str], ...]
+"""Levels by factor, for all factors but the subject."""
+
+
+def groups_of(trials: Sequence[TrialSummary]) -> dict[Group, list[TrialSummary]]:
+    """Return the trials by the levels that they share, in the order in which these occur."""
+    found: dict[Group, list[TrialSummary]] = {}
+    for trial in trials:
+        levels = tuple((factor, level) for factor, level in trial.labels.items() if factor != SUBJECT)
+        found.setdefault(levels, []).append(trial)
+    return found
+
+
+def spread(trials: Sequence[TrialSummary], values: Mapping[str, Array]) -> Spread:
+    """Return the spread over subjects of arrays by trial."""
+    by_subject: dict[str, list[Array]] = {}
+    for trial in trials:
+        if trial.name in values:
+            by_subject.setdefault(trial.labels[SUBJECT], []).append(values[trial.name])
+    each = np.stack([np.mean(some, axis=0) for some in by_subject.values()])
+    return Spread(tuple(by_subject), np.stack([one for some in by_subject.values() for one in some]), each)
+
+
+def columns_of_trials(trials: Sequence[TrialSummary]) -> dict[str, str]:
+    """Return every column that any trial has, with its unit, except the time."""
+    found: dict[str, str] = {}
+    for trial in trials:
+        found |= {name: unit for name, unit in trial.units.items() if name != "time"}
+    return found
+
+
+def values_of(trials: Sequence[TrialSummary], name: str) -> dict[str, Array]:
+    """Return a column's curve of each trial, or if none has curves, its mean, (1,)."""
+    return {one.name: one.curves[name] for one in trials if name in one.curves} or {
+        one.name: one.statistics[name][MEAN : MEAN + 1] for one in trials if name in one.statistics
+    }

@@ -1,0 +1,142 @@
+"""One trial of a study, from its log to its folder: the work of every engine's workers."""
+
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from linkwise.analysis.contacts.standing_robot import standing_on
+from linkwise.analysis.disk_rows import EverySample
+from linkwise.analysis.job import Job, prepared
+from linkwise.analysis.payload import carrying
+from linkwise.analysis.phases import Phase
+from linkwise.analysis.show.page import report
+from linkwise.errors import LinkwiseError
+from linkwise.escape import short
+from linkwise.output import whole_directory
+from linkwise.package.load import Array
+from linkwise.progress import silent
+from linkwise.study.cycles import TrialCycles
+from linkwise.study.inputs import trial_here, trial_key
+from linkwise.study.ledger import (
+    PAGE,
+    RECORD,
+    SUMMARY,
+    TABLE,
+    TrialRecord,
+    outputs_in,
+    refuse_unless_trial,
+    require_seen,
+)
+from linkwise.study.plan import StudyPlan, Trial
+from linkwise.study.robots import loaded_robot
+from linkwise.study.summary import RunningMoments
+from linkwise.study.tables import TrialTable, kept_columns
+
+
+@dataclass(frozen=True)
+class TrialTask:
+    """A trial to be run, and the folder for its results."""
+
+    plan: StudyPlan
+    """Plan of this trial alone."""
+    folder: Path
+
+    @property
+    def trial(self) -> Trial:
+        """Trial to be run."""
+        return self.plan.trials[0]
+
+
+@dataclass(frozen=True)
+class TrialOutcome:
+    """Outcome of a trial: its samples, or why there are none."""
+
+    name: str
+    samples: int = 0
+    reason: str = ""
+
+
+def run_trial(task: TrialTask) -> TrialOutcome:
+    """Run a trial and return its outcome; its folder appears whole, or not at all if it fails."""
+    try:
+        require_seen(task.folder)
+        with whole_directory(task.folder, refuse_unless_trial) as draft:
+            record = _worked(task, draft)
+            (draft / RECORD).write_text(record.text(), encoding="utf-8")
+    except LinkwiseError as error:
+        return TrialOutcome(task.trial.name, reason=str(error))
+    except MemoryError:
+        return TrialOutcome(task.trial.name, reason="there is not enough memory; cut the log")
+    except Exception as error:  # a fault of linkwise; it stops no other trial
+        fault = f"a fault of linkwise, please report it: {type(error).__name__}: {short(str(error), 300)}"
+        return TrialOutcome(task.trial.name, reason=fault)
+    return TrialOutcome(task.trial.name, record.samples)
+
+
+def _worked(task: TrialTask, draft: Path) -> TrialRecord:
+    plan, began = task.plan, time.monotonic()
+    with ExitStack() as files:
+        trial = files.enter_context(trial_here(task.trial))
+        key = trial_key(plan, task.trial, {}, trial)
+        job = prepared_trial(plan, trial, draft)
+        columns = job.columns
+        kept = kept_columns(columns, plan.columns)
+        labels = {"trial": trial.name, **dict(trial.labels)}
+        every = EverySample(len(columns), *((job.count, draft) if plan.pages else (0, None)))
+        files.enter_context(every)
+        moments = RunningMoments(len(columns))
+        table = files.enter_context(
+            TrialTable(draft / TABLE, labels, [columns[at] for at in kept], plan.cycles is not None)
+        )
+        cycles = TrialCycles(plan, job, lambda number, rows: table(rows[kept], number))
+
+        def sink(block: Array) -> None:
+            moments(block)
+            if plan.pages:
+                every(block)
+            if plan.cycles is None:
+                table(block[kept])
+            else:
+                cycles.sink(block)
+
+        done = job.run(sink, silent)
+        cycles.finish(draft)
+        analysis = job.analysis(done, every.values)
+    np.savez(
+        draft / SUMMARY,
+        statistics=moments.table,
+        names=[c.name for c in columns],
+        units=[c.unit for c in columns],
+    )
+    if plan.pages:
+        (draft / PAGE).write_bytes(report(analysis).encode())
+    seconds = time.monotonic() - began
+    warnings = (*analysis.warnings, *analysis.load_warnings)
+    return TrialRecord(
+        trial.name,
+        key.key,
+        key.files,
+        done.total,
+        cycles.count,
+        job.samples.rate,
+        seconds,
+        warnings,
+        outputs_in(draft),
+    )
+
+
+def prepared_trial(plan: StudyPlan, trial: Trial, buffer: Path) -> Job:
+    """Read and filter a trial whose files are on this machine; raise LinkwiseError for an invalid one.
+
+    buffer: a directory that keeps the samples
+    """
+    loaded, choices = loaded_robot(trial.robot, plan), trial.choices
+    robot = standing_on(carrying(loaded, choices.payloads(loaded)), choices.contacts(loaded))
+    wanted = replace(choices.wanted, page=plan.pages)
+    if plan.cycles is not None and plan.cycles.what:
+        wanted = replace(wanted, phases=(*wanted.phases, Phase.of(f"cycle={plan.cycles.what}")))
+    put = choices.borne(robot), choices.contacts(robot)
+    return prepared(Path(trial.log), robot, choices.reading, choices.processing, *put, silent, wanted, buffer)

@@ -1,0 +1,243 @@
+"""Packed values of back ends, with the operations that answers need, and tables to spread and sum them."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..interface import Namespace, Numbers
+from ..quantities import PARAMETERS
+from ..structure import Indices, Layout, Structure
+
+if TYPE_CHECKING:
+    from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
+
+
+class OneSample(Protocol):
+    """Functions of a back end for one sample, beside those for many."""
+
+    def answer(
+        self, call: str, motion: Sequence[Numbers], frame: int | None = None, point: Numbers | None = None
+    ) -> Numbers | None:
+        """Return the answer to a motion (..., n), for a frame and a point (..., 3) of it if given.
+
+        It is None for anything but one sample, and for calls that the function does not answer.
+        """
+
+
+class TorqueOfOne(Protocol):
+    """A controller's torque for one sample, which a back end has beside that for many."""
+
+    def torque(self, given: Mapping[str, Numbers]) -> Numbers | None:
+        """Return the torque (n,) for motion and targets by name; None where the function has no answer."""
+
+
+class PackedEngine:
+    """Base of back ends: packed values (..., count) in the order of `Layout`, for motion (..., n)."""
+
+    name: ClassVar[str]
+    """Name of the back end, as `load` accepts it."""
+    xp: ClassVar[Namespace]
+    structure: Structure
+    """Names, paths and parameters."""
+    examples: Sequence[Numbers] = ()
+    """Empty arrays of kinds for which tables are made in advance, so that no compiler traces how they are
+    made."""
+
+    @property
+    def samples(self) -> tuple[int, ...]:
+        """Shape of the samples that have a parameter or a body each; () where all samples share them."""
+        raise NotImplementedError
+
+    regresses: bool
+    """True if the back end has regressors, which come from the rule of rigid links."""
+    one_sample: OneSample | None = None
+    """Functions for one sample; None without any."""
+
+    @property
+    def fuses(self) -> bool:
+        """True if a compiler makes one loop of many operations, which a matrix product would split."""
+        raise NotImplementedError
+
+    def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """Return c2, c1, g, tau and h1, (..., count) each."""
+        raise NotImplementedError
+
+    def torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
+        """Return tau (..., count), in the order of `Layout.torque`."""
+        raise NotImplementedError
+
+    def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
+        """Return c0 (..., count), in the order of `Layout.velocity`."""
+        raise NotImplementedError
+
+    def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
+        """Return the kinetic and potential energies of the links in J, (..., N) each."""
+        raise NotImplementedError
+
+    def regressor(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
+        """Return the rows of 10 of tau, flat: (..., 10 count)."""
+        raise NotImplementedError
+
+    def coefficient_regressors(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
+        """Return the rows of 10 of c2, c1 and g, flat: (..., 10 count) each."""
+        raise NotImplementedError
+
+    def read_beside_motion(self) -> Iterable[object]:
+        """Return the arrays or tensors, beside the motion, that results depend on."""
+        raise NotImplementedError
+
+    def constant(self, values: Any, like: Numbers) -> Numbers:
+        """Return a table of numbers, to compute with `like`."""
+        raise NotImplementedError
+
+    def index(self, values: Any, like: Numbers) -> Numbers:
+        """Return a table of positions, to index `like` with."""
+        raise NotImplementedError
+
+    def weights(self, name: str, value: object, like: Numbers) -> Numbers:
+        """Return real numbers, from anything array-like, with the kind and dtype of `like`.
+
+        Raises TypeError or ValueError, which names the argument.
+        """
+        raise NotImplementedError
+
+    def zeros(self, like: Numbers, count: int) -> Numbers:
+        """Return zeros of shape (..., count) for `like` of shape (..., m)."""
+        raise NotImplementedError
+
+    def concatenate(self, parts: Iterable[Numbers]) -> Numbers:
+        """Return the parts joined along the last axis."""
+        raise NotImplementedError
+
+    def few(self, samples: int, links: int) -> bool:
+        """Return whether spatial matrices are faster for so many samples of a robot of so many links."""
+        raise NotImplementedError
+
+    def chunk(self, motion: Sequence[Numbers], most: int) -> int | None:
+        """Return the number of samples to compute at once, if `most` fit in the cache; None for all."""
+        raise NotImplementedError
+
+
+class SumTable(NamedTuple):
+    """Packed values that a matrix of joints sums up: first those of its first entry, row by row."""
+
+    values: Numbers
+    """Positions of the summands."""
+    entries: Numbers
+    """Flat index of the matrix entry to which each of them belongs."""
+    starts: Numbers
+    """Places where the summands begin of each entry that has any."""
+    filled: Numbers
+    """Flat indices of these entries."""
+
+
+class PackedTables:
+    """Tables of constants, for each device, by which packed values of one robot are spread and summed."""
+
+    def __init__(self, engine: PackedEngine) -> None:
+        structure = engine.structure
+        self._engine, self._layout, self._n = engine, structure.layout, structure.n
+        over = (structure.n, structure.N)
+        self._shapes = {
+            "acceleration": (*over, structure.n),
+            "velocity": (*over, structure.n),
+            "velocity_linear": (*over, structure.n),
+            "gravity": over,
+            "torque": over,
+        }
+        self._places: dict[object, Numbers] = {}
+        self._sums: dict[object, SumTable] = {}
+        for like in engine.examples:
+            for field in self._shapes:
+                self._table(field, like)
+            for field in ("acceleration", "velocity"):
+                self._sum_table(field, like)
+            self._joint_sums(like)
+
+    def spread(self, values: Numbers, field: str) -> Numbers:
+        """Return a field of `Layout` (..., count) as (..., n, N) or (..., n, N, n), zeros elsewhere."""
+        table, batch = self._table(field, values), values.shape[:-1]
+        if isinstance(values, np.ndarray):
+            padded = np.zeros((*batch, values.shape[-1] + 1), values.dtype)
+            padded[..., :-1] = values
+            placed: NDArray[np.floating] = padded.take(cast(Indices, table), -1)
+            return placed.reshape(*batch, *self._shapes[field])
+        entries = self._engine.concatenate([values, self._engine.zeros(values, 1)])[..., table]
+        dense: Numbers = entries.reshape(*batch, *self._shapes[field])
+        return dense
+
+    def spread_rows(self, values: Numbers, field: str) -> Numbers:
+        """Return rows of 10 (..., 10 count) of a field in (..., n, N[, n], 10), zeros elsewhere."""
+        padded = self._engine.concatenate([values, self._engine.zeros(values, PARAMETERS)])
+        rows = padded.reshape(*values.shape[:-1], len(getattr(self._layout, field)) + 1, PARAMETERS)
+        entries = rows[..., self._table(field, values), :]
+        dense: Numbers = entries.reshape(*values.shape[:-1], *self._shapes[field], PARAMETERS)
+        return dense
+
+    def sum_over_links(self, tau: Numbers) -> Numbers:
+        """Return packed torques (..., count) summed over the links, (..., n)."""
+        return tau @ self._joint_sums(tau)
+
+    def matrices(self, values: Numbers, field: str) -> Numbers:
+        """Return the sums sum_j c_ijk (..., n, n) of values (..., count) of a field with rows (i, j, k)."""
+        # Any: a table of arrays or of tensors, as the values are.
+        table: Any = self._sum_table(field, values)
+        size = self._n * self._n
+        sums = self._engine.zeros(values, size)
+        if not isinstance(values, np.ndarray):
+            chosen = cast("Tensor", values).index_select(-1, table.values)
+            sums = cast("Tensor", sums).index_add(-1, table.entries, chosen)
+        elif len(table.starts):
+            found = np.add.reduceat(values.take(table.values, -1), table.starts, -1)
+            if len(table.starts) == size:
+                sums = found
+            else:
+                sums[..., table.filled] = found
+        matrices: Numbers = sums.reshape(*values.shape[:-1], self._n, self._n)
+        return matrices
+
+    def _table(self, field: str, like: Numbers) -> Numbers:
+        key = field, getattr(like, "device", None)
+        if key not in self._places:
+            self._places[key] = self._engine.index(self._positions(field), like)
+        return self._places[key]
+
+    def _joint_sums(self, like: Numbers) -> Numbers:
+        """Return zeros (count, n), with ones where a packed torque is on a joint."""
+        key = like.dtype, getattr(like, "device", None)
+        if key not in self._places:
+            rows = self._layout.torque
+            sums = np.zeros((len(rows), self._n))
+            sums[np.arange(len(rows)), rows[:, 0]] = 1.0
+            self._places[key] = self._engine.constant(sums, like)
+        return self._places[key]
+
+    def _sum_table(self, field: str, like: Numbers) -> SumTable:
+        key = field, getattr(like, "device", None)
+        if key not in self._sums:
+            listed = sum_table(self._layout, field, self._n)
+            self._sums[key] = SumTable(*(self._engine.index(a, like) for a in listed))
+        return self._sums[key]
+
+    def _positions(self, field: str) -> Indices:
+        """Return for each entry of the dense tensor its packed position, or that of the zero behind."""
+        rows: Indices = getattr(self._layout, field)
+        positions = np.full(self._shapes[field], len(rows), dtype=np.intp)
+        positions[tuple(rows.T)] = np.arange(len(rows))
+        if field == "acceleration":
+            positions[rows[:, 2], rows[:, 1], rows[:, 0]] = np.arange(len(rows))
+        return positions.reshape(-1)
+
+
+def sum_table(layout: Layout, field: str, n: int) -> tuple[NDArray[np.intp], ...]:
+    """Return the fields of the `SumTable` of a field; for c2, listed for i <= k, with the other half too."""
+    rows: Indices = getattr(layout, field)
+    i, k = rows[:, 0], rows[:, 2]
+    values, entries = np.arange(len(rows)), i * n + k
+    if field == "acceleration":
+        values, entries = np.append(values, values[i < k]), np.append(entries, (k * n + i)[i < k])
+    order = np.argsort(entries, kind="stable")
+    filled, starts = np.unique(entries[order], return_index=True)
+    return values[order], entries[order], starts, filled
