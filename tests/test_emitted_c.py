@@ -168,7 +168,7 @@ def test_the_index_and_every_label_agree_with_the_layout(
     for path in folder.glob("link_*.h"):
         for function in path.read_text(encoding="utf-8").split("KERNEL(")[1:]:
             link = re.match(r"link_(\d+)", function)
-            labels = re.findall(r"(\w+)_out\[(\d+) \* W \+ b\] = .*; /\* (\w+)\((.*)\) \*/", function)
+            labels = re.findall(r"(\w+)\[(\d+) \* W \+ b\] = .*; /\* (\w+)\((.*)\) \*/", function)
             for array, entry, label, indices in labels:
                 assert link
                 own = [e for e in entries[array] if e.split(", ")[1] == link[1]]
