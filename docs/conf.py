@@ -1,4 +1,4 @@
-"""How Sphinx makes the documentation: `make docs`."""
+"""Settings by which Sphinx makes the documentation: `make docs`."""
 
 import re
 import sys

@@ -59,7 +59,7 @@ BESIDE_IN_C = {
 
 
 def signature(row: Call) -> str:
-    """How a call is written that is this row."""
+    """Return the call that is this row, as it is written."""
     given = [f"{name}={value!r}" if value is not REQUIRED else name for name, value in row.options.items()]
     chosen = [f"{name}={value!r}" for name, value in row.chosen.items()]
     out = ["out=None"] if row.out else []
@@ -74,7 +74,7 @@ def axes() -> dict[str, NamedAxis]:
 
 
 def unit(quantity: Quantity) -> str:
-    """Its unit, and in parentheses that of entries which are measured otherwise."""
+    """Return the quantity's unit, and in parentheses that of entries which are measured otherwise."""
     if not quantity.unit:
         return "as the layout says"
     units = units_of([quantity], axes() | {"moved": axes()["joint"]})[1]
@@ -89,7 +89,8 @@ def field(row: Call, at: int) -> str:
 
 
 def shape(row: Call, quantity: Quantity) -> str:
-    """Its axes behind those of the samples; of a motion over time, instants stand before these."""
+    """Return the quantity's axes behind those of the samples; of a motion over time, instants stand before
+    these."""
     axes = (WORDS.get(axis, axis) for axis in quantity.axes)
     before = ["…"] if row.record is not Trajectory else ["time", "…"][: 1 + (quantity.name != "time")]
     return f"({', '.join([*before, *axes])})"
@@ -113,7 +114,7 @@ def short(row: Call) -> str:
 
 
 def counted(rows: Sequence[Call]) -> list[str]:
-    """What calls count, and where they are: a line for all that are alike."""
+    """Return what calls count, and where they are: a line for all that are alike."""
     alike: dict[str, list[str]] = {}
     for row in rows:
         links = "rigid alone" if row.rigid else "any"
@@ -125,7 +126,7 @@ def counted(rows: Sequence[Call]) -> list[str]:
 
 
 def tables() -> str:
-    """Of each group what calls take and answer, and what they count."""
+    """Yield, for each group, what calls take and answer, and what they count."""
     lines = []
     for title, (owner, rows) in GROUPS.items():
         lines += [f"## {title}", "", f"Calls of `{owner}`:", ""]

@@ -95,7 +95,7 @@ def relative(mine: Any, reference: Any) -> float:
 
 
 def checked(path: Path, options: dict[str, Any]) -> dict[str, Any]:
-    """What `linkwise check` says of a robot's package, in which seconds and MB."""
+    """Return what `linkwise check` says of a robot's package, in which seconds and MB."""
     flags = [
         flag
         for key, value in options.items()

@@ -49,7 +49,7 @@ def sorted_out(rows: list[dict[str, Any]]) -> dict[str, set[str]]:
 
 
 def summary(rows: list[dict[str, Any]]) -> str:
-    """What the corpus shows, in a few lines."""
+    """Return in a few lines what the corpus shows."""
     files = {row["file"] for row in rows}
     made = [row for row in rows if "seconds" in row]
     plain, helped, lost = sorted_out(rows).values()
@@ -68,7 +68,7 @@ def summary(rows: list[dict[str, Any]]) -> str:
 
 
 def _checks(made: list[dict[str, Any]]) -> str:
-    """What `linkwise check` said of the packages, if it was asked."""
+    """Yield what `linkwise check` said of the packages, if it was asked."""
     rows = [row for row in made if "alarms" in row]
     if not rows:
         return ""
@@ -94,7 +94,7 @@ def most_per_output(made: list[dict[str, Any]]) -> float:
 
 
 def growth(made: list[dict[str, Any]]) -> str:
-    """How operations grow with outputs; small arms have few a piece, for their axes are aligned."""
+    """Return how operations grow with outputs; small arms have few a piece, for their axes are aligned."""
     bound = f"No robot needs more than {most_per_output(made):.1f} operations an output"
     if np.isnan(slope(made, LARGE)):
         return f"{bound}."

@@ -46,7 +46,7 @@ SMALL = ("-Os", "-DLINKWISE_SMALL", "-ffunction-sections", "-fdata-sections")
 
 @dataclass(frozen=True)
 class Measured:
-    """Of one function: answers of each sample, bytes of stack, instructions a sample."""
+    """Measurement of one function: answers of each sample, bytes of stack, instructions a sample."""
 
     values: Any
     stack: int

@@ -52,7 +52,7 @@ def copied(earlier: Path, where: Path) -> None:
 
 
 def wrong(where: Path, status: int, trees: tuple[Tree, Tree], atomic: bool) -> str:
-    """What is not as promised after a fault; empty if nothing."""
+    """Return what is not as promised after a fault; empty if nothing."""
     if not (where / "target").exists():
         if atomic:
             return "the output is gone"

@@ -177,7 +177,7 @@ def photographed(runs: Sequence[Pushed], folder: Path) -> Any:
 
 
 def photograph(asked: Path, made: Path) -> None:
-    """What `photographed` asks of its process."""
+    """Write the pictures that `photographed` asks of its process."""
     camera = Camera(np.load(asked)[0, 0])
     rows = [[camera.picture(q, _force(t)) for q, t in zip(row, SHOWN, strict=True)] for row in np.load(asked)]
     np.save(made, np.array(rows))

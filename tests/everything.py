@@ -1,4 +1,4 @@
-"""What linkwise makes of the robots and the log in the working directory: `same_bytes` runs this.
+"""Everything that linkwise makes of the robots and the log in the working directory: `same_bytes` runs this.
 
 Arguments are libraries that are to seem missing.
 """

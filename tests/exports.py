@@ -21,7 +21,8 @@ SAMPLES = (7, 1, 0)
 
 
 def goes(load: Callable[[], Any], call: str) -> dict[str, str]:
-    """What stands in the way of each way; nothing where it goes, and says what the call says."""
+    """Return what stands in the way of each way of exporting; nothing where it goes, and says what the call
+    says."""
     module, count = module_of(load(), call)
     motions = [motion(load(), count, samples, samples) for samples in SAMPLES]
     expected = [dict(enumerate(results(module(*given)))) for given in motions]

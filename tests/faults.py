@@ -51,7 +51,7 @@ CALLS = tuple(IDLE)
 
 @dataclass(frozen=True)
 class Fault:
-    """It strikes when the job makes `call` for the `number`th time."""
+    """Fault that strikes when the job makes `call` for the `number`th time."""
 
     call: str
     number: int
@@ -59,14 +59,14 @@ class Fault:
 
 @dataclass(frozen=True)
 class End:
-    """How a job ended: -9 if killed, else its exit status, and what it said."""
+    """End of a job: -9 if killed, else its exit status, and what it said."""
 
     status: int
     said: str
 
 
 def untraceable() -> str:
-    """Why there is no fault injection here; empty where there is."""
+    """Return why there is no fault injection here; empty where there is."""
     if absent := missing("strace"):
         return absent
     probe = ["strace", "-qq", "-e", "inject=fsync:error=EIO", "true"]

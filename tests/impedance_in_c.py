@@ -36,7 +36,7 @@ class ImpedanceInC:
         external: Any = None,
         dtype: Any = np.float64,
     ) -> tuple[int, Any]:
-        """What it returns and tau; `to` is q_d, qd_d, qdd_d."""
+        """Return what the function for joints returns, and tau; `to` is q_d, qd_d, qdd_d."""
         wanted, kept = joint_struct(given, dtype)
         return self._call("partial_impedance", (q, qd), (wanted, *to, task, external), len(q), dtype, kept)
 
@@ -52,7 +52,8 @@ class ImpedanceInC:
         external: Any = None,
         dtype: Any = np.float64,
     ) -> tuple[int, Any]:
-        """The same of a frame; `target` is its pose, velocity and acceleration."""
+        """Return what the function for a frame returns, and tau; `target` is its pose, velocity and
+        acceleration."""
         of_joints, kept = joint_struct(posture, dtype)
         of_frame, kept_too = frame_struct(self.frames.index(frame), given, dtype)
         arguments = (of_joints, *to, of_frame, *target, external)
@@ -109,7 +110,7 @@ def frame_formula(
 
 
 class Natural:
-    """What the robot's joints obey at a state."""
+    """Equation of motion of the robot's joints at a state."""
 
     def __init__(self, model: Any, q: Any, qd: Any) -> None:
         self.c2, self.c1, g = model.coefficients(q, qd)
@@ -130,14 +131,15 @@ class Natural:
         return qdd_d + np.linalg.solve(inertia + given.get("inertia", 0.0), pull)
 
     def torque(self, qdd: Any, given: Given) -> Any:
-        """What the motion asks of the joints, and of their friction what is wanted."""
+        """Return the torque that the motion asks of the joints, and the wanted part of their friction."""
         width = given.get("friction_width", 0.0)
         rubbed = self.friction * np.tanh(self.qd / width) if width else 0.0
         return self.inertia @ qdd + self.velocity @ self.qd + self.rest + rubbed
 
 
 def rotation_vector(turn: Any) -> Any:
-    """By the eigenvectors of a rotation matrix: the axis is that of eigenvalue 1."""
+    """Return the rotation vector by the eigenvectors of a rotation matrix: the axis is that of eigenvalue
+    1."""
     values, vectors = np.linalg.eig(turn)
     axis = np.real(vectors[:, np.argmin(np.abs(values - 1.0))])
     angle = np.arccos(np.clip((np.trace(turn) - 1.0) / 2.0, -1.0, 1.0))

@@ -23,7 +23,7 @@ ALONE = ("--quiet", "--no-index", "--no-deps")
 
 
 def run(*command: str | Path, folder: Path, **environment: str) -> str:
-    """What a command prints; it must not fail."""
+    """Return what a command prints; it must not fail."""
     changes = {key: value for key, value in (QUIET | environment).items() if value}
     kept = {key: value for key, value in os.environ.items() if key not in QUIET}
     done = subprocess.run(
@@ -57,7 +57,7 @@ def wheel_of(source: Path, target: Path, python: Path = Path(sys.executable)) ->
 
 
 def needs_of(requirements: Iterable[str]) -> Iterator[Distribution]:
-    """What requirements bring where they are installed, themselves included; each once, by name."""
+    """Return what requirements bring where they are installed, themselves included; each once, by name."""
     waiting, seen = [Requirement(text) for text in requirements], set()
     while waiting:
         wanted = waiting.pop(0)
@@ -82,17 +82,17 @@ class Environment:
 
     @property
     def programs(self) -> Path:
-        """Where its programs are."""
+        """Folder of its programs."""
         return self.folder / "bin"
 
     @property
     def python(self) -> Path:
-        """Its Python."""
+        """The environment's Python."""
         return self.programs / "python"
 
     @property
     def packages(self) -> Path:
-        """Where its packages are."""
+        """Folder of its packages."""
         [folder] = self.folder.glob("lib/python*/site-packages")
         return folder
 
@@ -113,7 +113,7 @@ class Environment:
                     (self.packages / part).symlink_to(found.locate_file(part))
 
     def run(self, program: str, *arguments: str | Path, folder: Path, **environment: str) -> str:
-        """What one of its programs prints, in a folder."""
+        """Return what one of its programs prints, in a folder."""
         path = f"{self.programs}{os.pathsep}{os.environ['PATH']}"
         return run(self.programs / program, *arguments, folder=folder, PATH=path, **environment)
 

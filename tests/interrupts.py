@@ -47,7 +47,7 @@ def trials(out: Path) -> pd.DataFrame:
 
 
 def left_of(group: int) -> bool:
-    """Whether a process of a group is still there, some seconds later."""
+    """Return whether a process of a group is still there, some seconds later."""
     end = time.monotonic() + SECONDS
     while time.monotonic() < end:
         try:

@@ -43,7 +43,7 @@ class Learnt:
 
 
 def descent(robot: Any, steps: int) -> Iterator[Learnt]:
-    """Where it begins, and where it is after each step."""
+    """Yield the gains at the beginning, and after each step."""
     numbers = {"dtype": torch.float64}
     inertia, target = torch.tensor(INERTIA, **numbers), torch.tensor(TARGET, **numbers)
     away, stiffness = torch.tensor(AWAY, **numbers), FREQUENCY**2 * inertia

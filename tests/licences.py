@@ -22,7 +22,8 @@ NOT_LISTED = re.compile(r"linkwise$|(nvidia|cuda|triton)\b")
 
 
 def licence(package: Distribution) -> str:
-    """What a package's metadata say: the expression, else the classifiers, else the text if it is a name."""
+    """Return what a package's metadata say: the expression, else the classifiers, else the text if it is a
+    name."""
     metadata = package.metadata
     if expression := metadata.get("License-Expression"):
         return str(expression)
@@ -34,18 +35,18 @@ def licence(package: Distribution) -> str:
 
 
 def name_of(package: Distribution) -> str:
-    """Its name as indexes write it."""
+    """Return a package's name as indexes write it."""
     return re.sub(r"[-_.]+", "-", package.name).lower()
 
 
 def packages_of(extras: Sequence[str]) -> dict[str, Distribution]:
-    """What these extras bring, or the core for "", by name."""
+    """Return what these extras bring, or the core for "", by name."""
     found = {name_of(package): package for package in needs_of(f"linkwise[{extra}]" for extra in extras)}
     return {name: package for name, package in sorted(found.items()) if not NOT_LISTED.match(name)}
 
 
 def rows() -> dict[str, tuple[str, str]]:
-    """Of each package that is installed for linkwise, its licence and the first that brings it."""
+    """Return the licence of each package that is installed for linkwise, and the first that brings it."""
     found: dict[str, tuple[str, str]] = {}
     for extra in (*USERS, *BINDING, *DEVELOPERS):
         for name, package in packages_of([extra]).items():

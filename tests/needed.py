@@ -23,7 +23,7 @@ PACKAGES = {
 
 
 def missing(*programs: str) -> str:
-    """Why what needs these programs cannot run here, and what helps; empty where all are there."""
+    """Return why what needs these programs cannot run here, and what helps; empty where all are there."""
     absent = [program for program in programs if shutil.which(program) is None]
     packages = dict.fromkeys(PACKAGES.get(program, program) for program in absent)
     return f"needs {', '.join(absent)}: apt-get install {' '.join(packages)}" if absent else ""

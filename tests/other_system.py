@@ -64,7 +64,7 @@ LONGEST = 259
 
 
 def is_open(path: Any) -> bool:
-    """Whether this process has a file, or one below a folder, open or mapped, or works there."""
+    """Return whether this process has a file, or one below a folder, open or mapped, or works there."""
     real = os.path.realpath(os.fspath(path))
     links = [f"/proc/self/fd/{number}" for number in os.listdir("/proc/self/fd")]
     held = []

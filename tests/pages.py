@@ -51,12 +51,12 @@ class Block:
 
     @property
     def is_held_elsewhere(self) -> bool:
-        """Whether a test of its own runs it."""
+        """Return whether a test of its own runs it."""
         return self.word.startswith("tests/")
 
     @property
     def runs(self) -> bool:
-        """Whether it is run with the page."""
+        """Return whether it is run with the page."""
         return self.language in RUN and not self.word
 
 
@@ -69,20 +69,20 @@ def blocks(page: Path) -> Iterator[Block]:
 
 
 def pictures(page: Path) -> Iterator[tuple[str, Path]]:
-    """What the page's commands make, and the picture of the page that it is."""
+    """Pictures that the page's commands make, and the picture of the page that each is."""
     text = page.read_text(encoding="utf-8")
     for made, shown in re.findall(r"<!-- from: (\S+) -->\s*!\[[^\]]*\]\(([^)\s]+)\)", text):
         yield made, page.parent / shown
 
 
 def words(page: Path, key: str) -> list[str]:
-    """What the page's comments `<!-- key: … -->` list."""
+    """Words that the page's comments `<!-- key: … -->` list."""
     found = re.findall(rf"<!-- {key}: (.*?) -->", page.read_text(encoding="utf-8"))
     return " ".join(found).split()
 
 
 def lacking(page: Path) -> str:
-    """Why the page cannot be run here, and what helps; empty where it can."""
+    """Return why the page cannot be run here, and what helps; empty where it can."""
     if absent := missing(*words(page, "needs")):
         return absent
     there = all(GIVEN[name].is_file() for name in words(page, "given") if name in GIVEN)

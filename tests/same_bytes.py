@@ -1,4 +1,4 @@
-"""The same bytes whatever the surroundings: `make same`.
+"""Proof that bytes are the same whatever the surroundings: `make same`.
 
 Packages, reports and analyses are made in a process of its own for each change of the surroundings, and with
 other Pythons, and compared file by file with those of a plain run.
@@ -23,7 +23,7 @@ OPTIONAL = ("torch", "mujoco", "scipy", "pyarrow", "matplotlib", "plotly")
 
 @dataclass(frozen=True)
 class Surroundings:
-    """How a run differs from a plain one; `mask` is its umask."""
+    """Differences of a run from a plain one; `mask` is its umask."""
 
     environment: dict[str, str] = field(default_factory=dict)
     python: tuple[str, ...] = (sys.executable,)
@@ -59,14 +59,15 @@ ALL_AT_ONCE = Surroundings(
 
 
 def on_another_system(system: str) -> Surroundings:
-    """As far as `other_system` makes it one, without a compiler, and on a console of few letters."""
+    """Return surroundings as far as `other_system` makes them, without a compiler, and on a console of few
+    letters."""
     python = (sys.executable, str(ROOT / "tests/other_system.py"), system)
     few = {"PATH": "/nowhere", "PYTHONUTF8": "0", "PYTHONIOENCODING": "cp1252", "LC_ALL": "de_DE.ISO-8859-1"}
     return Surroundings(few, python)
 
 
 def files(surroundings: Surroundings, place: Path, locales: Path) -> dict[str, bytes]:
-    """What a run writes, by its path."""
+    """Return what a run writes, by its path."""
     folder = place / surroundings.folder
     folder.mkdir(parents=True)
     shutil.copy(ROOT / "tests/data/skew.toml", folder)

@@ -1,4 +1,4 @@
-"""Where programs that tests start look for modules."""
+"""Folders where programs that tests start look for modules."""
 
 import os
 from pathlib import Path

@@ -35,7 +35,8 @@ class ShownModel:
         return {name: self._moved(self._link(name), q) @ self._shown(name) for name in self.frames}
 
     def load_torque(self, q: Any, frame: str, point: Any, force: Any) -> Any:
-        """What a force at a place in a frame, both in the world's axes at last, asks of the joints."""
+        """Return the torques that a force at a place in a frame, both in the world's axes at last, asks of
+        the joints."""
 
         def work(q: Any) -> float:
             return float(force @ (self.poses(q)[frame] @ [*point, 1.0])[:3])
@@ -43,7 +44,7 @@ class ShownModel:
         return _gradient(work, q)
 
     def gravity_torque(self, q: Any) -> Any:
-        """What holding the weight asks of the joints."""
+        """Return the torques that holding the weight asks of the joints."""
 
         def potential(q: Any) -> float:
             total = 0.0
@@ -77,7 +78,7 @@ class ShownModel:
         return name
 
     def _moved(self, link: str, q: Any) -> Any:
-        """What the joints above a link move it by, from where it is at q = 0."""
+        """Return the motion of a link by the joints above it, from where it is at q = 0."""
         joint = self.above.get(link)
         if joint is None:
             return np.eye(4)

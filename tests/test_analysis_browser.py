@@ -355,7 +355,8 @@ def test_many_joints_and_long_names_fit(driver, tmp_path, width):
 
 
 def hovered(driver, before):
-    """What the shares' label says; nothing while it says what it said before, for Plotly waits a little."""
+    """Return what the shares' label says; nothing while it says what it said before, for Plotly waits a
+    little."""
     said = driver.execute_script(
         "return [...document.querySelectorAll('#shares .hovertext')].map((text) => text.textContent)"
     )

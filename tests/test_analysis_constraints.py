@@ -78,7 +78,7 @@ def angles(x: Any, elbow: float = 1.0) -> tuple[Any, Any, Any]:
 
 
 def places(x: Any) -> dict[str, tuple[Any, Any]]:
-    """Of each link its centre of mass and its angle."""
+    """Return the centre of mass of each link, and its angle."""
     starts = (0.0, 0.0), (CRANK * np.cos(x), CRANK * np.sin(x)), (APART, 0.0)
     found = {}
     for (name, (_, reach, _)), start, angle in zip(MASSES.items(), starts, angles(x), strict=True):
@@ -93,7 +93,7 @@ def slope(of: Any, x: Any, h: float = 2e-3) -> Any:
 
 
 def share_of(name: str, x: Any, xd: Any, xdd: Any, mass: Any = None) -> tuple[Any, Any, Any]:
-    """What the crank gives for a link: by acceleration, by velocity, by weight."""
+    """Return what the crank gives for a link: by acceleration, by velocity, by weight."""
     m, _, inertia = MASSES[name] if mass is None else (mass[0], None, 0.0)
 
     def point(at: Any) -> Any:
@@ -349,7 +349,7 @@ def test_links_and_losses_are_identified_from_the_cranks_angle_and_torque_alone(
 
 
 def test_joints_that_follow_are_found_from_the_logs_own_first_sample(folder: Path, tmp_path: Path) -> None:
-    """With all joints at zero these bars lie on one line, where the loop is singular."""
+    """These bars lie on one line with all joints at zero, where the loop is singular."""
     flat = FOUR_BAR.replace("xyz = [0.5, 0, 0], rpy = [0, 0, 1.5707963267948966]", "xyz = [0.3, 0, 0]")
     (tmp_path / "flat.toml").write_text(flat)
     write_package(generate(read_system(tmp_path / "flat.toml"), ["numpy"]), tmp_path / "flat")

@@ -133,7 +133,7 @@ def test_a_tie_bears_what_the_ground_gives_to_a_joint_that_follows(folder: Path)
 def test_losses_loads_and_measured_forces_of_a_tied_leg_each_balance(
     folder: Path, undriven: tuple[str, ...]
 ) -> None:
-    """What a share asks of what nothing drives and of the ankle, which follows, ground and gear bear."""
+    """Ground and gear bear a share's torque on what nothing drives, and on the ankle, which follows."""
     text = (folder / "coupled.toml").read_text()
     for joint, losses in (("knee_angle_r", "damping = 20"), ("ankle_angle_r", "damping = 30")):
         text = text.replace(f'name = "{joint}"\n', f'name = "{joint}"\n{losses}\n', 1)

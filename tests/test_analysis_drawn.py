@@ -1,4 +1,4 @@
-"""What the page draws of an instant and over time is the result's: curves, map, figure, downloads."""
+"""The page draws of an instant and over time what the result has: curves, map, figure, downloads."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -88,7 +88,7 @@ def causes(result: Analysis, i: str, link: str | None, words: tuple[str, ...]) -
 
 
 def there_is(curves: dict[str, Any]) -> dict[str, Any]:
-    """Those that are not but rounding beside the largest."""
+    """Return the curves that are more than rounding beside the largest."""
     sizes = {cause: np.abs(curve).mean() for cause, curve in curves.items()}
     return {cause: curves[cause] for cause, size in sizes.items() if size >= 1e-12 * max(sizes.values())}
 

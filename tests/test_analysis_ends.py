@@ -1,4 +1,4 @@
-"""How `linkwise analyze` ends: one line for an error, and nothing left behind."""
+"""Endings of `linkwise analyze`: one line for an error, and nothing left behind."""
 
 import signal
 import subprocess

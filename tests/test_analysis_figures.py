@@ -31,7 +31,7 @@ def stance(tmp_path_factory: pytest.TempPathFactory) -> Analysis:
 
 
 def heights(area: Any, time: Any) -> Any:
-    """How far an area reaches from its foot at each instant."""
+    """Return how far an area reaches from its foot at each instant."""
     corners = area.get_paths()[0].vertices
     return np.array([np.ptp(corners[np.isclose(corners[:, 0], t), 1]) for t in time])
 

@@ -1,4 +1,4 @@
-"""What `linkwise analyze` and `linkwise motion` write, and that nothing half-written stays."""
+"""Files that `linkwise analyze` and `linkwise motion` write, of which nothing half-written stays."""
 
 import csv
 import json

@@ -66,7 +66,7 @@ def test_a_movement_is_the_same_in_every_format(tmp_path: Path, write: Callable[
 
 
 def test_a_bag_without_definitions_of_messages_is_read(tmp_path: Path) -> None:
-    """As recorders before ROS 2 Iron wrote them."""
+    """Recorders before ROS 2 Iron wrote such bags."""
     path = db3(tmp_path)
     with contextlib.closing(sqlite3.connect(path)) as file:
         file.executescript(

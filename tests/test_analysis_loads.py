@@ -63,7 +63,7 @@ class Pinocchio:
         return self.data.oMf[self.model.getFrameId(body, self.pin.BODY)]
 
     def share(self, body, motion, force, moment, place):
-        """What the wrench adds to the torques."""
+        """Return what the wrench adds to the torques."""
         pin, model = self.pin, self.model
         self.pose(body, motion[0])
         carrier = model.frames[model.getFrameId(body, pin.BODY)].parentJoint

@@ -22,7 +22,7 @@ LITTLE = ProcessLimits(seconds=10, memory=256 << 20)
 
 
 def refusal(path: Path) -> str:
-    """What is said of a log, which takes little time and memory, without its path."""
+    """Return what is said of a log, which takes little time and memory, without its path."""
     with pytest.raises(LinkwiseError) as caught:
         in_own_process(lambda: analyze(path, PLANAR3).columns, LITTLE)
     return str(caught.value).removeprefix(f"{path}: ")

@@ -46,7 +46,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def analysis(place: Path) -> Analysis:
-    """The same in Python."""
+    """Return the same analysis in Python."""
     held = Contacts(
         (Contact("foot", "held", (0.1, -0.06, 0.0), name="sole"),), {"sole": WhileColumn("stands")}
     )

@@ -312,7 +312,7 @@ def test_poses_of_a_slide_on_a_turned_frame():
 
 
 def many(analysis, count=14):
-    """The same numbers with as many names as asked for, one of 80 letters."""
+    """Return the same numbers with as many names as asked for, one of 80 letters."""
     joints = tuple(f"joint{i}" if i != 4 else f"{'a_name_from_a_drawing_' * 4}4" for i in range(count))
     robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * count, bodies=None)
     rows = ResultRows.of(robot, [("q", (i,)) for i in range(count)])

@@ -1,4 +1,4 @@
-"""How near a log comes to the pole of three turns, and when: long logs, and turns by a ratio of a joint's."""
+"""Distance of a log from the pole of three turns, and when: long logs, and turns by a ratio of a joint's."""
 
 from pathlib import Path
 

@@ -83,7 +83,7 @@ def test_work_counts_a_motion_from_its_first_sample_to_its_last(tmp_path):
 
 
 def test_joints_at_rest_send_no_power(tmp_path):
-    """In the paper's simulated motion only joint 3 moves until 3 s, though the others carry torque."""
+    """Until 3 s only joint 3 moves in the paper's simulated motion, though the others carry torque."""
     (path,) = write_motions(tmp_path, [SIMULATED])
     result = analyze(path, PLANAR3)
     rests = result.time <= 3.0

@@ -72,7 +72,8 @@ def packed(folder: Path, name: str, text: str, **options: Any) -> Path:
 
 
 def pushes(model: Any, data: Any) -> None:
-    """What drives the walker: it is carried upright, spins about the vertical, and everything swings."""
+    """Return what drives the walker: it is carried upright, spins about the vertical, and everything
+    swings."""
     t, (w, x, y, z) = data.time, data.qpos[3:7]
     up = np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
     swing = np.sin(t * np.array([5.0, 3.0, 4.0, 6.0, 7.0, 2.0, 5.0, 8.0, 3.0, 6.0]) + np.arange(10))

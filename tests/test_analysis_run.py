@@ -250,7 +250,7 @@ def test_partial_torques_are_those_of_an_independent_recursion(tmp_path):
 
 
 def test_a_robot_at_odds_with_the_recursion_is_refused(tmp_path):
-    """What sums cannot see: every torque too large by the same part."""
+    """Sums cannot see every torque being too large by the same part."""
     path = write_csv(tmp_path / "a.csv", smooth(60, 3))
     robot = load_robot(PLANAR3)
     heavy = deepcopy(robot.recursion)

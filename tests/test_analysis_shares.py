@@ -1,4 +1,5 @@
-"""What loads a joint most: bars, notebook, page and its table say the same, and what a table's columns say.
+"""The largest loads of a joint: bars, notebook, page and its table say the same, and what a table's columns
+say.
 
 Each cause counts by the mean size of its net torque on a joint, links summed first: of an arm that is folded
 back the links' weights cancel at the shoulder, so that their sizes, added up, would tell another story.
@@ -79,7 +80,7 @@ def folded() -> NDArray[np.float64]:
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What the command writes, while values lie in a file."""
+    """Return the folder that the command writes, while values lie in a file."""
     made: Path = tmp_path_factory.mktemp("shares")
     given = Reading(), Processing(), Wanted(figures=("shares",)), silent
     analyze_to(made / "out", write_csv(made / "log.csv", folded()), load_robot(PLANAR3), *given)
@@ -95,14 +96,14 @@ def analysis(place: Path) -> Analysis:
 
 @pytest.fixture(scope="module")
 def columns(place: Path) -> Columns:
-    """What the command wrote."""
+    """Return the columns that the command wrote."""
     table = pq.read_table(place / "out" / "analysis.parquet")
     return Columns({name: table[name].to_numpy() for name in table.column_names}, JOINTS)
 
 
 @pytest.fixture(scope="module")
 def crowd(analysis: Analysis) -> Analysis:
-    """Of 14 joints."""
+    """Return columns of 14 joints."""
     return crowd_of(CROWD, analysis)
 
 
@@ -156,7 +157,7 @@ def test_the_figure_has_mean_sizes_of_net_torques(place: Path, analysis: Analysi
 
 
 def notebook(result: Analysis) -> list[tuple[str, str]]:
-    """Of each joint the largest cause and its share."""
+    """Return the largest cause of each joint and its share, as the notebook shows them."""
     rows = re.findall(r"<tr[^>]*>(.*?)</tr>", result._repr_html_())[1:]
     cells = [[html.unescape(cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", row)] for row in rows]
     return [(row[-4], row[-3]) for row in cells]
@@ -181,7 +182,7 @@ def test_the_notebook_says_the_largest_of_the_figures_parts(
 
 
 def few_of(columns: Columns, word: str, gravity: bool = True) -> tuple[Shares, list[str]]:
-    """Of many joints: parts of the bars, and which other motion is the largest of each."""
+    """Return, of many joints, the parts of the bars, and which other motion is the largest of each."""
     sizes = columns.sizes((word,), gravity=gravity)
     by = np.array([sizes[f"{joint} {word}"] for joint in columns.joints]).T
     others = by * (1 - np.eye(len(by)))
@@ -221,7 +222,7 @@ def choose(page: Any, name: str, value: object) -> None:
 
 
 def page_bars(page: Any) -> Shares:
-    """The same of the page."""
+    """Return the bars that the page draws."""
     shown = page.execute_script(
         "return document.getElementById('shares').data.map((bar) => [bar.name, Array.from(bar.x)])"
     )

@@ -1,4 +1,4 @@
-"""How the page looks at a robot in space: undistorted, from above, all of it, turned as it is dragged."""
+"""View of a robot in space on the page: undistorted, from above, all of it, turned as it is dragged."""
 
 from pathlib import Path
 from typing import Any

@@ -96,12 +96,13 @@ def load(package_at: Load) -> Load:
 
 
 def of(row: Call) -> str:
-    """Which robot answers a row."""
+    """Return the kind of robot that answers a row."""
     return "free" if row.ties == "refused" else "tied"
 
 
 def given(load: Load, row: Call, batch: tuple[int, ...] = (), rigid: bool = True) -> dict[str, Any]:
-    """What a row is given, in arrays: the motion, in which the loop closes, and what has to be given too."""
+    """Return a row's arguments, in arrays: the motion, in which the loop closes, and what has to be given
+    too."""
     draw, (n, m) = np.random.default_rng(2), (4, 2) if rigid else (2, 0)
     sizes = {"q": n, "qd": n, "qdd": n, "tau": n, "yd": m, "ydd": m}
     motion = {name: draw.uniform(-1.0, 1.0, (*batch, size)) for name, size in sizes.items()}
@@ -128,12 +129,12 @@ def given(load: Load, row: Call, batch: tuple[int, ...] = (), rigid: bool = True
 def taken(
     asked: Mapping[str, Any], tensors: bool, dtype: str = "float64", device: str = "cpu"
 ) -> dict[str, Any]:
-    """The same in arrays, or tensors on a device, of a dtype."""
+    """Return the arguments in arrays, or tensors on a device, of a dtype."""
     return {name: cast_to(value, tensors, dtype, device) for name, value in asked.items()}
 
 
 def cast_to(value: Any, tensors: bool, dtype: str = "float64", device: str = "cpu") -> Any:
-    """The same of one; what is no array itself."""
+    """Return one argument in an array, or a tensor on a device, of a dtype; what is no array as it is."""
     if isinstance(value, list) and value and isinstance(value[0], AppliedLoad):
         return [
             AppliedLoad("hand", *(cast_to(a, tensors, dtype, device) for a in value[0][1:])) for _ in value
@@ -154,7 +155,7 @@ def answered(robot: Any, row: Call, asked: Mapping[str, Any], **more: Any) -> tu
 def shape_of(
     robot: Any, row: Call, quantity: Quantity, batch: tuple[int, ...], loads: int
 ) -> tuple[int, ...]:
-    """By the axes that the row has for it."""
+    """Return the shape of a quantity by the axes that the row has for it."""
     axes = axes_of(robot.joint_names, robot.joint_units, robot.link_names)
     sizes = dict(zip(PACKED, robot.structure.sizes, strict=True)) | {"part": PARTS, "load": loads}
     if row.rigid:
@@ -261,7 +262,7 @@ def test_out_is_where_the_answer_goes(row: Call, backend: str, tensors: bool, lo
 
 
 def slope(robot: Any, row: Call, asked: Mapping[str, Any]) -> Any:
-    """Of the sum of all that is answered, by q; of what no gradient runs through, zero."""
+    """Return the slope of the sum of all that is answered, by q; zero for what no gradient runs through."""
     q = asked["q"].requires_grad_()
     total = sum((value.sum() for value in answered(robot, row, asked)), 0.0 * q.sum())
     return torch.autograd.grad(total, q)[0]

@@ -1,4 +1,4 @@
-"""What `linkwise check` accepts, refuses and leaves out."""
+"""Packages that `linkwise check` accepts and refuses, and what it leaves out."""
 
 import hashlib
 import importlib.util
@@ -676,7 +676,7 @@ def of_parameters(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def loaded_with_parameters(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same on three back ends."""
+    """Return a package with run-time parameters on three back ends."""
     directory = tmp_path_factory.mktemp("loaded") / "odd"
     (directory.parent / "odd.toml").write_text(ODD)
     system = read_system(str(directory.parent / "odd.toml"), Options("symbolic"))
@@ -974,7 +974,7 @@ STATE = np.array([[0.1, 0.2], [0.0, 0.0], [0.0, 0.0]])
 
 
 def run_in(package: Path, *options: str) -> str:
-    """What a user's Python says that imports the package and calls it, caching what it compiles."""
+    """Return what a user's Python says that imports the package and calls it, caching what it compiles."""
     script = f"import numpy as np, {package.name} as p; print(p.load().partial_torque(*np.{STATE!r})[0, 0])"
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     command = [sys.executable, *options, "-c", script]

@@ -375,7 +375,7 @@ def test_a_right_package_is_never_called_wrong(robot: str, tmp_path: Path) -> No
 
 
 def test_where_one_joint_cannot_follow_another_nothing_is_asked(tmp_path: Path) -> None:
-    """Of jb*jb = ja**3 - ja, jb stands still whatever ja does where it is 0."""
+    """The coupling jb*jb = ja**3 - ja has jb stand still whatever ja does where jb is 0."""
     curve = PARALLEL.split("[[constraint]]")[0] + COUPLING
     (tmp_path / "robot.toml").write_text(curve)
     write_package(generate(read_system(tmp_path / "robot.toml"), ["numpy"]), tmp_path / "right")
@@ -413,7 +413,7 @@ def test_no_motion_is_asked_of_rods_that_agree_only_where_it_starts(tmp_path: Pa
 def test_ties_that_agree_no_more_where_they_are_closed_leave_no_motion_to_compare(
     package: Package, reference: LoopReference, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """They are looked at first, and again once each state has been closed."""
+    """The ties are looked at first, and again once each state has been closed."""
     first = iter([True])
 
     def agree(rows: np.ndarray, _: np.ndarray) -> np.ndarray:
@@ -428,7 +428,7 @@ def test_ties_that_agree_no_more_where_they_are_closed_leave_no_motion_to_compar
 
 @pytest.mark.parametrize(("size", "most"), [(1.0, 0.3), (1e-3, 0.006)])
 def test_contacts_are_as_near_as_links_are_short(size: float, most: float, tmp_path: Path) -> None:
-    """Of an arm of 0.3 m, and of one of 0.3 mm."""
+    """One arm is of 0.3 m, and one of 0.3 mm."""
     text = f"""schema = 1
     name = "arm"
     link = [{{name = "a", mass = {size**3}, inertia = {{xx = {size**5}, yy = {size**5}, zz = {size**5}}}}}]

@@ -1,4 +1,5 @@
-"""What `linkwise check` holds packages against: recursion, magnitudes, differences, readers of formulas."""
+"""Sources that `linkwise check` holds packages against: recursion, magnitudes, differences, readers of
+formulas."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -48,7 +49,7 @@ def sources(directory: Path) -> tuple[NewtonEuler, Magnitudes]:
 
 @pytest.fixture(scope="module")
 def leg(directory_of: Callable[[str], Path]) -> tuple[NewtonEuler, Magnitudes]:
-    """Of slides and hinges."""
+    """Return the robot of a leg of slides and hinges."""
     return sources(directory_of(LEG))
 
 

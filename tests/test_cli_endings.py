@@ -1,4 +1,4 @@
-"""How commands end: one printable line on stderr whatever was wrong, and a telling exit status."""
+"""Endings of commands: one printable line on stderr whatever was wrong, and a telling exit status."""
 
 import errno
 import os

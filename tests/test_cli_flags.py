@@ -93,7 +93,7 @@ class CalledWith(Exception):
 
 @pytest.fixture
 def called(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
-    """What a command calls a function of its module with, by the function's name."""
+    """Return the arguments by which a command calls a function of its module, by the function's name."""
     monkeypatch.chdir(tmp_path)
 
     def call(command: str, function: str, chosen: dict[str, Any]) -> tuple[Any, ...]:

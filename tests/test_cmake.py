@@ -138,7 +138,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Project]:
 
 
 def expected(project: Project, folder: Path) -> np.ndarray:
-    """What Python says to the same motion."""
+    """Return what Python says to the same motion."""
     write_package(generate(read_system(project.robot), ["numpy"]), folder / "arm_in_python")
     robot = import_package(folder / "arm_in_python").load("numpy")
     return np.asarray(robot.inverse_dynamics(*MOTION))

@@ -52,7 +52,7 @@ def test_a_program_asks_for_frames_by_name(
     package_of: Callable[[str], ModuleType],
     tmp_path: Path,
 ) -> None:
-    """As a user writes it: nothing but the header, and NAME.c beside it."""
+    """The program has nothing but the header, and NAME.c beside it, as a user writes it."""
     directory, (command, *flags) = directory_of(robot), strict(compiler)
     name, model = name_of(directory), package_of(robot).load("numpy")
     frame = model.kinematics.frames[-1]
@@ -131,7 +131,7 @@ def test_forward_dynamics_says_which_joint_moves_no_mass(kernel: str, tmp_path: 
 
 @pytest.mark.parametrize("kernel", ["straight", "loops"])
 def test_a_wrist_is_as_singular_beside_another_arm(kernel: str, tmp_path: Path) -> None:
-    """And as nearly singular next to it; the joint of the other arm comes first."""
+    """A wrist is as nearly singular beside another arm; the joint of the other arm comes first."""
     arm = [link("arm"), joint("lift", "base", "arm", **ROLL)]
     first = WRIST.index("<joint")
     path = tmp_path / "wrist.urdf"
@@ -160,7 +160,7 @@ def test_native_names_the_joints_that_move_no_mass(tmp_path: Path) -> None:
 
 
 def test_where_a_sliding_base_is_does_not_matter(tmp_path: Path) -> None:
-    """Of a body that floats, the mass matrix and accelerations are those at the origin, to the last bit."""
+    """The mass matrix and accelerations of a body that floats are those at the origin, to the last bit."""
     write_package(
         generate(read_system(CRANE, Options(base="floating")), ["c"], kernel="loops"), tmp_path / "crane"
     )
@@ -212,7 +212,7 @@ def kinds(directory_of: Callable[[str], Path], tmp_path_factory: pytest.TempPath
 
 
 def in_python(package: ModuleType, robot: Any) -> dict[str, Callable[[], Any]]:
-    """What answers in Python as each function of C does."""
+    """Return the call of Python that answers as each function of C does."""
     q = 0.3 + 0.1 * np.arange(robot.n)
     frame = robot.link_names[-1]
 
@@ -247,7 +247,7 @@ def in_python(package: ModuleType, robot: Any) -> dict[str, Callable[[], Any]]:
 
 @pytest.mark.parametrize("kind", [*KINDS, "tied", "coupled", "passive", "tied and passive"])
 def test_c_offers_nothing_that_python_refuses(kind: str, kinds: dict[str, Path]) -> None:
-    """And names what it lacks; that what it offers answers as Python does is what check holds."""
+    """C names what it lacks; that what it offers answers as Python does is what check holds."""
     name, package = name_of(kinds[kind]), import_package(kinds[kind])
     robot = package.load("numpy")
     header = (kinds[kind] / "c" / f"{name}.h").read_text(encoding="utf-8")

@@ -59,7 +59,8 @@ def controller(package: ModuleType, robot: Any, kind: str) -> Any:
 
 
 def in_c(model: Any, c: ImpedanceInC, kind: str, q: Any, qd: Any, external: Any) -> tuple[str, Any]:
-    """What C says by what it returns, and the torques; one that is refused leaves them as they were."""
+    """Return what C says by what it returns, and the torques; one that is refused leaves them as they
+    were."""
     weights, damping = np.ones((model.n, model.N, model.n)), np.eye(model.n) / 2.0
     hip, shank = model.joint_index("hip"), model.link_index("shank")
     if kind == "frame":
@@ -83,7 +84,7 @@ def in_c(model: Any, c: ImpedanceInC, kind: str, q: Any, qd: Any, external: Any)
 
 
 def told(control: Any, *motion: Any) -> tuple[str, Any]:
-    """The same in Python, whose messages name the joints."""
+    """Return the same in Python, whose messages name the joints."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:

@@ -31,7 +31,7 @@ def configured(project: Project, toolchain: str) -> Project:
 
 
 def machines(library: Path) -> set[int]:
-    """Which machines the ELF files in an archive are for."""
+    """Return the machines that the ELF files in an archive are for."""
     parts = library.read_bytes().split(b"\x7fELF")[1:]
     assert parts
     return {int.from_bytes(part[14:16], "little") for part in parts}

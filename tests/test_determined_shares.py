@@ -1,4 +1,4 @@
-"""Which shares joint torques determine, whatever links weigh: docs/method.md says it with these numbers."""
+"""Shares that joint torques determine, whatever links weigh: docs/method.md says it with these numbers."""
 
 from collections.abc import Callable, Iterator
 from types import ModuleType
@@ -26,14 +26,15 @@ class Determined:
         self.axes = axes[sizes > NOTHING * sizes[0]]
 
     def has(self, rows: Any) -> bool:
-        """Whether these (samples, N, 10), one for each motion, are combinations of torques."""
+        """Return whether these (samples, N, 10), one for each motion, are combinations of torques."""
         flat = rows.reshape(len(rows), -1)
         left = flat - flat @ self.axes.T @ self.axes
         return bool(abs(left).max() <= NOTHING * abs(flat).max())
 
 
 def shares(rows: Any) -> Iterator[Any]:
-    """Of rows (samples, …, N, 10) those of one link each that are not zero, and the other links' left out."""
+    """Return the rows (samples, …, N, 10) of one link each that are not zero, and the other links' left
+    out."""
     samples, links = len(rows), rows.shape[-2]
     for each in np.moveaxis(rows.reshape(samples, -1, links, 10), 1, 0):
         for j in range(links):

@@ -67,7 +67,7 @@ def needed(command: list[str], source: Path, made: Path) -> set[str]:
 def test_it_calls_the_functions_of_math_alone_and_converts_nothing_by_accident(
     kind: str, compiler: tuple[str, ...], directory_of: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    """But for copies and zeros, of which compilers make calls themselves."""
+    """Copies and zeros are excepted, of which compilers make calls themselves."""
     if lacking := missing(compiler[0]):
         pytest.skip(lacking)
     prototypes = ("-Wstrict-prototypes", "-Wmissing-prototypes")

@@ -166,7 +166,7 @@ def test_the_index_and_every_label_agree_with_the_layout(
         entries[array] = found
     entries |= {"tau": entries["g"], "c0": entries["c1"]}
     for path in folder.glob("link_*.h"):
-        for function in path.read_text(encoding="utf-8").split("KERNEL(")[1:]:
+        for function in path.read_text(encoding="utf-8").split("\nLINK_FUNCTION(")[1:]:
             link = re.match(r"link_(\d+)", function)
             labels = re.findall(r"(\w+)\[(\d+) \* W \+ b\] = .*; /\* (\w+)\((.*)\) \*/", function)
             for array, entry, label, indices in labels:

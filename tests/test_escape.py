@@ -65,7 +65,7 @@ EVIL = (
 
 
 def seen(text: str) -> bool:
-    """Whether people see every character of a text, and none orders what comes after."""
+    """Return whether people see every character of a text, and none orders what comes after."""
     return not {unicodedata.category(c) for c in text} & {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
 
 
@@ -160,7 +160,7 @@ def test_a_list_names_the_first_and_counts_the_others() -> None:
 
 
 class Page(html.parser.HTMLParser):
-    """What an HTML parser makes of a page: its title, its elements, the content of each script."""
+    """Page as an HTML parser reads it: its title, its elements, the content of each script."""
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
@@ -222,7 +222,8 @@ def test_a_templates_name_reaches_no_hover_template() -> None:
 
 @pytest.fixture(scope="module")
 def packages(tmp_path_factory) -> dict[str, Path]:
-    """For each name a package of a robot, a link and a joint of that name, with symbolic parameters."""
+    """Return for each name a package of a robot, a link and a joint of that name, with symbolic
+    parameters."""
     place = tmp_path_factory.mktemp("evil")
     made = {}
     for number, name in enumerate(EVIL[:-1]):

@@ -34,7 +34,7 @@ def planar2(package_of: Packages) -> Any:
 
 
 def test_the_page_has_every_call_in_its_table(planar2: Any) -> None:
-    """But for those of constraints, and one that is for these alone."""
+    """Calls of constraints are excepted, and one that is for these alone."""
     calls = {
         f"{of}{name}"
         for of, kind in (("", type(planar2)), ("kinematics.", type(planar2.kinematics)))
@@ -196,7 +196,7 @@ def test_forward_dynamics_is_compiled_and_exported_with_its_gradient_but_onnx_so
 def test_christoffel_and_shares_of_accelerations_take_any_number_of_samples(
     samples: Any, planar2: Any
 ) -> None:
-    """Their shapes are computed, and must not be those of the samples that they were traced with."""
+    """Shapes are computed, and must not be those of the samples that they were traced with."""
     call, count = ("christoffel", 1) if samples is None else ("induced_accelerations", 3)
     module = exported.module_of(planar2, call)[0]
     program = torch.export.export(

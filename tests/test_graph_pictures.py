@@ -25,7 +25,7 @@ def robot(package_of: Callable[[str], ModuleType]) -> Any:
 
 @pytest.fixture(scope="module")
 def parts(robot: Any) -> list[Any]:
-    """Of τ_1,2: gravity, two accelerations and two velocities."""
+    """Return the parts of τ_1,2: gravity, two accelerations and two velocities."""
     return list(robot.graph_parts(0, 1))
 
 

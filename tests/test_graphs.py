@@ -500,7 +500,8 @@ REPORTS = " ".join((Path(__file__).parents[1] / "docs/reports.md").read_text(enc
 
 
 def test_the_reduction_in_nodes_of_the_graph() -> None:
-    """By hand for one joint: (m r² + I) q̈ is one product, m g r cos q a cosine and one, and a sum is left."""
+    """One joint, counted by hand: (m r² + I) q̈ is one product, m g r cos q a cosine and one, and a sum is
+    left."""
     arm = rigid_system(read_robot("planar10", Options("symbolic")))
     pairs = list(recorded_operations(arm, 10, silent))
     assert (pairs[0].total, pairs[0].kept) == (4, 1)

@@ -192,7 +192,7 @@ def identified(folder: Path, name: str, text: str, *more: str) -> tuple[np.ndarr
 
 
 def by_mujoco(robot: Path, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    """What MuJoCo says of the same file, of its links alone."""
+    """Return what MuJoCo says of the same file, of its links alone."""
     model = mujoco.MjModel.from_xml_path(str(robot))
     model.dof_damping[:] = 0.0
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
@@ -230,7 +230,8 @@ def loaded(robot: Path, folder: Path):
 
 
 def without_numbers(text: str) -> str:
-    """What is left of a file when the numbers that are identified, and elements of nothing else, are gone."""
+    """Return what is left of a file when the numbers that are identified, and elements of nothing else, are
+    gone."""
     for gone in (
         r"<inertial [^>]*/>",
         r"(?s)(?<=<inertial>).*?(?=</inertial>)",

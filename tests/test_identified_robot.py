@@ -145,7 +145,7 @@ def test_friction_that_the_file_has_no_place_for_is_told(tmp_path: Path) -> None
 
 
 def test_mujoco_takes_every_link_of_the_file_as_a_body_that_can_exist(written: Path) -> None:
-    """It refuses a body whose moments break the triangle inequality; here no link is merged."""
+    """MuJoCo refuses a body whose moments break the triangle inequality; here no link is merged."""
     extension = b'<mujoco><compiler fusestatic="false" balanceinertia="false"/></mujoco></robot>'
     before, after = (
         mujoco.MjModel.from_xml_string(

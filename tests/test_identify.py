@@ -1,4 +1,5 @@
-"""What a log of motion and torques says of a robot's links, and what it does not say in time."""
+"""A log of motion and torques says some things of a robot's links, and what it does not say is told in
+time."""
 
 import json
 import re

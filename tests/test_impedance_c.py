@@ -139,7 +139,7 @@ def test_torques_of_a_frame_are_the_formulas(robot: str, dtype: Any, robots: Any
 
 
 def test_they_are_the_torques_of_the_controllers_in_python(robots: Any, package_of: Any) -> None:
-    """By targets as a user of Python gives them."""
+    """Targets are given as a user of Python gives them."""
     model, c = robots("torso")
     package, generator = package_of("torso"), np.random.default_rng(7)
     n, shape = model.n, (model.n, model.N, model.n)
@@ -186,7 +186,7 @@ def test_they_are_the_torques_of_the_controllers_in_python(robots: Any, package_
 
 @pytest.mark.parametrize("angle", [-1e-6, 3e-5, 1e-4, -3e-4, 2e-3, 0.0099, -0.02, 0.3])
 def test_a_frame_is_pulled_by_its_angle_however_small(angle: float, robots: Any, package_of: Any) -> None:
-    """In a plane the turn from the target is the sum of the joints' ways."""
+    """The turn from the target is, in a plane, the sum of the joints' ways."""
     model, c = robots("planar3 symbolic")
     package, (q, qd) = package_of("planar3 symbolic"), np.array([[0.3, -0.7, 0.9], [0.0, 0.0, 0.0]])
     frame, pose = model.kinematics.frames[-1], model.kinematics.pose(q - [0.0, 0.0, angle], "link3")
@@ -275,7 +275,7 @@ def test_a_frame_half_a_turn_away_is_told(dtype: Any, robots: Any) -> None:
 
 
 def test_equations_of_nine_joints_stay_within_their_arrays(tmp_path: Path) -> None:
-    """Their rows have 15 numbers, which are filled up to 16; too large an index ends the process."""
+    """The equations' rows have 15 numbers, which are filled up to 16; too large an index ends the process."""
     system = read_system("planar9")
     write_package(generate(system, ["c", "numpy"], kernel="loops"), tmp_path / "planar9")
     checked = ("-fsanitize=bounds", "-fsanitize-undefined-trap-on-error")
@@ -291,7 +291,7 @@ def test_equations_of_nine_joints_stay_within_their_arrays(tmp_path: Path) -> No
 
 
 def test_an_arm_of_parallel_slides_has_one_motion_too_many(tmp_path: Path) -> None:
-    """Its mass matrix is regular, and its hand moves along one axis by two of them."""
+    """The mass matrix is regular, and the hand moves along one axis by two of the slides."""
     slides = [joint("ab"[k] + "bc"[k], "ab"[k], "bc"[k], type="prismatic", rpy="0 0 0") for k in (0, 1)]
     (tmp_path / "slides.urdf").write_text(chain(*slides))
     write_package(generate(read_system(tmp_path / "slides.urdf"), ["c", "numpy"]), tmp_path / "slides")

@@ -49,7 +49,7 @@ FORCE = np.array([3.0, -2.0, 0.5])
 
 
 def scale(unit: str) -> float:
-    """What a number in this unit is multiplied by where units are smaller: read from the text alone."""
+    """Return the factor of a number in this unit where units are smaller: read from the text alone."""
     above, _, below = unit.partition("/")
     factor = 1.0
     for part, sign in ((above, 1), (below.strip("()"), -1)):
@@ -150,7 +150,8 @@ def units_of(one: Any) -> Any:
 
 
 def same(smaller: Any, larger: Any) -> bool:
-    """Whether numbers in smaller units are as many times larger as their units say; unknown ones any."""
+    """Return whether numbers in smaller units are as many times larger as their units say; unknown ones
+    any."""
     units = units_of(larger)
     assert units.equals(units_of(smaller))
     factor = xr.DataArray([scale(u) if u else np.nan for u in units.values.ravel()], dims="at").values

@@ -1,4 +1,5 @@
-"""What `python tests/learn.py` shows: noisy torques teach a robot its numbers, by whatever gradients."""
+"""Result that `python tests/learn.py` shows: noisy torques teach a robot its numbers, by whatever
+gradients."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,5 @@
-"""What `python tests/learn_damping.py` shows: gains of a controller are learned by gradients through time."""
+"""Result that `python tests/learn_damping.py` shows: gains of a controller are learned by gradients through
+time."""
 
 from collections.abc import Callable
 from types import ModuleType

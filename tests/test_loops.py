@@ -108,7 +108,7 @@ def brush(legs: int, parts: str) -> str:
 def test_torques_err_by_the_rounding_of_what_they_are_summed_from(
     speed: float, package_of: Callable[[str], ModuleType], directory_of: Callable[[str], Path]
 ) -> None:
-    """In float, against double: also where velocities ask a large force of a link that no joint bears."""
+    """Float is held against double, also where velocities ask a large force of a link that no joint bears."""
     package, loops = package_of("puma560"), import_package(directory_of("puma560 loops")).load("native")
     arrays = package.load("numpy", kernel="rule")
     q, qd, qdd = (a.astype(np.float32) for a in random_states(6, 100))
@@ -207,7 +207,7 @@ def test_the_header_counts_its_operations(
 
 
 def test_a_link_counts_what_a_robot_counts_that_has_no_other(tmp_path: Path) -> None:
-    """Of a finger, whose second joint follows the first."""
+    """The links are those of a finger, whose second joint follows the first."""
     finger = joint("a", "base", "one") + joint("b", "one", "tip", inner=mimic("a", 0.5))
     (tmp_path / "finger.urdf").write_text(robot(link("base"), '<link name="one"/>', link("tip"), finger))
     system = read_system(tmp_path / "finger.urdf")

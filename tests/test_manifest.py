@@ -220,7 +220,8 @@ def test_a_manifest_of_another_version_is_told_apart_from_a_damaged_one(package:
 
 
 def leaves(data: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
-    """Where the manifest has a number, a string, null, true or false; of a list's items the last."""
+    """Yield the places where the manifest has a number, a string, null, true or false; of a list's items the
+    last."""
     inner = (
         data.items()
         if isinstance(data, dict)
@@ -241,7 +242,7 @@ def another(value: Any) -> Any:
 
 
 def complaint(package: Path) -> str:
-    """What `check` says of a manifest."""
+    """Return what `check` says of a manifest."""
     try:
         [wrong] = [result for result in check_package(package, 1)[:3] if result.failed]
     except LinkwiseError as error:

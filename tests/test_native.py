@@ -154,7 +154,7 @@ def values_of(held: Any) -> list[np.ndarray]:
 
 @pytest.fixture
 def nobody_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """How many references an object has is the interpreter's own affair, and changed with Python 3.14."""
+    """An object's count of references is the interpreter's own affair, and changed with Python 3.14."""
     monkeypatch.setattr(sys, "getrefcount", lambda _: 2)
 
 
@@ -355,7 +355,7 @@ def test_what_is_written_to_is_known_to_have_changed(package_of: Callable[[str],
 
 
 def for_control(robot: Any, q: Any, qd: Any, tau: Any) -> dict[str, Any]:
-    """What C has functions of one sample for."""
+    """Return what C has functions of one sample for."""
     kinematics, point = robot.kinematics, [0.1, -0.2, 0.3]
     frame = kinematics.frames[-1]
     return {

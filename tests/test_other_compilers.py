@@ -87,7 +87,7 @@ class Robot:
         return np.float64 if self.real == "double" else np.float32
 
     def main(self) -> list[str]:
-        """What compiles answers.c for this robot."""
+        """Return what compiles answers.c for this robot."""
         constants = {key: f"{self.name.upper()}_{key}" for key in ("JOINTS", "LINKS", "C2", "C1", "G")}
         call = f"{self.name}_##name{'##f' if self.real == 'float' else ''}"
         given = {"HEADER": f'"{self.name}.h"', "SAMPLES": SAMPLES, "real": self.real, "CALL(name)": call}
@@ -101,7 +101,7 @@ class Robot:
         ]
 
     def command(self, *command: str) -> str:
-        """What a command prints; fails where it does."""
+        """Return what a command prints; fail where it does."""
         done = subprocess.run(
             command,
             cwd=self.folder,
@@ -153,7 +153,8 @@ def robot_of(
 
 @pytest.fixture(scope="module")
 def wine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, object]]:
-    """How Windows' programs are run; the folder that Wine makes for it is large, and goes in the end."""
+    """Return how Windows' programs are run; the folder that Wine makes for it is large, and goes in the
+    end."""
     place = tmp_path_factory.mktemp("wine")
     settings = {"WINEPREFIX": str(place / "prefix"), "WINEDEBUG": "-all"}
     settings["WINEDLLOVERRIDES"] = "mscoree,mshtml,winemenubuilder.exe="

@@ -1,4 +1,4 @@
-"""On Windows and macOS, as far as Linux can be made to lack what they lack; see `other_system`."""
+"""Windows and macOS, as far as Linux can be made to lack what they lack; see `other_system`."""
 
 import json
 import os

@@ -46,7 +46,7 @@ def prepare(where: Path) -> None:
 
 
 def left(where: Path, way: str) -> str:
-    """What a fault leaves of the target, read as linkwise does."""
+    """Return what a fault leaves of the target, read as linkwise does."""
     if not (where / "target").exists():
         assert WAYS[way], "the target is gone, between two renames"
         sweep(where)

@@ -1,4 +1,4 @@
-"""What the calls of a package take for a motion: every kind that leaves no doubt, and no other."""
+"""Calls of a package take for a motion every kind that leaves no doubt, and no other."""
 
 import pickle
 import re
@@ -322,7 +322,7 @@ REST = np.zeros(3), np.zeros(3)
 def planar3_again(
     directory_of: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory
 ) -> ModuleType:
-    """The same package in another place."""
+    """Return the same package in another place."""
     return import_package(
         shutil.copytree(directory_of("planar3"), tmp_path_factory.mktemp("again") / "planar3")
     )
@@ -349,7 +349,7 @@ def test_a_record_that_is_no_target_is_refused(package_of: Callable[[str], Modul
 
 
 def test_of_each_class_there_is_one(package_of: Callable[[str], ModuleType], tmp_path: Path) -> None:
-    """Also in a package that carries its runtime, once linkwise has opened it: its copy is the library's."""
+    """A package that carries its runtime has the library's classes, too, once linkwise has opened it."""
     write_package(generate(read_system("planar2"), ["numpy"], vendor_runtime=True), tmp_path / "planar2")
     packages = package_of("planar3"), package_of("torso"), import_package(tmp_path / "planar2")
     for name in ("AppliedLoad", "Bodies", "Contact", "FrameImpedance", "Natural", "Target"):
@@ -394,7 +394,7 @@ Vectors = dict[str, tuple[tuple[int, ...], Callable[[Any, Any], Any]]]
 
 
 def calls_beside(package: ModuleType, robot: Any) -> Vectors:
-    """By the name of what stands beside q: its own shape, and a call that takes both."""
+    """Return, by the name of what stands beside q, its own shape and a call that takes both."""
     frame, Target = robot.kinematics.frames[-1], package.Target
     held = robot.partial_impedance(frame=package.FrameImpedance(frame, stiffness=1.0, rows=("x", "y", "rz")))
     free = robot.partial_impedance(frame=package.FrameImpedance(frame, rows=("x", "y", "rz")))

@@ -204,7 +204,7 @@ def test_options_of_reading_make_another_package_and_are_refused_for_one_that_is
 
 
 def test_what_opensim_keeps_in_radians_stays_so_in_a_log_in_degrees(tmp_path: Path) -> None:
-    """Of a coordinate that turns no axis one to one; columns of a locked one are left out unasked."""
+    """The coordinate turns no axis one to one; columns of a locked one are left out unasked."""
     locked = {"joint2_angle": "<default_value>0.4</default_value><locked>true</locked>"}
     (tmp_path / "model.osim").write_text(chain([ROLLING, "PinJoint", "PinJoint"], coordinates=locked))
     columns = "joint0_turn", "joint0_slip", "joint1_angle", "joint2_angle"

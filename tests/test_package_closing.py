@@ -1,4 +1,4 @@
-"""Where loops close without a guess: positions that generate kept, held against MuJoCo's own residuals."""
+"""Positions where loops close without a guess, kept by generate and held against MuJoCo's own residuals."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -232,7 +232,7 @@ def test_joints_own_torques_are_compensated_and_armature_is_kept(backend: str, s
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_friction_is_compensated_only_as_smoothly_as_is_asked_for(backend: str, sprung: ModuleType) -> None:
-    """At rest the sign of a velocity is that of a sensor's noise."""
+    """The sign of a velocity is, at rest, that of a sensor's noise."""
     model, kinds = sprung.load(backend), {}
     frame = sprung.FrameImpedance("two", damping=3.0, rows=("x",))
     for name, given in (("natural", {}), ("whole", {"inertia": 4.0}), ("frame", {"frame": frame})):

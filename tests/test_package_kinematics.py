@@ -108,7 +108,7 @@ def test_a_wrench_on_a_point_loads_the_joints_by_the_transpose(package_of: Calla
 
 
 def centres_in_files_axes(robot: Any) -> Any:
-    """Of each link, in the axes of its frame from that frame's origin."""
+    """Yield the centre of mass of each link, in the axes of its frame from that frame's origin."""
     tree = robot.backend.tree
     at = {frame.name: frame for frame in tree.frames}
     for link in tree.links:
@@ -255,7 +255,7 @@ def test_large_batches_are_computed_in_pieces_that_fit(arm: ModuleType) -> None:
 
 
 def of_frame(package: ModuleType, backend: str, frame: str | int) -> Any:
-    """What each call that takes a frame answers."""
+    """Return what each call that takes a frame answers."""
     robot = package.load(backend)
     about: Any = robot.kinematics
     motion = np.array([[0.3, -1.1, 0.7], [0.7, 0.4, -0.2], [-0.2, 0.9, 0.5]])

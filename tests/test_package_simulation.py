@@ -173,7 +173,7 @@ def test_no_step_is_longer_than_asked_and_torques_are_those_of_its_instants(rod:
 
 
 def middles_of(begin: float, end: float, step: float) -> Any:
-    """Of the fewest equal steps that are none longer than asked."""
+    """Return the middles of the fewest equal steps that are none longer than asked."""
     count = next(n for n in range(1, 100) if (end - begin) / n <= step + 1e-12)
     return begin + (np.arange(count) + 0.5) * (end - begin) / count
 

@@ -98,7 +98,7 @@ def test_sums_are_those_of_the_shares(backend: str, robot: str, package_of: Pack
 def test_christoffel_symbols_of_many_samples_are_slopes_of_the_mass_matrix(
     robot: str, package_of: Packages, spherical: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In pieces of four samples, of which the last is short."""
+    """Symbols come in pieces of four samples, of which the last is short."""
     package = spherical if robot == "spherical" else package_of(robot)
     model, answers = package.load("numpy"), import_module("linkwise_runtime.answers.answers")
     monkeypatch.setattr(answers, "AT_ONCE", 4 * model.n * sum(model.structure.sizes))

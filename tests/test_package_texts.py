@@ -1,4 +1,4 @@
-"""What a package says is read before it runs: a foreign call is refused, whatever its hash says."""
+"""A package's text is read before it runs: a foreign call is refused, whatever its hash says."""
 
 import hashlib
 import json

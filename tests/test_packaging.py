@@ -205,7 +205,7 @@ def test_the_changelog_begins_with_this_version() -> None:
 
 
 def torques_by_pinocchio(robot: Path) -> np.ndarray:
-    """Of each joint through each link, by models in which that link alone has mass."""
+    """Return the torques of each joint through each link, by models in which that link alone has mass."""
     model = pin.buildModelFromUrdf(str(robot))
     links = range(1, model.njoints)
     columns = []

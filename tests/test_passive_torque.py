@@ -1,4 +1,4 @@
-"""What joints take for springs, damping, friction and armature of their own, on every back end."""
+"""Torques that joints take for springs, damping, friction and armature of their own, on every back end."""
 
 import ctypes
 import hashlib

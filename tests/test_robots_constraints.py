@@ -195,7 +195,8 @@ EQUALITIES = {
 
 @pytest.mark.parametrize("equality", EQUALITIES)
 def test_equality_of_mjcf_is_mujocos_own(equality: str, tmp_path: Path) -> None:
-    """At any position, but for turns, which MuJoCo counts otherwise: these are alike where they close."""
+    """The equality holds at any position, but for turns, which MuJoCo counts otherwise: these are alike where
+    they close."""
     mujoco = pytest.importorskip("mujoco")
     path = written(tmp_path, "arms.xml", ARMS.format(equality=EQUALITIES[equality]))
     constraints = loaded(path, tmp_path).constraints
@@ -415,7 +416,7 @@ def test_constraint_that_cannot_be_is_named(case: str, tmp_path: Path) -> None:
     ids=["ties", "couplings"],
 )
 def test_far_more_constraints_than_could_hold_anything_are_refused_at_once(pin: str, tmp_path: Path) -> None:
-    """Which of them follow from others takes time and memory by the square of their number."""
+    """Finding which of them follow from others takes time and memory by the square of their number."""
     tree = FOURBAR.read_text().partition("[[constraint]]")[0]
 
     def refused(count: int) -> str:
@@ -457,7 +458,7 @@ def notes_of(robot: Robot) -> set[tuple[str, str, str]]:
 
 
 def test_ends_that_are_held_or_cut_away_are_told(tmp_path: Path) -> None:
-    """Of the five-bar's arms one is locked, cut away, or both stand still where they do not meet."""
+    """One of the five-bar's arms is locked, cut away, or both stand still where they do not meet."""
     path = DATA / "fivebar.toml"
     held = robot_of(path, lock={"left": 1.0})
     assert [tie.name for tie in held.ties] == ["tip"]
@@ -482,7 +483,7 @@ def test_ends_that_are_held_or_cut_away_are_told(tmp_path: Path) -> None:
 
 
 def test_couplings_pass_through_locks_and_mimic_joints(tmp_path: Path) -> None:
-    """With b = 2 a + 0.3 put in, 1 + a + 3 b^2 + d is 1.27 + 4.6 a + 12 a^2 + d."""
+    """The coupling 1 + a + 3 b^2 + d is 1.27 + 4.6 a + 12 a^2 + d with b = 2 a + 0.3 put in."""
     path = written(
         tmp_path,
         "hand.toml",

@@ -134,7 +134,7 @@ def test_joints_of_many_axes_are_pinocchios_composites(kind: str, tmp_path: Path
 
 
 def test_master_bears_the_torque_of_its_mimic(tmp_path: Path) -> None:
-    """With q_bc = a q_ab + b, τ of the master is τ_ab + a τ_bc of the robot that has both joints."""
+    """The master's τ is, with q_bc = a q_ab + b, τ_ab + a τ_bc of the robot that has both joints."""
     a, b = -1.7, 0.4
     texts = {"mimic": mimic("ab", a, b), "both": ""}
     robots = {}

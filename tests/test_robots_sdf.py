@@ -241,7 +241,7 @@ def test_what_closes_a_loop_has_its_axes_from_links_that_stand_askew(closing: st
 
 
 def _place(robot: Any, frame: Any) -> Any:
-    """Where a frame is at q = 0."""
+    """Return the place of a frame at q = 0."""
     x = np.array(frame.translation, dtype=float)
     for link in reversed(robot.chain(frame.link)):
         joint = robot.links[link].joint

@@ -1,4 +1,4 @@
-"""What a file in TOML need not say: the table in docs/robots.md."""
+"""Entries that a file in TOML may leave out: the table in docs/robots.md."""
 
 import re
 from pathlib import Path

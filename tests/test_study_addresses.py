@@ -52,7 +52,8 @@ def store() -> Iterator[Any]:
 
 
 def test_logs_loads_and_robots_are_read_where_they_lie(store: Any, tmp_path: Path) -> None:
-    """The same study of files beside it and of a store gives the same tables; a changed log is done again."""
+    """A study of files beside it and one of files of a store give the same tables; a changed log is done
+    again."""
     (tmp_path / "arm.urdf").write_text(urdf_text.chain(*map(urdf_text.joint, JOINTS, "abc", "bcd")))
     (tmp_path / "push.xml").write_text(PUSH)
     (tmp_path / "forces.sto").write_text(NUMBERS)

@@ -1,4 +1,4 @@
-"""Which trials a study does again when something changes: those that are made of it, and no others."""
+"""Trials that a study does again when something changes: those that are made of it, and no others."""
 
 import shutil
 from collections.abc import Callable
@@ -123,7 +123,7 @@ def test_a_trial_is_done_again_by_another_linkwise(done: Path, monkeypatch: pyte
 
 
 def test_a_trial_is_made_of_every_file_that_it_names(done: Path, tmp_path: Path) -> None:
-    """Of OpenSim's loads the file of their numbers, too, and what ties the robot's joints."""
+    """OpenSim's loads name the file of their numbers, too, and what ties the robot's joints."""
     loads = '<OpenSimDocument><ExternalLoads><objects><ExternalForce name="f"/></objects>'
     (tmp_path / "plate.xml").write_text(
         f"{loads}<datafile>plate.mot</datafile></ExternalLoads></OpenSimDocument>"

@@ -1,4 +1,4 @@
-"""What is fetched of an address is bounded, whatever its server sends."""
+"""Data fetched of an address are bounded, whatever its server sends."""
 
 from collections.abc import Iterator
 from contextlib import suppress

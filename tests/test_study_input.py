@@ -206,7 +206,7 @@ def put_instead(path: Path, kind: str) -> None:
 
 
 def refusal(file: Path, out: Path) -> str:
-    """For what a study is refused, told within bounds of time and memory."""
+    """Return why a study is refused, told within bounds of time and memory."""
 
     def told() -> str:
         with pytest.raises(LinkwiseError) as caught:
@@ -240,7 +240,7 @@ def test_what_is_no_file_in_the_place_of_a_record_is_told_and_not_read(kind: str
 
 @pytest.mark.parametrize("name", ["summary.parquet", "tests.parquet"])
 def test_a_folder_in_the_place_of_a_studys_file_is_told_before_any_work(name: str, tmp_path: Path) -> None:
-    """Of one that is made again, and of one that a former run made and would now be removed."""
+    """The folder is one that is made again, or one that a former run made and would now be removed."""
     file, out = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1), tmp_path / "out"
     run_study(file, out, Here())
     mark = json.loads((out / "study.json").read_text())

@@ -183,7 +183,7 @@ def test_a_trial_whose_process_dies_is_tried_once_more(tmp_path: Path, deadly: s
 def test_a_trial_whose_process_died_is_tried_after_all_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where it was for want of memory, there may be enough by then."""
+    """There may be enough memory by then, where it was for want of it."""
     file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1)
     for name, value in killing(tmp_path, "once() and", "SIGKILL").items():
         monkeypatch.setenv(name, value)
@@ -202,7 +202,7 @@ def test_a_trial_whose_process_died_is_tried_after_all_others(
 
 
 def test_what_a_killed_study_left_among_passing_files_goes_with_the_next(tmp_path: Path) -> None:
-    """It is killed while it looks at the first log, whose samples are then in a folder that passes."""
+    """The study is killed while it looks at the first log, whose samples are then in a folder that passes."""
     file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS, subjects=1, trials=1)
     (passing := tmp_path / "passing").mkdir()
     study = begun(file, tmp_path / "out", TMPDIR=str(passing), **killing(tmp_path, "not", "SIGKILL"))

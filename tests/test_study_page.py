@@ -59,7 +59,7 @@ def choose(page: Any, name: str, value: object) -> None:
 
 
 def of_subjects(out: Path, factor: str | None, column: str) -> dict[str, Any]:
-    """By level, the mean curve of each subject (subjects, points) over all its trials there."""
+    """Return by level the mean curve of each subject (subjects, points) over all its trials there."""
     table = pd.read_parquet(out / "trials")
     table["level"] = table[factor].astype(str) if factor else "all subjects"
     trials = table.groupby(["level", "subject", "trial", "percent"], observed=True)[column].mean()

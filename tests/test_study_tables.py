@@ -1,4 +1,4 @@
-"""What trials say together, held against pandas, SciPy and spm1d: tables, tests and figures."""
+"""Tables, tests and figures of trials together, held against pandas, SciPy and spm1d."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -86,7 +86,7 @@ def test_a_groups_rows_are_of_its_subjects(means: Path) -> None:
 
 
 def test_means_are_compared_by_subject(means: Path) -> None:
-    """By Welch's test where subjects are unpaired, and the first level less the second."""
+    """Unpaired subjects are compared by Welch's test, and the first level less the second."""
     every = pd.read_parquet(means / "summary.parquet")
     tests = pd.read_parquet(means / "tests.parquet").set_index("column")
     assert sorted(tests.index) == ["q/joint1", "tau/joint1", "tau/joint2", "tau/joint3"]

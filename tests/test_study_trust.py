@@ -1,4 +1,4 @@
-"""What a study's file may have done: it names files to read, and runs no code by itself."""
+"""A study's file may have little done: it names files to read, and runs no code by itself."""
 
 import hashlib
 import json
@@ -77,7 +77,7 @@ def test_python_beside_a_study_is_run_only_where_that_is_asked_for_and_then_told
 
 
 def test_a_package_of_another_version_is_not_run_by_a_study(tmp_path: Path) -> None:
-    """What it carries of its runtime is not at hand to compare with, and may do anything."""
+    """The runtime that it carries is not at hand to compare with, and may do anything."""
     file, mark = with_program(tmp_path, "cart"), tmp_path / "was run"
     made = generate(read_system(DATA / "cart_pendulum.py"), ["numpy"], vendor_runtime=True)
     write_package(made, tmp_path / "cart")
@@ -182,7 +182,7 @@ def test_a_file_with_the_sign_of_chains_in_its_name_is_read(tmp_path: Path) -> N
 def test_a_file_called_by_its_scheme_lies_where_paths_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """From the study's file on, and not from wherever the command was given."""
+    """Paths start from the study's file, and not from wherever the command was given."""
     file = write_study(tmp_path, HEAD, QUICK, CHOICES, TRIALS.replace('"data', '"file://data'), subjects=1)
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")

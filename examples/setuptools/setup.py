@@ -19,7 +19,7 @@ class BuildWithRobot(build_py):
         write_package(files, self._package(), replace=True)
 
     def get_source_files(self) -> list[str]:
-        """What goes into the archive of sources: the robot's file too."""
+        """Return what goes into the archive of sources: the robot's file too."""
         return [*super().get_source_files(), ROBOT]
 
     def _package(self) -> Path:

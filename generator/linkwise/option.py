@@ -18,7 +18,7 @@ REQUIRED: Any = MISSING
 
 @dataclass(frozen=True)
 class Option:
-    """What a field declares of its option, beside type and default.
+    """Declaration of a field's option, beside type and default.
 
     flag: spelling of the flag, by default that of the field's name
     read: makes the field's value of the texts that were written

@@ -85,7 +85,7 @@ def pinocchio_again(case: Case, package: Package, work: Path, results: Results) 
 
 
 def facts(package: Package) -> dict[str, object]:
-    """What generating and compiling came to."""
+    """Return the results of generating and compiling, in words."""
     return {
         "robot": package.name,
         "joints": package.sizes["JOINTS"],
@@ -118,7 +118,7 @@ def machine() -> dict[str, object]:
 
 
 def chooses_kernels() -> bool:
-    """Whether `generate` has a choice of kernels."""
+    """Return whether `generate` has a choice of kernels."""
     command = [sys.executable, "-m", "linkwise", "generate", "--help"]
     return "--kernel" in subprocess.run(command, check=True, capture_output=True, text=True).stdout
 

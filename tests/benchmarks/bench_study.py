@@ -50,7 +50,7 @@ def write_log(path: Path, samples: int, number: int) -> None:
 
 
 def seconds(*arguments: str, folder: Path) -> float:
-    """Of one command from beginning to end; what it writes to `out` goes."""
+    """Return the seconds of one command from beginning to end, and remove what it writes to `out`."""
     began = time.perf_counter()
     subprocess.run([*LINKWISE, *arguments, "--out", "out"], cwd=folder, check=True, capture_output=True)
     took = time.perf_counter() - began

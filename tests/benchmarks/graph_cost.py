@@ -1,4 +1,4 @@
-"""What a part of a torque costs when only its graph runs, beside the whole torque's graph.
+"""Cost of a part of a torque when only its graph runs, beside the whole torque's graph.
 
     python tests/benchmarks/graph_cost.py DIR/NAME [JOINT LINK]
 

@@ -66,7 +66,7 @@ def motion_of(backend: str, batch: int, n: int) -> list[Any]:
 
 
 def quicker(name: str, backend: str, pairs: Sequence[Pair], rounds: int) -> dict[int, bool]:
-    """Whether the second of each pair of calls is quicker, by batch; prints them."""
+    """Return whether the second of each pair of calls is quicker, by batch, and print them."""
     found = {}
     for batch, first, second in pairs:
         one, other = shortest((first, second), rounds)

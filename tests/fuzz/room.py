@@ -1,4 +1,4 @@
-"""Where a case runs, and the watch over what it does to files elsewhere."""
+"""Place where a case runs, and the watch over what it does to files elsewhere."""
 
 import os
 import shutil

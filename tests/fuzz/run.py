@@ -23,7 +23,8 @@ from fuzz.worker import Outcome
 
 @dataclass
 class Tally:
-    """What was run and found; the first finding of each sort is printed and kept in `folder` as it comes."""
+    """Count of what was run and found; the first finding of each sort is printed and kept in `folder` as it
+    comes."""
 
     folder: Path
     ends: Counter[tuple[str, int | None]] = field(default_factory=Counter)
@@ -51,7 +52,7 @@ class Tally:
         (folder / "finding.txt").write_text(told + "\n", encoding="utf-8", errors="backslashreplace")
 
     def summary(self, seconds: float) -> str:
-        """How often each was found, and how many cases there were."""
+        """Return how often each was found, and how many cases there were."""
         lines = [f"{count:>7} × {sort}" for sort, count in self.found.most_common()]
         for kind in dict.fromkeys(kind for kind, _ in self.ends):
             count = sum(number for (which, _), number in self.ends.items() if which == kind)

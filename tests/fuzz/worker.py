@@ -40,7 +40,7 @@ FAULT = re.compile(r"linkwise: fault: (\w+ \([^)]*\))")
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a case did; `faults` is empty where that was right, `place` tells like faults from others."""
+    """Outcome of a case; `faults` is empty where that was right, `place` tells like faults from others."""
 
     status: int | None
     message: str

@@ -93,7 +93,8 @@ class Decider:
         return "survived", f"{total:.0f} s of tests" if total else "nothing reaches it"
 
     def _trusted(self, ended: Ended, tests: list[str], seconds: float, left: list[str], tree: Tree) -> bool:
-        """Whether what failed fails because of the mutant; if not, it is told and does not count any more."""
+        """Return whether what failed fails because of the mutant; if not, it is told and does not count any
+        more."""
         if ended.by and not ended.again:
             self._leave(ended.by, "failed, and passed when it was run again")
             return False

@@ -76,12 +76,14 @@ def formula_mutants(directory: Path) -> list[Mutant]:
 
 
 def _out_of_plane(mutant: Mutant) -> bool:
-    """Whether part of a planar arm leaves its plane by a millionth: no torque, or one of second order."""
+    """Return whether part of a planar arm leaves its plane by a millionth: no torque, or one of second
+    order."""
     return mutant.path.startswith("energies/") and mutant.old == "0.0"
 
 
 def _prose(mutant: Mutant) -> bool:
-    """Whether it changes no result: a head, when results pass the cache by, 0 · W, · W where W is 1."""
+    """Return whether it changes no result: a head, when results pass the cache by, 0 · W, · W where W is
+    1."""
     text = mutant.text
     nothing = mutant.old == "*" and (
         "_one(" in text or (mutant.place == 1 and text.partition("*")[0].endswith("[0 "))
@@ -94,7 +96,7 @@ def _prose(mutant: Mutant) -> bool:
 
 
 def caught(directory: Path, mutant: Mutant | None, seconds: int = 120) -> bool:
-    """Whether `check` refuses the package with this change, in a process of its own.
+    """Return whether `check` refuses the package with this change, in a process of its own.
 
     What takes more `seconds` of the processor, or ten times as long, is caught too. The parent may compute
     nothing with torch: what it has forked could not.

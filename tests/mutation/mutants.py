@@ -83,7 +83,7 @@ class Mutant:
         return f"{self.path}: {self.text} [{self.old} -> {self.new or 'nothing'}, {self.place}]"
 
     def parses(self, text: str) -> bool:
-        """Whether what comes out is Python, where that is what it was."""
+        """Return whether what comes out is Python, where that is what it was."""
         if not self.path.endswith(".py"):
             return True
         try:
@@ -100,7 +100,7 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Rules:
-    """What is changed beside operators and words.
+    """Rules of what is changed beside operators and words.
 
     share: of a float, by which it grows; names: whether digits and axes in names change, as in t12 and v3_x
     """
@@ -227,7 +227,8 @@ def _statements(text: str) -> Iterator[tuple[int, str, str]]:
 
 
 def _hidden(path: str, text: str) -> list[tuple[int, int]]:
-    """Where nothing is changed: strings and annotations of Python, comments and preprocessor lines of C."""
+    """Return the spans where nothing is changed: strings and annotations of Python, comments and preprocessor
+    lines of C."""
     if path.endswith(".html.j2"):
         # Outside of scripts, only what is filled in.
         scripts = [m.span() for m in SCRIPT.finditer(text)]

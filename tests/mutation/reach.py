@@ -1,4 +1,4 @@
-"""Which tests reach a line: each file of tests runs under coverage.py, anew when its text changes.
+"""Tests that reach a line: each file of tests runs under coverage.py, anew when its text changes.
 
 Kept by the text of the line and by the function's name, not by number, so that it stays true while lines
 move. What programs of the tests reach counts for the test that runs them, what fixtures of many tests reach
@@ -35,7 +35,7 @@ patch = _exit, fork
 
 @dataclass(frozen=True)
 class Reached:
-    """What one file of tests reaches.
+    """Lines and functions that one file of tests reaches.
 
     seconds: of the processor, of each of its tests; functions: of a source, by name, "" for what runs at
     its import: tests, or "" where every test of the file may depend on it; lines: the same of lines within
@@ -55,7 +55,7 @@ class Reached:
         return set(self.functions[path].get(function, ()) if tests is None else tests)
 
     def share(self, folder: str) -> float:
-        """Of all functions that are reached, the part that is in a folder."""
+        """Return the part of all reached functions that is in a folder."""
         counts = {path: sum(bool(name) for name in found) for path, found in self.functions.items()}
         inside = sum(count for path, count in counts.items() if path.rpartition("/")[0] == folder)
         return max(inside, 1) / max(sum(counts.values()), 1)
@@ -81,7 +81,7 @@ def _bare_digest(text: str) -> str:
 
 
 def _is_text(node: ast.stmt) -> bool:
-    """Whether a statement is a docstring, or a string that stands below what it tells of."""
+    """Return whether a statement is a docstring, or a string that stands below what it tells of."""
     text = node.value if isinstance(node, ast.Expr) else None
     return isinstance(text, ast.Constant) and isinstance(text.value, str)
 
@@ -101,7 +101,7 @@ def digest_of_test(path: Path, test: str) -> str:
 
 
 class Map:
-    """What each file of tests reaches, kept in a folder."""
+    """Map of what each file of tests reaches, kept in a folder."""
 
     def __init__(self, folder: Path) -> None:
         """Take what is there; files that changed since are not in it."""

@@ -1,4 +1,4 @@
-"""Which room each source file belongs to, which of its lines are changed, and which tests count.
+"""Room that each source file belongs to, the lines of it that are changed, and the tests that count.
 
 A room of the house is a room here, with those of the runtime and the templates apart. The tests of a Python
 file are those that reach the changed function; for what Python does not run, a room names its tests, cheap
@@ -178,7 +178,7 @@ def text_of(path: str) -> str:
 
 
 def lines_of(room: str) -> int:
-    """How many lines a room has."""
+    """Return how many lines a room has."""
     return sum(text_of(path).count("\n") for path in files_of(room))
 
 
@@ -200,7 +200,7 @@ def drawn(room: str) -> list[Mutant]:
 
 
 def _by_chance(path: str) -> Iterator[tuple[str, list[Mutant]]]:
-    """For each line, its chance and its mutants, both by a hash."""
+    """Yield the chance of each line and its mutants, both by a hash."""
     by_line: dict[int, list[Mutant]] = {}
     for mutant in mutants(path, text_of(path)):
         by_line.setdefault(mutant.line, []).append(mutant)

@@ -43,7 +43,7 @@ _IGNORED = shutil.ignore_patterns("__pycache__", "mutation", "test_mutation.py")
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run of tests ended.
+    """End of a run of tests.
 
     code: pytest's exit status, or minus the signal; by: the first test that failed, "" where none was told;
     again: whether it failed again when it ran alone
@@ -55,12 +55,12 @@ class Ended:
 
     @property
     def passed(self) -> bool:
-        """Whether every test passed; that there was none is no failure."""
+        """Return whether every test passed; that there was none is no failure."""
         return self.code in (0, 5)
 
     @property
     def too_slow(self) -> bool:
-        """Whether it was ended for the time it took."""
+        """Return whether it was ended for the time it took."""
         return self.code in (-signal.SIGXCPU, -signal.SIGALRM)
 
 
@@ -86,7 +86,7 @@ class Tree:
         compileall.compile_dir(folder, quiet=2, invalidation_mode=mode)
 
     def place(self, path: str) -> Path:
-        """Where a file of the project is in this copy."""
+        """Return the place of a file of the project in this copy."""
         inner = path.removeprefix("generator/")
         return self.folder / (inner if inner != path else f"linkwise/{path}")
 

@@ -1,4 +1,4 @@
-"""What was decided, kept on disk, so that a sweep goes on where it stopped and runs nothing twice."""
+"""Verdicts kept on disk, so that a sweep goes on where it stopped and runs nothing twice."""
 
 import hashlib
 import json
@@ -22,7 +22,7 @@ HEAD = "| room | mutants | caught | equivalent | score |\n|---|---:|---:|---:|--
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a mutant.
+    """Verdict on a mutant.
 
     verdict: killed, too slow or survived; by: the test that failed, else how much was run;
     source: digest of the code of the file that is changed; tests: of the test that failed, else of all
@@ -117,7 +117,7 @@ def _read(told: str) -> Verdict:
 
 @dataclass(frozen=True)
 class Score:
-    """How a room stands."""
+    """Count of a room's verdicts."""
 
     room: str
     mutants: int
@@ -145,7 +145,7 @@ def explained() -> Mapping[str, str]:
 
 
 def scores(record: Record, rooms: Sequence[str] = tuple(ROOMS)) -> list[Score]:
-    """How each room stands, for the texts as they are."""
+    """Yield the score of each room, for the texts as they are."""
     reasons = explained()
     found = []
     for room in rooms:

@@ -1,4 +1,4 @@
-"""What is left of an impedance where the controller runs at a rate, late, or believes the wrong masses.
+"""Remains of an impedance where the controller runs at a rate, late, or believes the wrong masses.
 
 Robots that MuJoCo moves are pushed by known forces, to which an impedance is fitted; let go beside their
 target, which shows the stored energy; and led along a moving target.
@@ -22,7 +22,7 @@ SWING = 1.0
 
 @dataclass(frozen=True)
 class Loop:
-    """How a controller is run."""
+    """Loop in which a controller is run."""
 
     name: str
     held: bool = True
@@ -72,15 +72,15 @@ class JointSpace:
         return q - self.start
 
     def target(self, x: Any, xd: Any, xdd: Any) -> Any:
-        """Of the controller, at x (..., m)."""
+        """Return the controller's target at x (..., m)."""
         return self.package.Target(self.start + x, xd, xdd)
 
     def external(self, q: Any, force: Any) -> Any:
-        """What a force (m,) at one position puts on the joints."""
+        """Return what a force (m,) at one position puts on the joints."""
         return force
 
     def push(self, force: Callable[[float], Any]) -> dict[str, Callable[[float], Any]]:
-        """The same for the plant."""
+        """Return the same force for the plant, by the name that it has there."""
         return {"joints": force}
 
 
@@ -122,7 +122,7 @@ class HandSpace:
 
 @dataclass(frozen=True)
 class Course:
-    """What happens to one copy: a push, a moving target, or a start away from it."""
+    """Course of one copy: a push, a moving target, or a start away from it."""
 
     force: Sines | None = None
     swing: Any = None
@@ -151,7 +151,7 @@ class Copy:
 
 @dataclass(frozen=True)
 class Record:
-    """Of one copy at every period."""
+    """Record of one copy at every period."""
 
     offset: Any
     """(samples, m)"""
@@ -195,7 +195,8 @@ def run(space: Any, copies: Sequence[Copy], model: Callable[[float], Any], secon
 
 
 def _torque(space: Any, copy: Copy, q: Any, qd: Any, t: float) -> Any:
-    """Of one copy (joints,), for what is measured at t, or what that lets expect of a time ahead."""
+    """Return the torque of one copy (joints,), for what is measured at t, or what that lets expect of a time
+    ahead."""
     course, m = copy.course, len(space.wanted.inertia)
     force = course.pushed(t, m)
 
@@ -228,7 +229,7 @@ def measured(record: Record, seconds: float) -> Impedance:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one way to run the loop."""
+    """Outcome of one way to run the loop."""
 
     loop: Loop
     found: Impedance
@@ -248,7 +249,7 @@ def studied(
     swing: Any,
     seconds: float,
 ) -> list[Outcome]:
-    """What is left under each loop; all held, or none.
+    """Return what is left under each loop; all held, or none.
 
     motion: how far each direction is pushed at each frequency; swing: how far the target goes and back;
     seconds: of the fitted record, before which as many pass for the start to die away

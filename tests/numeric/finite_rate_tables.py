@@ -66,7 +66,7 @@ def by_inertia(space: JointSpace) -> str:
 
 
 def percent(share: float) -> str:
-    """To two digits, and no more than two behind the point."""
+    """Return a share in percent to two digits, and no more than two behind the point."""
     return f"{round(float(f'{100.0 * share:.2g}'), 2):g} %" if share >= 1e-4 else "< 0.01 %"
 
 
@@ -76,7 +76,7 @@ def planar3_of(by: float) -> Any:
 
 
 def panda_of(by: float) -> Any:
-    """Likewise."""
+    """Return Panda with links that are heavier by a share."""
     return heavier(panda_model(PANDA), np.full(7, 1.0 + by))
 
 

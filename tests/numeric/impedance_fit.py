@@ -13,7 +13,7 @@ WAVES = 3
 
 
 class Impedance(NamedTuple):
-    """Of an equation M xdd + B xd + K x = f."""
+    """Matrices of an equation M xdd + B xd + K x = f."""
 
     inertia: Any
     damping: Any

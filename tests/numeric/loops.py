@@ -75,7 +75,7 @@ def hinge(name: str, parent: str, child: str, xyz: Row, rpy: Row = NONE, axis: R
 
 
 def fourbar() -> Mechanism:
-    """In a plane: a pin in space, of whose rows one is held twice."""
+    """Return a four-bar in a plane: a pin in space, of whose rows one is held twice."""
     joints = (
         hinge("crank", "base", "a", NONE),
         hinge("knee", "a", "b", (0.3, 0.0, 0.0)),
@@ -88,7 +88,7 @@ def fourbar() -> Mechanism:
 
 
 def fivebar() -> Mechanism:
-    """In a plane: a hinge, of whose five rows three are held twice."""
+    """Return a five-bar in a plane: a hinge, of whose five rows three are held twice."""
     joints = (
         hinge("left", "base", "a", NONE),
         hinge("left_elbow", "a", "b", (0.2, 0.0, 0.0)),

@@ -18,7 +18,7 @@ HAND_MASS = 3.0
 
 
 def spring_and_damper(inertia: Any) -> Impedance:
-    """What moves with an inertia at FREQUENCY and RATIO."""
+    """Return the impedance of an inertia that moves at FREQUENCY and RATIO."""
     return Impedance(inertia, 2 * RATIO * FREQUENCY * inertia, FREQUENCY**2 * inertia)
 
 
@@ -60,7 +60,7 @@ def natural_hand(package: Any) -> HandSpace:
 
 
 def _hand(package: Any, wanted: Impedance, sensed: bool, *targets: Any) -> HandSpace:
-    """What the hand leaves free stays by a weak spring."""
+    """Return the space of the hand; what the hand leaves free stays by a weak spring."""
     robot, start = package.load("native"), PANDA_AT_WORK
     natural = robot.mass_matrix(start)
     controller = robot.partial_impedance(

@@ -36,7 +36,8 @@ def planar_model(links: int = 3) -> Any:
 
 
 def panda_spec(urdf: Path) -> Any:
-    """What MuJoCo's own compiler reads of Panda's URDF, its fingers held, with the shapes of its links."""
+    """Return what MuJoCo's own compiler reads of Panda's URDF, its fingers held, with the shapes of its
+    links."""
     text = re.sub('type="prismatic"', 'type="fixed"', urdf.read_text())
     # Bodies on fixed joints stay bodies, so that the hand can be pushed by its name.
     options = '<mujoco><compiler fusestatic="false" balanceinertia="false"/></mujoco>'

@@ -1,4 +1,4 @@
-"""What OpenSim answers of a model that linkwise has read, in linkwise's coordinates and their rates."""
+"""OpenSim's answers on a model that linkwise has read, in linkwise's coordinates and their rates."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -65,7 +65,7 @@ class Beside:
         return moved.columns.T @ moved.turn.T @ force
 
     def torques_of_energies(self) -> Any:
-        """What the Lagrangian of OpenSim's own energies asks for, by differences of fourth order."""
+        """Return what the Lagrangian of OpenSim's own energies asks for, by differences of fourth order."""
         model, locked = bare(self.file, ())
         state = model.initSystem()
         q, qd, qdd = self.motion
@@ -105,7 +105,7 @@ class Beside:
 
 
 class Moved(NamedTuple):
-    """How OpenSim's coordinates follow linkwise's, their rates, and E of u = E q̇ with its rate."""
+    """OpenSim's coordinates as functions of linkwise's, their rates, and E of u = E q̇ with its rate."""
 
     columns: Any
     rate: Any
@@ -153,7 +153,7 @@ Followed = tuple[str, float, float, float]
 
 
 def follows(model: Any, order: list[str], free: dict[str, float], locked: dict[str, float]) -> list[Followed]:
-    """What all coordinates are, by OpenSim's own functions of couplings."""
+    """Return what each coordinate follows, by OpenSim's own functions of couplings."""
     found: dict[str, Followed] = {name: (name, value, 1.0, 0.0) for name, value in free.items()}
     found |= {name: ("", value, 0.0, 0.0) for name, value in locked.items()}
     every = (model.getConstraintSet().get(k) for k in range(model.getConstraintSet().getSize()))

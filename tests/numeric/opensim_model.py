@@ -106,7 +106,7 @@ class OpenSimModel:
         return state
 
     def order(self, state: Any) -> list[int]:
-        """Where Simbody has the speed of each coordinate."""
+        """Return the places where Simbody has the speed of each coordinate."""
         numbered = osim.State(state)
         for k, name in enumerate(self.names):
             self.model.getCoordinateSet().get(name).setSpeedValue(numbered, float(k))
@@ -115,5 +115,5 @@ class OpenSimModel:
 
 
 def numbers(vector: Any) -> Any:
-    """What a vector of Simbody holds."""
+    """Return the numbers of a vector of Simbody."""
     return np.array([vector.get(k) for k in range(vector.size())])

@@ -19,7 +19,7 @@ BASE = {
 
 
 class Map(NamedTuple):
-    """How one degree of freedom of Pinocchio's moves: ratio · q[coordinate] + offset; None stands still."""
+    """Motion of one degree of freedom of Pinocchio's: ratio · q[coordinate] + offset; None stands still."""
 
     at: int
     velocity_at: int

@@ -63,7 +63,7 @@ def drawn(seed: int) -> RobotData:
 
 
 def features(robot: RobotData) -> Counter[str]:
-    """What a robot has: its joint types, branches, mimic joints, massless links."""
+    """Return what a robot has: its joint types, branches, mimic joints, massless links."""
     parents = Counter(joint.parent for joint in robot.joints)
     there = {joint.type for joint in robot.joints} | {robot.form}
     there |= {"branch"} if max(parents.values()) > 1 else set()

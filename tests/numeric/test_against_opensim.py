@@ -50,7 +50,7 @@ FEET = {"swings": None, "stands": Foot("foot", SOLE, False), "stuck": Foot("foot
 
 
 def package(folder: Path, name: str) -> Any:
-    """What linkwise makes of the folder's robot.toml."""
+    """Return the package that linkwise makes of the folder's robot.toml."""
     system = read_system(folder / "robot.toml")
     write_package(generate(system, ["numpy"], name, kernel="loops"), folder / name)
     return import_package(folder / name)
@@ -128,7 +128,7 @@ class Asked:
         self.given["loads"] = [self._calf(q), leg.module.AppliedLoad("torso", PUSH, point=HAND)]
 
     def _calf(self, q: Any) -> list[Any]:
-        """What pulls both ends together."""
+        """Return the two loads of a muscle that pulls both ends together."""
         ends = [self.leg.robot.kinematics.pose(q, name) @ (*point, 1.0) for name, point in CALF.items()]
         line = (ends[1] - ends[0])[:3]
         pull = TENSION * line / np.linalg.norm(line)

@@ -91,7 +91,7 @@ ONE_ENERGY_ALONE = {
 
 
 class OfLink(NamedTuple):
-    """What LagrangesMethod says of one link at every state; c1 as half the slope by velocities."""
+    """Answers of LagrangesMethod on one link at every state; c1 as half the slope by velocities."""
 
     c2: Any
     c1: Any

@@ -1,4 +1,5 @@
-"""How many combinations of parameters torques tell, of ten real robots: the rank of Pinocchio's regressor."""
+"""Number of parameter combinations that torques tell, of ten real robots: the rank of Pinocchio's
+regressor."""
 
 from pathlib import Path
 from typing import Any

@@ -60,7 +60,7 @@ class Cassie:
         self.data = self.model.createData()
 
     def order(self, names: tuple[str, ...]) -> Any:
-        """Where Pinocchio has the joints of these names."""
+        """Return where Pinocchio has the joints of these names."""
         return [self.model.joints[self.model.getJointId(name)].idx_v for name in names]
 
 

@@ -44,7 +44,7 @@ class Closed:
         self.tau = draw.uniform(-1.0, 1.0, (SAMPLES, n))
 
     def each(self, of_sample: Callable[..., Any], *motion: Any) -> Any:
-        """What the oracle says, sample by sample."""
+        """Return what the oracle says, sample by sample."""
         return np.array([of_sample(*(a[s] for a in motion)) for s in range(SAMPLES)])
 
 

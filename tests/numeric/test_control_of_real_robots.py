@@ -24,7 +24,7 @@ pytestmark = needs_compiler
 
 
 def functions(package: Path) -> ctypes.CDLL:
-    """Those of the part that has them, and of the sines."""
+    """Return the library of the part that has functions for control, and of the sines."""
     made = str(package / "control.so")
     source, objects = str(package / "c" / "robot.c"), []
     for part in ("CONTROL", "SINES"):

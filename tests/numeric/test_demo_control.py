@@ -1,4 +1,4 @@
-"""What `make demo-control` shows: how far a push moves Panda's hand, limp, soft and stiff."""
+"""Result that `make demo-control` shows: how far a push moves Panda's hand, limp, soft and stiff."""
 
 from collections.abc import Callable
 from types import ModuleType

@@ -79,7 +79,7 @@ class Driven:
         return write_csv(path, np.column_stack([t, q, torque]), names)
 
     def rank(self) -> int:
-        """Of what Pinocchio's regressor comes to on the independent joints, in closed positions."""
+        """Return the rank of Pinocchio's regressor on the independent joints, in closed positions."""
         draw, model, rows = np.random.default_rng(6), self.oracle.model, []
         order = self.oracle.order
         carried = np.repeat([inertia.mass > 0.0 for inertia in model.inertias[1:]], 10)
@@ -96,7 +96,7 @@ class Driven:
 
 
 def other(mechanism: Mechanism) -> Mechanism:
-    """The same with links that are some 30 % lighter or heavier, their centres elsewhere."""
+    """Return the mechanism with links that are some 30 % lighter or heavier, their centres elsewhere."""
     draw = np.random.default_rng(7)
     links = []
     for link in mechanism.robot.links:

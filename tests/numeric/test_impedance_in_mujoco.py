@@ -102,7 +102,7 @@ def test_a_hand_weighs_what_it_is_told_in_every_direction(package_of: Callable[[
 
 
 def expected_change(space: Any, loop: Loop) -> Impedance:
-    """To first order in the time that torques are late by.
+    """Return the change of an impedance, to first order in the time that torques are late by.
 
     Torques act half a period late where they are held, one more where they are late, and velocities by
     differences are of half a period before. With G = dg/dq and J = M* H^-1,

@@ -32,7 +32,8 @@ class OneSource(PinocchioModel):
     """Accelerations of one source, the others away, by the articulated-body algorithm where it can be."""
 
     def alone_at(self, q: Any, qd: Any, tau: Any, weight: bool, load: tuple[Any, ...] | None = None) -> Any:
-        """Of torques, velocities, all weights or not, and a wrench on a point of a body."""
+        """Return accelerations by torques, velocities, all weights or not, and a wrench on a point of a
+        body."""
         gravity = self.model.gravity.linear.copy()
         self.model.gravity.linear = gravity * weight
         try:

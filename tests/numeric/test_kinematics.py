@@ -60,7 +60,7 @@ class WithFrames(PinocchioModel):
         return self.data
 
     def frame(self, name: str) -> dict[str, Any]:
-        """What Pinocchio says of a body's frame, with the rows of rotation first."""
+        """Return what Pinocchio says of a body's frame, with the rows of rotation first."""
         model, data, at = self.model, self.data, self.model.getFrameId(name, pin.BODY)
         swap = np.r_[3:6, :3]
         return {

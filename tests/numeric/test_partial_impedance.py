@@ -157,7 +157,7 @@ def test_a_moving_target_is_followed_as_the_target_equation_says(arm: Arm) -> No
 
 @pytest.mark.parametrize("rows", [("x", "y", "z", "rx", "ry", "rz"), ("x", "z")], ids=["all", "two"])
 def test_a_frame_obeys_its_target_equation(arm: Arm, rows: tuple[str, ...]) -> None:
-    """Of turns the equation is linear in the angle about one axis only, so that turns are held apart."""
+    """The equation is linear in the angle about one axis only, so that turns are held apart."""
     places = [row for row in rows if len(row) == 1]
     count, time = len(places), np.linspace(0.0, 0.4, 5)
     inertia, damping, stiffness = (positive(count, size, seed) for seed, size in enumerate((3.0, 8.0, 60.0)))

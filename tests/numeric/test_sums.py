@@ -66,7 +66,7 @@ def pinocchio_says(name: str) -> dict[str, Any]:
 
 
 def answers_of(robot: Any) -> dict[str, Any]:
-    """What a robot says at the same states."""
+    """Return what a robot says at the same states."""
     motion: Any = random_states(robot.n, STATES)
     if robot.backend.takes_tensors:
         torch = pytest.importorskip("torch")

@@ -1,4 +1,4 @@
-"""What one arm's joints bear, and through which link."""
+"""Loads that one arm's joints bear, and through which link."""
 
 import numpy as np
 

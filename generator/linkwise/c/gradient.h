@@ -8,7 +8,7 @@
    coordinate. */
 
 /* Sdd of every joint, by its frame. */
-static inline void KERNEL(second_changes)(const motion *m, const real *gravity, screw *second)
+static inline void SIZED(second_changes)(const motion *m, const real *gravity, screw *second)
 {
     const vector g = {same(gravity[0]), same(gravity[1]), same(gravity[2])};
     for (int f = 1; f <= FRAMES; ++f) {
@@ -26,26 +26,26 @@ static inline void KERNEL(second_changes)(const motion *m, const real *gravity, 
 
 /* c0 of a link, to which each pair of joints on its path adds: `frames` from the base on, each of which follows the
    coordinate at `places` of the path. */
-static inline void KERNEL(gradient)(const motion *m, const screw *second, const moving_link *l, int count, const short *frames,
+static inline void SIZED(gradient)(const motion *m, const screw *second, const moving_link *l, int count, const short *frames,
     const short *places, int length, real *c0)
 {
     const vector force = l->wrench.s;
     for (int b = 0; b < count; ++b) {
         const int f = frames[b];
         const screw axis = m->axis[f - 1], change = m->change[f - 1], sdd = second[f];
-        const screw moves = KERNEL(moves)(l, &axis, KERNEL(arm)(l, &axis));
+        const screw moves = SIZED(moves)(l, &axis, SIZED(arm)(l, &axis));
         const vector twice = scale(same(R(2.0)), change.z);
         const vector slips = subtract_cross(subtract_cross(sdd.s, l->com, sdd.z), l->velocity, twice);
         const screw behind = {add_applied(apply(l->inertia, sdd.z), l->turning, twice), slips};
         const screw before = {add_cross(add_cross(behind.z, axis.z, l->wrench.z), moves.s, force),
             add_cross(behind.s, axis.z, force)};
         for (int a = 0; a < count; ++a) {
-            const screw *other = &m->axis[frames[a] - 1], of = KERNEL(moves)(l, other, KERNEL(arm)(l, other));
+            const screw *other = &m->axis[frames[a] - 1], of = SIZED(moves)(l, other, SIZED(arm)(l, other));
             real *entry = c0 + (places[a] * length + places[b]) * W;
             PUT(entry, TAKE(entry) + along(&of, a <= b ? &before : &behind));
         }
 #ifdef CURVED
-        const screw own = KERNEL(moves)(l, &m->bend[f - 1], KERNEL(arm)(l, &m->bend[f - 1]));
+        const screw own = SIZED(moves)(l, &m->bend[f - 1], SIZED(arm)(l, &m->bend[f - 1]));
         real *entry = c0 + (places[b] * length + places[b]) * W;
         PUT(entry, TAKE(entry) + along(&own, &l->wrench));
 #endif

@@ -241,13 +241,13 @@ static void gradient_rows(size_t count, INPUTS, int dense, real *c0)
         const size_t samples = count - s < BLOCK ? count - s : BLOCK;
         rows_moved(x, samples, q + s * N, qd + s * N, qdd + s * N, m);
         for (int part = 0; part < BLOCK_PARTS; ++part)
-            KERNEL(second_changes)(&m[part], x->gravity, second[part]);
+            SIZED(second_changes)(&m[part], x->gravity, second[part]);
         for (int j = 0; j < LINKS; ++j) {
             const int length = path_start[j + 1] - path_start[j], joints_of_j = frames_of(j, frames, places);
             clear((size_t)length * (size_t)length * BLOCK, block);
             for (int part = 0; part < BLOCK_PARTS; ++part) {
-                const moving_link l = KERNEL(link_at)(&m[part], links[j].frame, &x->bodies[j], x->gravity);
-                KERNEL(gradient)(&m[part], second[part], &l, joints_of_j, frames, places, length, block + part * LANES);
+                const moving_link l = SIZED(link_at)(&m[part], links[j].frame, &x->bodies[j], x->gravity);
+                SIZED(gradient)(&m[part], second[part], &l, joints_of_j, frames, places, length, block + part * LANES);
             }
             if (dense)
                 to_cubes(j, j + 1, 0, block, wait.ones, samples, &wait, c0 + s * row);

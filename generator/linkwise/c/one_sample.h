@@ -79,7 +79,6 @@ SHARED void API(dense_one)(INPUTS, const struct dense *to)
 
 #undef W
 #undef number
-#undef KERNEL
 #undef SIZED
 #undef TAKE
 #undef PUT

@@ -1,6 +1,6 @@
 /* The rigid-link rule in loops. The same in every package of linkwise.
 
-   The file that includes it has the robot's tables `joints` and `sums` (tree.h) and says what KERNEL makes of a name and what a `number` is:
+   The file that includes it has the robot's tables `joints` and `sums` (tree.h) and says what SIZED makes of a name and what a `number` is:
    that of one sample, or the lanes of several.
 
    All vectors are in the base's axes. Joint k's axis is S = (z, s): z its direction times its ratio, s = p x z with its
@@ -19,9 +19,9 @@
    Errors of tau are rounding of its wrench. What velocities add to that, a centripetal force say, may be large and do
    nothing along any axis: where the joints move fast and hardly accelerate, few digits of tau are left. */
 
-#define motion KERNEL(motion)
-#define moving_link KERNEL(moving_link)
-#define wrenches KERNEL(wrenches)
+#define motion SIZED(motion)
+#define moving_link SIZED(moving_link)
+#define wrenches SIZED(wrenches)
 
 /* Frames, 0 being the base: axes, place, twist (w, v) and its rate (wd, vd), v at the base's origin. Columns: S and its
    change. Where joints follow curves, how S changes by its own coordinate, and what this adds to S's second change. */
@@ -49,7 +49,7 @@ typedef struct {
     screw moves[LONGEST], c2[LONGEST], c1[LONGEST];
 } wrenches;
 
-static inline void KERNEL(base)(motion *m)
+static inline void SIZED(base)(motion *m)
 {
     const number zero = same(R(0.0)), one = same(R(1.0));
     const vector none = {zero, zero, zero};
@@ -61,7 +61,7 @@ static inline void KERNEL(base)(motion *m)
 }
 
 /* A row of a frame's axes from that of its parent's. */
-INLINE vector KERNEL(axes)(vector row, const real *t, number sine, number cosine)
+INLINE vector SIZED(axes)(vector row, const real *t, number sine, number cosine)
 {
     const number x = row.x * t[0] + row.y * t[3] + row.z * t[6], y = row.x * t[1] + row.y * t[4] + row.z * t[7];
     const vector axes = {cosine * x + sine * y, cosine * y - sine * x, row.x * t[2] + row.y * t[5] + row.z * t[8]};
@@ -70,15 +70,15 @@ INLINE vector KERNEL(axes)(vector row, const real *t, number sine, number cosine
 
 /* Frame f, its joint turned by an angle with this sine and cosine, or moved by ratio * by; derivatives of `by` are `stride`
    behind each other. */
-static inline void KERNEL(frame)(motion *m, int f, const struct placing *here, number sine, number cosine, const real *by,
+static inline void SIZED(frame)(motion *m, int f, const struct placing *here, number sine, number cosine, const real *by,
     int stride, number qd, number qdd)
 {
     const struct joint *joint = &joints[f - 1];
     const matrix above = m->turn[joint->parent];
     const screw twist = m->twist[joint->parent], rate = m->rate[joint->parent];
     const vector none = m->place[0];
-    const matrix turn = {KERNEL(axes)(above.x, here->turn, sine, cosine),
-        KERNEL(axes)(above.y, here->turn, sine, cosine), KERNEL(axes)(above.z, here->turn, sine, cosine)};
+    const matrix turn = {SIZED(axes)(above.x, here->turn, sine, cosine),
+        SIZED(axes)(above.y, here->turn, sine, cosine), SIZED(axes)(above.z, here->turn, sine, cosine)};
     const vector z = {turn.x.z, turn.y.z, turn.z.z}, direction = scale(same(here->ratio), z);
     vector place = joint->placed ? add(m->place[joint->parent], turned(above, here->place)) : none;
     screw axis = {direction, cross(place, direction)}, change;
@@ -116,7 +116,7 @@ static inline void KERNEL(frame)(motion *m, int f, const struct placing *here, n
 }
 
 /* Columns of joints that follow one coordinate together, for all or the `wanted` frames. */
-static inline void KERNEL(sum_columns)(motion *m, const char *wanted)
+static inline void SIZED(sum_columns)(motion *m, const char *wanted)
 {
     for (int column = FRAMES; column < COLUMNS; ++column) {
         const int a = sums[column - FRAMES].column, b = sums[column - FRAMES].joint;
@@ -130,7 +130,7 @@ static inline void KERNEL(sum_columns)(motion *m, const char *wanted)
 }
 
 /* A row of the inertia in the base's axes: of R J R', with J = xx, yy, zz, xy, xz, yz. */
-INLINE vector KERNEL(inertia_row)(matrix turn, vector row, const real *j)
+INLINE vector SIZED(inertia_row)(matrix turn, vector row, const real *j)
 {
     const vector half = {row.x * j[0] + row.y * j[3] + row.z * j[4], row.x * j[3] + row.y * j[1] + row.z * j[5],
         row.x * j[4] + row.y * j[5] + row.z * j[2]};
@@ -138,7 +138,7 @@ INLINE vector KERNEL(inertia_row)(matrix turn, vector row, const real *j)
 }
 
 /* The link of this body, at frame f. */
-INLINE moving_link KERNEL(link_at)(const motion *m, int f, const struct body *body, const real *gravity)
+INLINE moving_link SIZED(link_at)(const motion *m, int f, const struct body *body, const real *gravity)
 {
     const matrix turn = m->turn[f];
     const screw twist = m->twist[f], rate = m->rate[f];
@@ -149,8 +149,8 @@ INLINE moving_link KERNEL(link_at)(const motion *m, int f, const struct body *bo
     l.com = add(m->place[f], turned(turn, body->com));
     l.velocity = add_cross(twist.s, twist.z, l.com);
     const vector acceleration = add_cross(add_cross(rate.s, rate.z, l.com), twist.z, l.velocity);
-    const matrix inertia = {KERNEL(inertia_row)(turn, turn.x, j), KERNEL(inertia_row)(turn, turn.y, j),
-        KERNEL(inertia_row)(turn, turn.z, j)};
+    const matrix inertia = {SIZED(inertia_row)(turn, turn.x, j), SIZED(inertia_row)(turn, turn.y, j),
+        SIZED(inertia_row)(turn, turn.z, j)};
     l.inertia = inertia;
     /* -w x E = w x I - tr(I) / 2 w x, and column c of w x I is w x I_c. */
     const vector x = cross(twist.z, inertia.x), y = cross(twist.z, inertia.y), z = cross(twist.z, inertia.z);
@@ -164,20 +164,20 @@ INLINE moving_link KERNEL(link_at)(const motion *m, int f, const struct body *bo
 }
 
 /* How a link's centre of mass moves with a joint: s - c x z. */
-INLINE vector KERNEL(arm)(const moving_link *l, const screw *axis)
+INLINE vector SIZED(arm)(const moving_link *l, const screw *axis)
 {
     return subtract_cross(axis->s, l->com, axis->z);
 }
 
 /* What a wrench is put together with: z and, as forces are for each unit of mass, m times the `arm`. */
-INLINE screw KERNEL(moves)(const moving_link *l, const screw *axis, vector arm)
+INLINE screw SIZED(moves)(const moving_link *l, const screw *axis, vector arm)
 {
     const screw moves = {axis->z, scale(l->mass, arm)};
     return moves;
 }
 
 /* A row of I z and one of I zd - w x E z, each entry of the matrices read once. */
-INLINE void KERNEL(moments)(vector inertia, vector turning, vector z, vector zd, number *c2, number *c1)
+INLINE void SIZED(moments)(vector inertia, vector turning, vector z, vector zd, number *c2, number *c1)
 {
     number n = inertia.x * z.x, nd = inertia.x * zd.x;
     n += inertia.y * z.y;
@@ -192,15 +192,15 @@ INLINE void KERNEL(moments)(vector inertia, vector turning, vector z, vector zd,
 }
 
 /* The wrenches of each coordinate of a link's path. */
-static inline void KERNEL(columns)(const motion *m, const moving_link *l, const short *column, int length, wrenches *out)
+static inline void SIZED(columns)(const motion *m, const moving_link *l, const short *column, int length, wrenches *out)
 {
     for (int k = 0; k < length; ++k) {
         const screw axis = m->axis[column[k]], change = m->change[column[k]];
-        const vector arm = KERNEL(arm)(l, &axis);
-        out->moves[k] = KERNEL(moves)(l, &axis, arm);
-        KERNEL(moments)(l->inertia.x, l->turning.x, axis.z, change.z, &out->c2[k].z.x, &out->c1[k].z.x);
-        KERNEL(moments)(l->inertia.y, l->turning.y, axis.z, change.z, &out->c2[k].z.y, &out->c1[k].z.y);
-        KERNEL(moments)(l->inertia.z, l->turning.z, axis.z, change.z, &out->c2[k].z.z, &out->c1[k].z.z);
+        const vector arm = SIZED(arm)(l, &axis);
+        out->moves[k] = SIZED(moves)(l, &axis, arm);
+        SIZED(moments)(l->inertia.x, l->turning.x, axis.z, change.z, &out->c2[k].z.x, &out->c1[k].z.x);
+        SIZED(moments)(l->inertia.y, l->turning.y, axis.z, change.z, &out->c2[k].z.y, &out->c1[k].z.y);
+        SIZED(moments)(l->inertia.z, l->turning.z, axis.z, change.z, &out->c2[k].z.z, &out->c1[k].z.z);
         out->c2[k].s = arm;
         out->c1[k].s = subtract_cross(subtract_cross(change.s, l->velocity, axis.z), l->com, change.z);
     }

@@ -3,7 +3,7 @@
    Entry e is stored at e * W by PUT. */
 
 /* What a wrench does along two motions, each of its components read once. */
-INLINE void KERNEL(along_both)(const screw *a, const screw *b, const screw *f, real *first, real *second)
+INLINE void SIZED(along_both)(const screw *a, const screw *b, const screw *f, real *first, real *second)
 {
     number x = a->z.x * f->z.x, y = b->z.x * f->z.x;
     x += a->z.y * f->z.y;
@@ -21,7 +21,7 @@ INLINE void KERNEL(along_both)(const screw *a, const screw *b, const screw *f, r
 }
 
 /* Rows i and, if there is one, i + 1 of a link's c2 and c1. */
-INLINE void KERNEL(two_rows)(const wrenches *RESTRICT x, int i, int length, real *RESTRICT c2, real *RESTRICT c1)
+INLINE void SIZED(two_rows)(const wrenches *RESTRICT x, int i, int length, real *RESTRICT c2, real *RESTRICT c1)
 {
     const screw a = x->moves[i];
     PUT(c2, along(&a, &x->c2[i]));
@@ -33,13 +33,13 @@ INLINE void KERNEL(two_rows)(const wrenches *RESTRICT x, int i, int length, real
     const screw b = x->moves[i + 1];
     real *second2 = c2 + (length - i - 1) * W, *second1 = c1 + length * W;
     for (int k = i + 1; k < length; ++k)
-        KERNEL(along_both)(&a, &b, &x->c2[k], c2 + (k - i) * W, second2 + (k - i) * W);
+        SIZED(along_both)(&a, &b, &x->c2[k], c2 + (k - i) * W, second2 + (k - i) * W);
     for (int k = 0; k < length; ++k)
-        KERNEL(along_both)(&a, &b, &x->c1[k], c1 + k * W, second1 + k * W);
+        SIZED(along_both)(&a, &b, &x->c1[k], c1 + k * W, second1 + k * W);
 }
 
 /* A link's g and tau. */
-INLINE void KERNEL(torques)(const moving_link *l, const wrenches *x, int length, real *g, real *tau)
+INLINE void SIZED(torques)(const moving_link *l, const wrenches *x, int length, real *g, real *tau)
 {
     for (int i = 0; i < length; ++i) {
         const vector s = x->moves[i].s;

@@ -64,7 +64,7 @@ class PackageChoices:
 
 @dataclass(frozen=True)
 class BuildStep:
-    """What a build tool asks for beside the packages, or in their place."""
+    """Requests of a build tool beside the packages, or in their place."""
 
     PANEL = "For build tools"
     list_outputs: bool = option(False, "Print the paths that would be written; write none")
@@ -80,7 +80,7 @@ class BuildStep:
 
     @property
     def writes(self) -> bool:
-        """Whether packages are written."""
+        """True if packages are written."""
         return not (self.list_outputs or self.check)
 
     def check_flags(self) -> None:

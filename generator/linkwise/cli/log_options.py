@@ -1,4 +1,4 @@
-"""What commands that read a log have in common: the log, its robot and the back end that computes.
+"""Options of all commands that read a log: the log, its robot and the back end that computes.
 
 The robot is a package, or a robot's file, of which one is made.
 """

@@ -31,7 +31,7 @@ TOKEN = re.compile(
 )
 DECLARED = re.compile(r"\b(?:real|int|short|char|size_t|double|float)\s+\**\s*(?:RESTRICT\s+)?(\w+)")
 ENUMERATED = re.compile(r"\benum\s*\{([^{}]*)\}")
-MADE = re.compile(r"\b(KERNEL|API|F|SIZED)\((\w+)$")
+MADE = re.compile(r"\b(LINK_FUNCTION|API|F|SIZED)\((\w+)$")
 """Pattern, up to the bracket that ends it, of a name that a macro makes, which may be called."""
 OF_LINK = re.compile(r"links?_\d+(?:_\w+)?|at_p_\w+")
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include\b[ \t]*([<"]?)([^>"\n]*)[>"]?', re.MULTILINE)
@@ -44,9 +44,9 @@ STRUCTURES = "|".join(
 )
 DIRECTIVE = re.compile(
     r"# *(?:include\b.*|else|endif|(?:if|ifdef|ifndef|elif)\b[^#]*"
-    rf"|undef (?:{ARGUMENTS}|{MARKS}|W|SIZED|KERNEL|NUMBERS|OFFSETS|API)"
+    rf"|undef (?:{ARGUMENTS}|{MARKS}|W|SIZED|LINK_FUNCTION|NUMBERS|OFFSETS|API)"
     rf"|define (?:(?:{MARKS})|W (?:1|BLOCK)|(?:{ARGUMENTS}) [\w ,*+]*|{STRUCTURES}"
-    r"|SIZED\(name\) name##_(?:one|block)|KERNEL\(name\) (?:static|APART) void SIZED\(name\)"
+    r"|SIZED\(name\) name##_(?:one|block)|LINK_FUNCTION\(name\) (?:static|APART) void SIZED\(name\)"
     r"|API\(function\) F\((?P<robot>\w+)_##function\)))"
 )
 """Pattern of each directive in the templates of C, with what is put into them."""

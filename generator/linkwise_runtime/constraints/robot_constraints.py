@@ -350,7 +350,7 @@ class Constraints(Generic[Array]):
 
 
 def made_again(robot: object, call: str, arguments: tuple[object, ...]) -> object:
-    """What a robot's method makes: a copy's arguments are copied with the robot."""
+    """Return what a robot's method returns: a copy's arguments are copied with the robot."""
     return getattr(robot, call)(*arguments)
 
 

@@ -62,7 +62,7 @@ class Lease:
         if self._size + sum(size * len(blocks) for size, blocks in tuple(_free.items())) > MOST:
             _free.clear()
         if hasattr(mmap, "MADV_FREE"):
-            with suppress(OSError):  # a kernel without it
+            with suppress(OSError):  # a system without it
                 block.madvise(mmap.MADV_FREE)
         _free.setdefault(self._size, []).append(block)
 
@@ -78,7 +78,7 @@ def _new(size: int) -> mmap.mmap:
     except (OSError, OverflowError):
         raise MemoryError(f"no memory for results of {size} bytes") from None
     if hasattr(mmap, "MADV_HUGEPAGE"):
-        with suppress(OSError):  # a kernel without them
+        with suppress(OSError):  # a system without them
             block.madvise(mmap.MADV_HUGEPAGE)
     return block
 

@@ -1,4 +1,4 @@
-"""What the machine can do at most."""
+"""The most that the machine can do."""
 
 import re
 import shutil

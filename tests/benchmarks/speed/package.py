@@ -86,7 +86,7 @@ def code_size(library: Path) -> int:
 
 
 def build_flags() -> tuple[str, ...]:
-    """What peers in C are compiled with."""
+    """Return the flags by which peers in C are compiled."""
     return ("-O3", "-march=native")
 
 

@@ -126,7 +126,7 @@ def chain(package: Package, links: list[int], only: int | None) -> Any:
 
 
 def from_python(package: Package, ours: Any) -> Peer:
-    """The same recipe through Pinocchio's Python."""
+    """Return the peer that goes by the same recipe through Pinocchio's Python."""
     import pinocchio as pin
 
     paths = [link["path"] for link in package.manifest["links"]]

@@ -12,7 +12,7 @@ from speed.pinocchio_peer import Peer
 
 @dataclass
 class Results:
-    """What goes into the table and the JSON file."""
+    """Contents of the table and of the JSON file."""
 
     machine: dict[str, object]
     packages: list[dict[str, Any]] = field(default_factory=list)

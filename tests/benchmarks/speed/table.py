@@ -34,7 +34,7 @@ def markdown(results: Results) -> str:
 
 
 def limits_text(results: Results) -> str:
-    """What shares are shares of."""
+    """Return the limits, in words, of which shares are shares."""
     mix = results.mix
     given = f"{mix.fused:.0%} fused operations and {mix.products:.0%} products" if mix else "no mix"
     return (
@@ -128,7 +128,7 @@ def emitted(results: Results) -> Iterator[list[str]]:
 
 
 def share(least: float | None, ns: float) -> str:
-    """What part of a time is needed at least."""
+    """Return the part of a time that is needed at least, in percent."""
     return f"{least / ns:.0%}" if least else "-"
 
 
@@ -186,7 +186,7 @@ def number(ns: float | None) -> str:
 
 
 def times(theirs: float | None, ours: float | None) -> str:
-    """How many times faster we are."""
+    """Return how many times faster we are."""
     return f"{theirs / ours:,.0f}×" if theirs and ours else "-"
 
 

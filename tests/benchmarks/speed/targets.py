@@ -9,7 +9,7 @@ from speed.results import Results
 
 @dataclass(frozen=True)
 class Target:
-    """What is measured, and the value it must not pass, from above or from below."""
+    """Quantity that is measured, and the value it must not pass, from above or from below."""
 
     what: str
     measured: float | None
@@ -18,7 +18,7 @@ class Target:
 
     @property
     def met(self) -> bool | None:
-        """Whether it is reached; None where it was not measured."""
+        """Return whether it is reached; None where it was not measured."""
         if self.measured is None:
             return None
         return self.measured <= self.wanted if self.at_most else self.measured >= self.wanted

@@ -22,7 +22,6 @@ static inline void rows_moved(const struct numbers *x, size_t samples, const rea
 
 #define W BLOCK
 #define number lanes
-#define KERNEL(name) name##_block
 #define SIZED(name) name##_block
 #define TAKE(at) LANES_FROM(at)
 #define PUT(at, value) (LANES_AT(at) = (value))

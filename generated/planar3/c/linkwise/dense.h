@@ -2,8 +2,8 @@
 
    A cube is a row (N, LINKS, N) of c(i, j, k), a square a row (N, LINKS) of g(i, j) or tau(i, j). Link j has values for
    the joints on its path alone, path[path_start[j]] to path[path_start[j + 1] - 1]. The file that includes this one has
-   these tables, and linear[j], whether link j has h1. It says by W and SIZED, as for the kernels, of how many samples
-   functions are, and includes this once for each. Values come packed, as kernels store them: entry e of sample b is at
+   these tables, and linear[j], whether link j has h1. It says by W and SIZED, as for closed forms, of how many samples
+   functions are, and includes this once for each. Values come packed, as links store them: entry e of sample b is at
    e * W + b, in cubes too. Of links, `first` is the first, and the one before `last` the last. */
 #ifndef LINKWISE_DENSE_H
 #define LINKWISE_DENSE_H

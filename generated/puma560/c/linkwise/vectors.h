@@ -1,19 +1,19 @@
-/* Vectors, matrices and screws over `number`, for KERNEL's number of samples. The same in every package of linkwise. */
+/* Vectors, matrices and screws over `number`, for SIZED's number of samples. The same in every package of linkwise. */
 
-#define vector KERNEL(vector)
-#define matrix KERNEL(matrix)
-#define screw KERNEL(screw)
-#define add KERNEL(add)
-#define subtract KERNEL(subtract)
-#define scale KERNEL(scale)
-#define cross KERNEL(cross)
-#define add_cross KERNEL(add_cross)
-#define subtract_cross KERNEL(subtract_cross)
-#define apply KERNEL(apply)
-#define add_applied KERNEL(add_applied)
-#define turned KERNEL(turned)
-#define same KERNEL(same)
-#define along KERNEL(along)
+#define vector SIZED(vector)
+#define matrix SIZED(matrix)
+#define screw SIZED(screw)
+#define add SIZED(add)
+#define subtract SIZED(subtract)
+#define scale SIZED(scale)
+#define cross SIZED(cross)
+#define add_cross SIZED(add_cross)
+#define subtract_cross SIZED(subtract_cross)
+#define apply SIZED(apply)
+#define add_applied SIZED(add_applied)
+#define turned SIZED(turned)
+#define same SIZED(same)
+#define along SIZED(along)
 
 typedef struct {
     number x, y, z;

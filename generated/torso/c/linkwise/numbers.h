@@ -6,7 +6,7 @@
        W       samples that are computed at a time: 1 or BLOCK
    Beside these, SHARED marks a function that one part calls and another defines.
 
-   In the kernels, vectors have components _x, _y and _z; numbers in names count joints from 1, and 0 is the base:
+   In closed forms, vectors have components _x, _y and _z; numbers in names count joints from 1, and 0 is the base:
        sin3, cos3      sine and cosine of joint 3 (3b: of another joint that follows coordinate 3)
        x3, y3, z3      axes of the frame that joint 3 moves; z3 is the joint's own axis
        s3_x, s3_y ...  moment (p - o) x z3 of the axis about the origin o, p a point on it
@@ -45,7 +45,7 @@ typedef double real;
 #define BLOCK (64 / (int)sizeof(real))
 #endif
 
-/* No two arrays of a kernel overlap; C++ has no word of its own for that. */
+/* No two arrays that a function is given overlap; C++ has no word of its own for that. */
 #if defined(__GNUC__) || defined(_MSC_VER)
 #define RESTRICT __restrict
 #elif defined(__cplusplus)
@@ -54,7 +54,7 @@ typedef double real;
 #define RESTRICT restrict
 #endif
 
-/* Blocks start on a cache line, so that no vector straddles two. What is APART stays a function of its own: a kernel
+/* Blocks start on a cache line, so that no vector straddles two. What is APART stays a function of its own: one
    over blocks, put into its caller, would lose what RESTRICT says. */
 #if defined(__GNUC__) && !defined(LINKWISE_SMALL)
 #define ALIGNED __attribute__((aligned(64)))

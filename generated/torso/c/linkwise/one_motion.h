@@ -1,15 +1,13 @@
 /* The motion of one sample, for what goes in loops over links and joints. The same in every package of linkwise.
 
-   Wherever it is included, kernels are those of one sample from there on. */
+   Wherever it is included, functions and types of SIZED are those of one sample from there on. */
 #undef W
 #undef number
-#undef KERNEL
 #undef SIZED
 #undef TAKE
 #undef PUT
 #define W 1
 #define number real
-#define KERNEL(name) name##_one
 #define SIZED(name) name##_one
 #define TAKE(at) (*(at))
 #define PUT(at, value) (*(at) = (value))

@@ -9,7 +9,7 @@
 #endif
 
 /* A vector past the cache, to where such a vector may start, and the end of it. The compilers' own functions do for gcc and
-   clang, as reading <immintrin.h> takes them longer than most kernels here. A build may bring its own. */
+   clang, as reading <immintrin.h> takes them longer than most of what is compiled here. A build may bring its own. */
 #if !defined(STREAM) && defined(__GNUC__) && (defined(__AVX__) || defined(__AVX512F__))
 #if defined(__AVX512F__)
 #define STREAM_BYTES 64

@@ -71,7 +71,7 @@ def _link_view(
         "title": f"Link {number}, {c_comment(system.links[number - 1].name)}",
         "about": (
             "The file that includes this one asks for functions by WANT_DECOMPOSITION, WANT_TORQUE and",
-            "WANT_POSITION_GRADIENT, and says how many samples W they take; KERNEL completes their names.",
+            "WANT_POSITION_GRADIENT, and says how many samples W they take; LINK_FUNCTION declares them.",
         ),
         "functions": (
             ("WANT_DECOMPOSITION", functions.decomposition),
