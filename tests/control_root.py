@@ -28,7 +28,7 @@ LINK_3_MOVES, LINK_2_MOVES, END = 0.25, 1.75, 3.5
 THROW = 0.75
 """s, of link 3's throw and its return."""
 CANCELLED = {("joint1", "link3", None, None)}
-"""What link 3 does to joint 1, whichever joint's motion moves it, by acceleration and by velocity."""
+"""Torques of link 3 on joint 1, whichever joint's motion moves it, by acceleration and by velocity."""
 SHOWN = (0.0, 0.62, 1.0, 2.12, 2.5, 2.88, 3.4)
 """s, of the drawings."""
 FELT, FREED = "Nothing cancelled", "Link 3's effect on joint 1 cancelled"

@@ -21,7 +21,7 @@ FIXED: dict[str, Callable[[Any], dict[str, Any]]] = {
     "simulate": lambda robot: {"time": [0.0, 0.01], "tau": None},
     "kinematics.load_torque": lambda robot: {"frame": robot.N - 1, "force": FORCE},
 }
-"""What calls are given besides positions, velocities, accelerations and torques."""
+"""Arguments of calls besides positions, velocities, accelerations and torques."""
 KINEMATICS = ("pose", "jacobian", "jacobian_rate", "velocity", "acceleration")
 FIXED |= {f"kinematics.{call}": lambda robot: {"frame": robot.N - 1} for call in KINEMATICS}
 

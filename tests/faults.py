@@ -28,7 +28,7 @@ WHEN = {"write": 40, "generate": 1000, "analyze": 400}
 NO_EXCHANGE = "--inject=renameat2:error=ENOSYS"
 """A file system that cannot exchange two folders in one step."""
 NAMES = ("a", "b", "c", "sub/d", "sub/e", "sub/f")
-"""What the job `write` writes."""
+"""Files that the job `write` writes."""
 WORKPLACE = ".linkwise-"
 NONE = "/nowhere"
 IDLE: dict[str, Callable[[], object]] = {

@@ -29,7 +29,7 @@ START = 0.5
 """Seconds in which Python itself begins, before linkwise can have a say."""
 TOLD = "linkwise: interrupted\n"
 ENDED = (130, -signal.SIGINT)
-"""As linkwise ends, and as Python makes of it where it executes text, or after the program's last word."""
+"""Exit statuses: of linkwise, and of Python where it executes text, or after the program's last word."""
 
 
 def whole(file: Path, out: Path) -> float:

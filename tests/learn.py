@@ -43,7 +43,7 @@ class Numbers:
     true: torch.Tensor
     torque: Callable[[torch.Tensor, Motion], torch.Tensor]
     followed: Callable[[torch.Tensor, Motion], torch.Tensor]
-    """The same by the vectorised rule, which torch.func may go through quickly."""
+    """Torques by the vectorised rule, which torch.func may go through quickly."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ FREQUENCY = 10.0
 BEGIN = 4.0
 """Damping at the start, in a ratio to the best."""
 RATE, SECONDS, STEP = 0.7, 1.2, 0.04
-"""Of the descent; of the motion, and of RK4's steps, s."""
+"""Rate of the descent; seconds of the motion, and of RK4's steps."""
 TARGET, AWAY = (-1.0, 0.8, 0.6), (0.3, -0.2, 0.4)
 
 

@@ -99,7 +99,7 @@ class _Link:
     ends: Sequence[tuple[Sequence[float], Sequence[float]]]
     more: Mapping[str, str]
     turned: bool
-    """Whether the joint leads from the body back."""
+    """True if the joint leads from the body back."""
 
     @property
     def tag(self) -> str:

@@ -77,7 +77,7 @@ def is_open(path: Any) -> bool:
 
 
 SYSTEM: dict[str, Callable[..., Any]] = {"open a file": builtins.open}
-"""What the wrappers below call in the end."""
+"""Functions that the wrappers below call in the end."""
 
 
 def in_the_case_that_is_there(path: Any) -> Any:

@@ -18,7 +18,7 @@ log = "data/{subject}/{condition}_{trial}.csv"
 robot = "planar3"
 """
 NAMES = [f"S{s}-{c}-{k}" for s in (1, 2) for c in ("fast", "slow") for k in (1, 2)]
-"""Of two subjects."""
+"""Names of trials of two subjects."""
 QUICK = 'pages = false\ncolumns = ["tau/*"]\n'
 CYCLES = '\n[cycles]\nstart = "stands>0.5"\n'
 CHOICES = "\n[analysis]\nignore_extra = true\n"

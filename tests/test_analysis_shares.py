@@ -36,7 +36,7 @@ CROWD = tuple(f"j{i}" for i in range(14))
 BOTH = ("acceleration", "velocity")
 WORDS = {"acceleration": "tau_qdd", "velocity": "tau_qd", "motion": "tau_q(?:dd|d)"}
 Shares = dict[str, NDArray[np.float64]]
-"""Of each cause the mean size on each joint, (joints,)."""
+"""Mean size of each cause on each joint, (joints,)."""
 
 
 @dataclass(frozen=True)

@@ -57,14 +57,14 @@ TEXTS = {
     "free bare": re.sub(BARE, "", FREE),
 }
 CART = str(DATA / "cart_pendulum.py")
-"""Its links are energies."""
+"""Cart with a pendulum, whose links are energies."""
 KINDS = [
     *(("numpy", False), ("torch", True), ("autograd", True)),
     *(pytest.param("native", tensors, marks=needs_compiler) for tensors in (False, True)),
 ]
 """Back ends, and whether they are given tensors."""
 INSTANTS, PARTS = [0.0, 0.01, 0.02], 7
-"""Of `simulate`; and the entries of an axis that any torques may have."""
+"""Instants of `simulate`; and the entries of an axis that any torques may have."""
 on_every_back_end = pytest.mark.parametrize(("backend", "tensors"), KINDS)
 on_a_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
 key_of = attrgetter("key")

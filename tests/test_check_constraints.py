@@ -142,7 +142,7 @@ type = "point"
 first = { frame = "shank", xyz = [-0.1, 0, 0.02] }
 second = { frame = "link2", xyz = [0, 0, -0.3] }
 """
-"""Its first closed state is next to a base's pitch of 90 degrees."""
+"""Arm whose first closed state is next to a base's pitch of 90 degrees."""
 
 
 def test_states_next_to_a_singular_mass_matrix_are_left_out(tmp_path: Path) -> None:

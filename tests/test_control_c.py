@@ -182,9 +182,9 @@ def test_where_a_sliding_base_is_does_not_matter(tmp_path: Path) -> None:
 
 
 FREE = {"forward_dynamics", "forward_dynamics_of_links", "partial_impedance", "frame_partial_impedance"}
-"""What moves joints that nothing ties."""
+"""Calls that move joints that nothing ties."""
 OF_PASSIVE = {"forward_dynamics_of_links", "passive_torque"}
-"""What only robots have a use for whose joints have anything of their own."""
+"""Calls that only robots have a use for whose joints have anything of their own."""
 
 
 @pytest.fixture(scope="module")

@@ -34,7 +34,7 @@ SAID = {
     "float64": ("silent",) * 4 + ("vague",) * 3 + ("refused",) * 2,
     "float32": ("silent",) * 2 + ("vague",) + ("refused",) * 6,
 }
-"""Of the distances, what all but the natural controller say: half of the digits, and all, are lost there."""
+"""Answers of all but the natural controller, by distance: half of the digits, and all, are lost there."""
 
 
 @pytest.fixture(scope="module")

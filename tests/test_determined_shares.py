@@ -11,7 +11,7 @@ from test_stated_figures import stated
 
 Packages = Callable[[str], ModuleType]
 NOTHING = 1e-10
-"""What is less is rounding."""
+"""Share below which a number is rounding."""
 MOTION = np.array([[0.3, 0.5, -0.2], [1.0, 0.0, 2.0], [0.0, 0.0, 5.0]])
 """The README's."""
 

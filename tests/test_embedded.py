@@ -45,7 +45,7 @@ CONTROL = (
 SMALL = "-DLINKWISE_SMALL"
 ARM = ("arm-none-eabi-gcc", "-std=c99", "-mthumb", "-mfloat-abi=hard", "-mcpu=cortex-m7", "-mfpu=fpv5-d16")
 MADE = {"gcc": set(), "clang": {"memcpy", "memmove", "memset"}, ARM[0]: {"memcpy", "memset"}}
-"""What compilers themselves make calls of, with the flags below."""
+"""Functions that compilers themselves make calls of, with the flags below."""
 
 
 def sources(directory: Path) -> list[Path]:

@@ -40,7 +40,7 @@ constraint = [
 independent = ["crank"]
 """
 SCALES = {"kg": 2.0, "m": 4.0, "s": 0.5, "rad": 1.0}
-"""What a unit of the second robot is smaller by."""
+"""Factor by which a unit of the second robot is smaller."""
 SCALES |= {"N": SCALES["kg"] * SCALES["m"] / SCALES["s"] ** 2}
 SCALES |= {"J": SCALES["N"] * SCALES["m"], "W": SCALES["N"] * SCALES["m"] / SCALES["s"]}
 Q, QD, QDD = np.random.default_rng(5).uniform(-0.3, 0.3, (3, 3, 4))

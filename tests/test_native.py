@@ -145,7 +145,7 @@ HOLDINGS: dict[str, Callable[[Any], Any]] = {
     "a slice of a tensor": lambda answer: torch.from_numpy(answer.velocity)[5:, 1],
     "a buffer": lambda answer: memoryview(answer.velocity),
 }
-"""How a user may hold on to results."""
+"""Ways in which a user may hold on to results."""
 
 
 def values_of(held: Any) -> list[np.ndarray]:

@@ -102,7 +102,7 @@ const wide = [...document.querySelectorAll(".content, .content *")]
 const whole = document.documentElement;
 return [...wide, ...(whole.scrollWidth > innerWidth ? [whole] : [])].map((e) => e.outerHTML.slice(0, 80));
 """
-"""What of a page ends right of its window, but for what scrolls by itself; the whole where its drawers do."""
+"""Parts of a page right of its window, but for what scrolls by itself; the whole where its drawers do."""
 
 
 @pytest.mark.ship

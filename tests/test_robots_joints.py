@@ -30,7 +30,7 @@ BARE = robot(
     BC.replace('<origin xyz="0.2 0.1 0.3" rpy="0.4 -0.3 0.2"/>', ""),
     joint("cd", "c", "d", inner='<mimic joint="ab"/>').replace('xyz="0.2 0.1 0.3" ', ""),
 )
-"""With the least that a file must say."""
+"""Robot with the least that a file must say."""
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "defaults": (BARE, {}),
     "revolute": (chain(AB, BC), {}),

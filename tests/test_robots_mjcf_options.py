@@ -28,7 +28,7 @@ POST = '/><geom name="post" type="{}" size="0.1 1" pos="0.1 0 0" euler="1.57 0 0
 AROUND = """<worldbody><site name="floor" pos="-1 0 -0.5"/></worldbody>
   <tendon><spatial name="t" stiffness="3"><site site="wall"/><geom geom="post"/><site site="floor"/></spatial>
   </tendon>"""
-"""From world to world, and past a link by a shape of it alone."""
+"""Tendon from world to world, and past a link by a shape of it alone."""
 MOTOR = '<actuator><motor name="m" {}/></actuator>'
 FLEX = """<worldbody><flexcomp name="cloth" type="grid" count="3 3 1" spacing="0.1 0.1 0.1" pos="2 0 0"
   mass="1" radius="0.01"><contact contype="0" conaffinity="0" selfcollide="none"/>
@@ -238,14 +238,14 @@ DERIVED = """
     flexedge_J_rowadr flexedge_J_colind flex_vert0 flex_node0 flex_size ten_J_rownnz ten_J_rowadr
     ten_J_colind stat signature
 """
-"""What MuJoCo computes from other fields, and sizes and addresses."""
+"""Fields that MuJoCo computes from other ones, and sizes and addresses."""
 
 NO_FORCE_OF_ITS_OWN = """
     body_user jnt_user jnt_group qpos_spring jnt_springyield jnt_plasticadr tendon_springyield
     tendon_plasticadr tendon_lengthspring jnt_actfrclimited jnt_actfrcrange tendon_actfrclimited
     tendon_actfrcrange geom_fluid wind magnetic wrap_prm disableactuator flg_gravcomp
 """
-"""What shapes a force that is told wherever its own field is not zero: a spring's rest, the medium's wind."""
+"""Fields of a force that is told wherever its own field is not zero: a spring's rest, the medium's wind."""
 
 CONTACTS_AND_LIMITS = """
     body_margin body_contype body_conaffinity jnt_solref jnt_solimp jnt_range jnt_margin dof_solref
@@ -260,7 +260,7 @@ SIMULATION = """
     ccd_iterations sdf_initpoints sdf_iterations tree_bodyadr tree_bodynum tree_dofadr tree_dofnum
     tree_sleep_policy
 """
-"""How a simulation goes from step to step."""
+"""Fields by which a simulation goes from step to step."""
 
 ACTUATORS = """
     actuator_acc0 actuator_actadr actuator_actearly actuator_actlimited actuator_actnum actuator_actrange
@@ -284,7 +284,7 @@ FLEXES = """
     flex_vertnum flex_yield flexedge_J_colind flexedge_J_rowadr flexedge_J_rownnz flexedge_invweight0
     flexedge_length0 flexedge_rigid
 """
-"""Where the vertices of a flex are and what they touch; its bodies are bodies like others."""
+"""Fields of the vertices of a flex and what they touch; its bodies are bodies like others."""
 
 GEOMS = """
     geom_aabb geom_adhesion geom_castshadow geom_conaffinity geom_condim geom_contype geom_dataid

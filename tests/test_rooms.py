@@ -45,7 +45,7 @@ ROOMS = (
     "escape",
     "linkwise_runtime",
 )
-"""From the top of the house to its ground: a room imports from rooms below it only."""
+"""Rooms from the top of the house to its ground: a room imports from rooms below it only."""
 
 RUNTIME = (
     "native",
@@ -168,3 +168,29 @@ def test_inside_the_runtime_too_imports_run_downwards_only(room: str) -> None:
         if RUNTIME.index(room_in(module.split(".")[1])) < RUNTIME.index(room)
     ]
     assert not upwards, f"not below {room or 'the ground'}: {'; '.join(upwards)}"
+
+
+FRAGMENTS = re.compile(
+    r"(?:The same|Likewise|Ditto|(?:Of|That|Those|Their|Its|Whose|Who|What|Which|Whether|Why|How|As|By|But|And)\b)"
+)
+"""Beginnings of docstrings that lean on their neighbours, or leave out what is returned."""
+LEFT = {"conftest.py", "compiled.py"}
+"""Files whose docstrings are still to be put so."""
+
+
+def documentation(path: Path) -> Iterator[str]:
+    """Yield the docstrings of a file, and the strings below what they tell of, with their lines."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        body = getattr(node, "body", None)
+        for line in body if isinstance(body, list) else ():
+            match line:
+                case ast.Expr(value=ast.Constant(value=str(text))):
+                    yield f"{path.relative_to(ROOT)}:{line.lineno}: {text}"
+
+
+@pytest.mark.parametrize("folder", ["generator", "templates", "generated", "tests", "docs", "examples"])
+def test_documentation_begins_with_what_it_tells_of(folder: str) -> None:
+    files = sorted(path for path in (ROOT / folder).rglob("*.py") if path.name not in LEFT)
+    told = [line for path in files for line in documentation(path)]
+    assert told
+    assert not [line for line in told if FRAGMENTS.match(line.split(": ", 1)[1])]

@@ -27,7 +27,7 @@ def motion_of(backend: str, n: int, *batch: int, dtype: str = "float64") -> list
 
 
 WAYS = {"in matrices": (True, False), "samples innermost": (False, False), "fused": (False, True)}
-"""How the rule computes: for few samples, for many, and for a compiler, here without one."""
+"""Ways in which the rule computes: for few samples, for many, and for a compiler, here without one."""
 in_every_way = pytest.mark.parametrize("way", WAYS)
 
 

@@ -108,7 +108,7 @@ def test_means_are_compared_by_subject(means: Path) -> None:
 
 
 SUBJECTS = {"slow": "CAADBE", "fast": "BDACF", "mean": "ABCDEF"}
-"""In the order of their trials: A was slow twice, and two were in one condition only."""
+"""Subjects in the order of their trials: A was slow twice, and two were in one condition only."""
 
 
 def trials_of(points: int) -> list[TrialSummary]:

@@ -22,7 +22,7 @@ from pages import run_page  # noqa: E402
 LENGTHS = (0.30, 0.26, 0.17)
 COLOUR_OF = {"shoulder": VERMILION, "elbow": BLUE, "wrist": GREEN}
 INSTANT, BEGIN = 0.3, 0.1
-"""In s of the log: what is drawn, and when the shoulder begins to swing."""
+"""Seconds of the log: what is drawn, and when the shoulder begins to swing."""
 
 
 def places(q: np.ndarray) -> np.ndarray:

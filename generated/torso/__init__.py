@@ -119,7 +119,7 @@ def load(
 
 
 def bodies() -> Bodies[Any]:
-    """What the links carry, in arrays of NumPy; with run-time parameters, for their built-in values."""
+    """Return what the links carry, in arrays of NumPy; with run-time parameters, for their built-in values."""
     from .tree import RULE
 
     return RULE.bodies()
@@ -178,7 +178,7 @@ FASTEST_FIRST: tuple[str, ...] = (
     "torch",
     "autograd",
 )
-"""The same, the fastest for large batches first."""
+"""Names of these back ends, the fastest for large batches first."""
 
 __all__ = [
     "AppliedLoad",

@@ -23,7 +23,7 @@ Value = float | NDArray[np.float64]
 TRIANGLE = 1e-6
 """Relative slack of the triangle inequality: files round flat bodies' moments to about six digits."""
 SPECK = 1e-14
-"""In m^2: moments of inertia below mass times this count as zero; those of a point mass are rounding
+"""Area in m^2: moments of inertia below mass times this count as zero; those of a point mass are rounding
 errors."""
 
 

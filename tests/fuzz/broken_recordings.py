@@ -14,7 +14,7 @@ from fuzz.case import JOINTS, Case
 from fuzz.mutations import NUMBERS, TEXTS, mutated_bytes
 
 ODD = [float(value) for value in NUMBERS if not isinstance(value, int) or abs(value) < 1 << 1000]
-"""Those that a float holds."""
+"""Numbers that a float holds."""
 
 
 def bag(rng: Random) -> Case:

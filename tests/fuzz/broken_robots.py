@@ -68,7 +68,7 @@ COSTLY = (
     '<include file="/dev/zero"/>',
     '<asset><mesh name="t" file="/dev/zero"/></asset>',
 )
-"""What may cost MuJoCo gigabytes; how large it is comes in."""
+"""Elements that may cost MuJoCo gigabytes; their size comes in."""
 
 
 def mjcf(rng: Random) -> Case:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 NUMPY = ("--backend", "numpy")
 JOINTS = ("joint1", "joint2", "joint3")
-"""Those of planar3."""
+"""Joints of planar3."""
 
 
 @dataclass(frozen=True)

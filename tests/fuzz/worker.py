@@ -28,14 +28,14 @@ from fuzz.room import Room, Watch
 LIBRARIES = ("h5py", "matplotlib.pyplot", "mujoco", "plotly.graph_objects", "pyarrow.parquet", "scipy.signal")
 COMMANDS = ("analyze", "check", "inspect", "motion", "report_reduction", "report_terms")
 MODULES = (*LIBRARIES, *(f"linkwise.cli.{command}" for command in COMMANDS))
-"""What commands import."""
+"""Modules that commands import."""
 GIGABYTE = 1 << 30
 LONGEST = 1100
 """Characters of a message and what stands before it, the folder apart."""
 RUN = " is a Python program, which was run"
-"""How a note of it ends, which stands before the error."""
+"""End of a note of it, which stands before the error."""
 FAULT = re.compile(r"linkwise: fault: (\w+ \([^)]*\))")
-"""How a fault of linkwise itself is told, and where it was."""
+"""Message of a fault of linkwise itself, with its place."""
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ COMMENTS = {
     **dict.fromkeys(("py", "txt", "toml", "cmake"), r"\#[^\n]*"),
     **dict.fromkeys(("c", "h", "js", "html"), r"//[^\n]*|/\*.*?\*/"),
 }
-"""By the ending of the text that is meant; other texts have none."""
+"""Rules by the ending of the text that is meant; other texts have none."""
 CALL = re.compile(r"^[ \t]*([A-Za-z_][\w.]*\(.*\);)[ \t]*$", re.MULTILINE)
 COMMAND = re.compile(
     r"^[ \t]*((?!if|else|endif|foreach|endforeach|function|endfunction)[a-z_]+\(.*\))[ \t]*$", re.MULTILINE
@@ -75,7 +75,7 @@ class Mutant:
     text: str
     """The line it is on, stripped."""
     place: int
-    """Which of the same changes on this line, and on lines like it, this is."""
+    """Number of this change among the same ones on this line, and on lines like it."""
 
     @property
     def key(self) -> str:

@@ -30,7 +30,7 @@ include = {folder}/linkwise/*, */linkwise_runtime/*
 disable_warnings = couldnt-parse, no-data-collected, module-not-measured, already-imported, dynamic-conflict
 patch = _exit, fork
 """
-"""Of programs that tests start; the runtime is also copied into packages, which are anywhere."""
+"""Settings of programs that tests start; the runtime is also copied into packages, which are anywhere."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from mutation.tree import ROOT
 HOUSE = "generator/linkwise/"
 RUNTIME = "generator/linkwise_runtime/"
 LINES = 100
-"""Of so many lines, one is changed at least."""
+"""Number of lines of which one is changed at least."""
 LEAST = 20
 """Mutants of a room, however small: with fewer, one survivor would be more than 5 %."""
 

@@ -13,7 +13,7 @@ from mutation.tree import ROOT
 
 CAUGHT = ("killed", "too slow")
 KEPT = Path(__file__).with_name("caught.json")
-"""What is caught, and by which test, kept with the tests: a sweep begins with what caught it before."""
+"""Mutants that tests catch, by which test, kept with the tests: a sweep begins with what caught it before."""
 EQUIVALENTS = Path(__file__).with_name("equivalents.json")
 MARK = "<!-- from here on by tests/mutation/run.py --write -->\n"
 END = "<!-- to here -->\n"

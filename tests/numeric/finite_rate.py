@@ -34,7 +34,7 @@ class Loop:
     ahead: bool = False
     """The controller is asked for the state expected in the middle of the time in which its torque acts."""
     heavier: float = 0.0
-    """By this share each link is heavier than the controller believes, and its inertia larger."""
+    """Share by which each link is heavier than the controller believes, and its inertia larger."""
 
 
 HELD = Loop("torques held over 1 ms")
@@ -66,7 +66,7 @@ class JointSpace:
     """A body of the plant; None where forces act on the joints."""
     unit: str = "mrad"
     sensed: bool = True
-    """Whether the controller is told what acts from outside."""
+    """True if the controller is told what acts from outside."""
 
     def offset(self, q: Any) -> Any:
         return q - self.start
@@ -234,7 +234,7 @@ class Outcome:
     loop: Loop
     found: Impedance
     error: Impedance
-    """Of the measured impedance, in a ratio to what was asked for."""
+    """Error of the measured impedance, in a ratio to what was asked for."""
     rise: float
     """The most that stored energy rose again after the robot was let go, in a ratio to the start's."""
     tracking: float

@@ -25,13 +25,13 @@ from numeric.measured_spaces import panda_hand, planar3_joints, spring_and_dampe
 from numeric.mujoco_plant import heavier, panda_model, planar_model
 
 SECONDS = 2.0
-"""Of the record that an impedance is fitted to."""
+"""Length of the record that an impedance is fitted to."""
 PLANAR3_MOTION, PANDA_MOTION = 1e-4, 5e-4
-"""How far each direction is pushed at each frequency, in rad and m."""
+"""Distance that each direction is pushed at each frequency, in rad and m."""
 PLANAR3_SWING, PANDA_SWING = np.full(3, 0.5), np.full(3, 0.1)
-"""How far the moving target goes, in rad and m."""
+"""Distance that the moving target goes, in rad and m."""
 RATIOS = (0.25, 0.5, 1.0, 2.0, 4.0)
-"""Of inertia that is asked for to the natural one."""
+"""Ratios of inertia that is asked for to the natural one."""
 
 
 def table(outcomes: Sequence[Outcome], unit: str) -> str:

@@ -7,7 +7,7 @@ import opensim as osim
 from fuzz.valid_robots import JointData, LinkData, RobotData, Row
 
 KINDS = {"planar": (osim.PlanarJoint, (1, 2, 0)), "revolute": (osim.PinJoint, (0,))}
-"""Of a joint, which of OpenSim's coordinates are linkwise's, in order."""
+"""OpenSim's coordinates of a joint that are linkwise's, in order."""
 
 
 class OpenSimModel:

@@ -29,7 +29,7 @@ needs_panda = pytest.mark.skipif(
     not PANDA.is_file(), reason="needs real robots: pip install example-robot-data"
 )
 ENOUGH = 0.02
-"""What a measured impedance may differ by from what was asked for."""
+"""Difference that a measured impedance may have from what was asked for."""
 DT = 1e-3
 
 

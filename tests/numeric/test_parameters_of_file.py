@@ -125,7 +125,7 @@ HINGES = {
     ),
 }
 WHOLE = {link: body and body.moved(np.zeros(3), np.eye(3)) for link, body in BODIES.items() if link != "tool"}
-"""What moves as one, in the frame of the link that is kept."""
+"""Links that move as one, in the frame of the link that is kept."""
 WHOLE["a"] = WHOLE["a"].joined(BODIES["tool"].moved(HINGES["tool"].xyz, turned(*HINGES["tool"].rpy)))  # type: ignore
 
 

@@ -33,7 +33,7 @@ def analyze(
     backend: Backend = None,
     as_json: Json = False,
 ) -> None:
-    """Who loads whom: every torque term of a recorded movement, as a table, figures and a page."""
+    """Decompose a recorded movement: every torque term, as a table, figures and a page."""
     with shown_progress() as progress:
         package = opened_robot(robot, backend, options, progress)
     package = carrying(package, chosen.payloads(package))

@@ -21,9 +21,9 @@ COMMANDS = {
     "generate": "Write the packages of robots.",
     "check": "Prove a package right: hashes, and every entry of every formula, back end and C function.",
     "inspect": "Show a robot's joints, links, parameters, and what was merged, locked, ignored or left out.",
-    "analyze": "Who loads whom: every torque term of a recorded movement, as a table, figures and a page.",
-    "study": "Many recordings: every trial analysed, and what they say together; also on a cluster.",
-    "identify": "What a log of motion and torques says of the links: masses, centres, inertias, friction.",
+    "analyze": "Decompose a recorded movement: every torque term, as a table, figures and a page.",
+    "study": "Analyse many recordings: every trial, and what they say together; also on a cluster.",
+    "identify": "Identify links from a log of motion and torques: masses, centres, inertias, friction.",
     "graph": "Show what autograd computes for a partial torque, or a part of it; equal operations are one.",
     "motion": "Write two motions modelled on the paper's Fig. 5 and 10, for the arm of Table 2, `planar3`.",
 }

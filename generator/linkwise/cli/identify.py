@@ -43,7 +43,7 @@ def identify(
     backend: Backend = None,
     as_json: Json = False,
 ) -> None:
-    """What a log of motion and torques says of the links: masses, centres, inertias, friction."""
+    """Identify links from a log of motion and torques: masses, centres, inertias, friction."""
     processing = replace(processing, edges="trim")
     own = own_file(robot)
     if own is not None:

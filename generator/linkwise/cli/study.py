@@ -45,7 +45,7 @@ def study(
     address: Address = None,
     trust_python: TrustPython = False,
 ) -> None:
-    """Many recordings: every trial analysed, and what they say together; also on a cluster."""
+    """Analyse many recordings: every trial, and what they say together; also on a cluster."""
     chosen = ProcessPool(workers) if engine == "processes" else RayCluster(address)
     with shown_progress({"trials": "trials"}) as progress:
         found = run_study(file, out, chosen, progress, trust_python)

@@ -11,7 +11,7 @@ from linkwise.package.entries import JointEntry
 from linkwise.package.load import Array
 
 DRAWS = 40
-"""How many times as many states are tried as were asked for, where energies are not defined everywhere."""
+"""Number of times as many states that are tried as were asked for; energies may not be defined everywhere."""
 AT_REST = 4
 """States beside the random ones: without acceleration, without velocity, without either, twice."""
 NUMBERS = 1 << 21

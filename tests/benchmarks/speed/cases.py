@@ -16,7 +16,7 @@ class Case:
     robot: Callable[[Path], str]
     options: tuple[str, ...] = ()
     kernel: str | None = None
-    """What `generate --kernel` is told; where there is no such choice, the robot is left out."""
+    """Kernel that `generate --kernel` is told; where there is no such choice, the robot is left out."""
     casadi: bool = True
     peers: bool = True
     every_backend: bool = False

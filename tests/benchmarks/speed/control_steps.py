@@ -8,7 +8,7 @@ from speed.emitted import Figure
 from speed.package import PEERS, Package, compiler, run
 
 CONTROL = "control of "
-"""How calls begin that are control steps."""
+"""Beginnings of calls that are control steps."""
 
 
 def measure(package: Package, work: Path) -> list[Figure]:

@@ -19,7 +19,7 @@ BOOST = (
     "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
     "-DBOOST_FUSION_INVOKE_MAX_ARITY=12",
 )
-"""As Pinocchio's own CMake files have it: its joint types are more than Boost's lists hold by default."""
+"""Limits of Pinocchio's own CMake files: its joint types are more than Boost's lists hold by default."""
 
 
 @dataclass(frozen=True)
