@@ -95,7 +95,8 @@ def closed_form_cost(system: RigidSystem) -> float:
     """Return the operations of the closed forms of all links, estimated from the link of median path length.
 
     Its operations are counted in one frame, about its centre of mass, and all others are assumed to save as
-    much as it does of what loops would take. No link is derived where even the sparsest would have too many.
+    much as it does of what loops would take: to derive them all would take the time that the choice may
+    spare. No link is derived where even the sparsest would have too many.
     """
     loops, costs = decomposition_cost(system), link_costs(system)
     behind_more = sum(cost for link, cost in zip(system.links, costs, strict=True) if len(link.joints) > 1)

@@ -103,11 +103,11 @@ def _parts(robot: str | Path, backends: Sequence[str], options: Options) -> Iter
     for path in robot_files(robot, options):
         if path.is_file():
             # A file too large for a package is left to its reader to refuse, at once.
-            yield _told(path) if is_too_large(path) else hashlib.sha256(path.read_bytes()).hexdigest()
-    yield from map(_told, map(Path, generator_files()))
+            yield _size_time(path) if is_too_large(path) else hashlib.sha256(path.read_bytes()).hexdigest()
+    yield from map(_size_time, map(Path, generator_files()))
 
 
-def _told(path: Path) -> str:
+def _size_time(path: Path) -> str:
     """Return a text that changes when a file does, without reading it."""
     found = path.stat()
     return f"{path} {found.st_size} {found.st_mtime_ns}"

@@ -148,11 +148,11 @@ class Qpos:
             raise TypeError(f"{name} has dtype {values.dtype}; give numbers")
         if values.ndim == 0 or values.shape[-1] != width or shape not in (None, values.shape[:-1]):
             raise ValueError(
-                f"{name} has shape {values.shape}; {self._told(name, values.shape, width, shape)}"
+                f"{name} has shape {values.shape}; {self._wanted(name, values.shape, width, shape)}"
             )
         return values.astype(np.float64)
 
-    def _told(self, name: str, given: tuple[int, ...], width: int, shape: tuple[int, ...] | None) -> str:
+    def _wanted(self, name: str, given: tuple[int, ...], width: int, shape: tuple[int, ...] | None) -> str:
         if given[-1:] == (width,):
             return f"qpos has {shape} samples; give as many"
         if name != "qpos":

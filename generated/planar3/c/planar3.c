@@ -44,7 +44,7 @@ struct results {
     real *c2, *c1, *g, *tau;
 };
 
-/* Where those with their zeros go: see dense.h. */
+/* Where results with their zeros go: see dense.h. */
 struct dense;
 
 SHARED void API(decomposition_one)(const real *q, const real *qd, const real *qdd,
@@ -250,7 +250,7 @@ static void links_1_to_3(size_t blocks, const struct inputs *m, const struct res
         link_3_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].c2 + 4 * W, r[t].c1 + 5 * W, r[t].g + 3 * W, r[t].tau + 3 * W);
 }
 
-/* Their torques alone. */
+/* Torques of these links alone. */
 static void links_1_to_3_torque(size_t blocks, const struct inputs *m, const struct results *r)
 {
     for (size_t t = 0; t < blocks; ++t)

@@ -104,7 +104,7 @@ enum {
 void planar3_decomposition(size_t count, const double *q, const double *qd, const double *qdd,
     double *c2, double *c1, double *g, double *tau);
 
-/* The same, of blocks of samples.
+/* All quantities but c0, of blocks of samples.
    Reads q, qd, qdd (blocks, JOINTS, BLOCK);
    writes c2 (blocks, C2, BLOCK), c1 (blocks, C1, BLOCK), g, tau (blocks, G, BLOCK). */
 void planar3_decomposition_blocks(size_t blocks, const double *q, const double *qd, const double *qdd,
@@ -114,11 +114,11 @@ void planar3_decomposition_blocks(size_t blocks, const double *q, const double *
    Reads q, qd, qdd (count, JOINTS); writes tau (count, G). */
 void planar3_torque(size_t count, const double *q, const double *qd, const double *qdd, double *tau);
 
-/* With their zeros: the torque at every joint through every link, entry (i - 1, j - 1) of a row being tau(i, j).
+/* Partial torques with their zeros, at every joint through every link: entry (i - 1, j - 1) of a row is tau(i, j).
    Reads q, qd, qdd (count, JOINTS); writes torque (count, JOINTS, LINKS). */
 void planar3_partial_torque(size_t count, const double *q, const double *qd, const double *qdd, double *torque);
 
-/* Their sums over the links, ordinary inverse dynamics.
+/* Joint torques, ordinary inverse dynamics: sums of tau(i, j) over the links j.
    Reads q, qd, qdd (count, JOINTS); writes torque (count, JOINTS). */
 void planar3_inverse_dynamics(size_t count, const double *q, const double *qd, const double *qdd, double *torque);
 
@@ -129,14 +129,14 @@ void planar3_inverse_dynamics(size_t count, const double *q, const double *qd, c
 void planar3_coefficients(size_t count, const double *q, const double *qd,
     double *acceleration, double *velocity, double *gravity);
 
-/* Torques by each joint's motion, with their zeros: c2(i, j, k) qdd_k and c1(i, j, k) qd_k, and g(i, j). Over k and the
+/* Propagation torques, by each joint's motion, with their zeros: c2(i, j, k) qdd_k and c1(i, j, k) qd_k, and g(i, j). Over k and the
    three they sum to tau(i, j).
    Reads q, qd, qdd (count, JOINTS);
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS), gravity (count, JOINTS, LINKS). */
 void planar3_propagation(size_t count, const double *q, const double *qd, const double *qdd,
     double *acceleration, double *velocity, double *gravity);
 
-/* The same, with d(tau)/d(qd) in place of c1: velocities then count twice in that sum. */
+/* Propagation torques with d(tau)/d(qd) in place of c1: velocities then count twice in that sum. */
 void planar3_gradient_propagation(size_t count, const double *q, const double *qd, const double *qdd,
     double *acceleration, double *velocity, double *gravity);
 
@@ -144,7 +144,7 @@ void planar3_gradient_propagation(size_t count, const double *q, const double *q
    Reads q, qd, qdd (count, JOINTS); writes c0 (count, C1). */
 void planar3_position_gradient(size_t count, const double *q, const double *qd, const double *qdd, double *c0);
 
-/* The same with its zeros. Reads q, qd, qdd (count, JOINTS); writes gradient (count, JOINTS, LINKS, JOINTS). */
+/* Position gradient with its zeros. Reads q, qd, qdd (count, JOINTS); writes gradient (count, JOINTS, LINKS, JOINTS). */
 void planar3_dense_position_gradient(size_t count, const double *q, const double *qd, const double *qdd, double *gradient);
 
 /* Regressors, with their zeros: entry (i - 1, j - 1) of a row is the Y of which tau(i, j) = Y . pi(j), whatever link j
@@ -154,7 +154,7 @@ void planar3_dense_position_gradient(size_t count, const double *q, const double
    Reads q, qd, qdd (count, JOINTS); writes regressor (count, JOINTS, LINKS, 10). */
 void planar3_regressor(size_t count, const double *q, const double *qd, const double *qdd, double *regressor);
 
-/* The same of c2(i, j, k), c1(i, j, k) and g(i, j).
+/* Regressors of c2(i, j, k), c1(i, j, k) and g(i, j), with their zeros.
    Reads q, qd (count, JOINTS);
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS, 10), gravity (count, JOINTS, LINKS, 10). */
 void planar3_coefficient_regressors(size_t count, const double *q, const double *qd,
@@ -174,9 +174,9 @@ void planar3_link_2(const double *q, const double *qd, const double *qdd,
 void planar3_link_3(const double *q, const double *qd, const double *qdd,
     double *c2, double *c1, double *g, double *tau);
 
-/* What control needs, of one sample, in the world's axes, in m and rad.
+/* Functions for control, of one sample, in the world's axes, in m and rad.
 
-   Matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
+   Pose: the matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
    Reads q (JOINTS); writes pose (4, 4). */
 void planar3_pose(int frame, const double *q, double *pose);
 
@@ -185,7 +185,7 @@ void planar3_pose(int frame, const double *q, double *pose);
    column i times (n, f). Reads q (JOINTS), point (3); writes jacobian (6, JOINTS). */
 void planar3_jacobian(int frame, const double *point, const double *q, double *jacobian);
 
-/* How it changes with time, the point staying where it is in the frame.
+/* Rate of that Jacobian, the point staying where it is in the frame.
    Reads q, qd (JOINTS), point (3); writes rate (6, JOINTS). */
 void planar3_jacobian_rate(int frame, const double *point, const double *q, const double *qd, double *rate);
 
@@ -270,7 +270,7 @@ int planar3_frame_partial_impedance(const double *q, const double *qd, const pla
 void planar3_decompositionf(size_t count, const float *q, const float *qd, const float *qdd,
     float *c2, float *c1, float *g, float *tau);
 
-/* The same, of blocks of samples.
+/* All quantities but c0, of blocks of samples.
    Reads q, qd, qdd (blocks, JOINTS, BLOCKF);
    writes c2 (blocks, C2, BLOCKF), c1 (blocks, C1, BLOCKF), g, tau (blocks, G, BLOCKF). */
 void planar3_decomposition_blocksf(size_t blocks, const float *q, const float *qd, const float *qdd,
@@ -280,11 +280,11 @@ void planar3_decomposition_blocksf(size_t blocks, const float *q, const float *q
    Reads q, qd, qdd (count, JOINTS); writes tau (count, G). */
 void planar3_torquef(size_t count, const float *q, const float *qd, const float *qdd, float *tau);
 
-/* With their zeros: the torque at every joint through every link, entry (i - 1, j - 1) of a row being tau(i, j).
+/* Partial torques with their zeros, at every joint through every link: entry (i - 1, j - 1) of a row is tau(i, j).
    Reads q, qd, qdd (count, JOINTS); writes torque (count, JOINTS, LINKS). */
 void planar3_partial_torquef(size_t count, const float *q, const float *qd, const float *qdd, float *torque);
 
-/* Their sums over the links, ordinary inverse dynamics.
+/* Joint torques, ordinary inverse dynamics: sums of tau(i, j) over the links j.
    Reads q, qd, qdd (count, JOINTS); writes torque (count, JOINTS). */
 void planar3_inverse_dynamicsf(size_t count, const float *q, const float *qd, const float *qdd, float *torque);
 
@@ -295,14 +295,14 @@ void planar3_inverse_dynamicsf(size_t count, const float *q, const float *qd, co
 void planar3_coefficientsf(size_t count, const float *q, const float *qd,
     float *acceleration, float *velocity, float *gravity);
 
-/* Torques by each joint's motion, with their zeros: c2(i, j, k) qdd_k and c1(i, j, k) qd_k, and g(i, j). Over k and the
+/* Propagation torques, by each joint's motion, with their zeros: c2(i, j, k) qdd_k and c1(i, j, k) qd_k, and g(i, j). Over k and the
    three they sum to tau(i, j).
    Reads q, qd, qdd (count, JOINTS);
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS), gravity (count, JOINTS, LINKS). */
 void planar3_propagationf(size_t count, const float *q, const float *qd, const float *qdd,
     float *acceleration, float *velocity, float *gravity);
 
-/* The same, with d(tau)/d(qd) in place of c1: velocities then count twice in that sum. */
+/* Propagation torques with d(tau)/d(qd) in place of c1: velocities then count twice in that sum. */
 void planar3_gradient_propagationf(size_t count, const float *q, const float *qd, const float *qdd,
     float *acceleration, float *velocity, float *gravity);
 
@@ -310,7 +310,7 @@ void planar3_gradient_propagationf(size_t count, const float *q, const float *qd
    Reads q, qd, qdd (count, JOINTS); writes c0 (count, C1). */
 void planar3_position_gradientf(size_t count, const float *q, const float *qd, const float *qdd, float *c0);
 
-/* The same with its zeros. Reads q, qd, qdd (count, JOINTS); writes gradient (count, JOINTS, LINKS, JOINTS). */
+/* Position gradient with its zeros. Reads q, qd, qdd (count, JOINTS); writes gradient (count, JOINTS, LINKS, JOINTS). */
 void planar3_dense_position_gradientf(size_t count, const float *q, const float *qd, const float *qdd, float *gradient);
 
 /* Regressors, with their zeros: entry (i - 1, j - 1) of a row is the Y of which tau(i, j) = Y . pi(j), whatever link j
@@ -320,7 +320,7 @@ void planar3_dense_position_gradientf(size_t count, const float *q, const float 
    Reads q, qd, qdd (count, JOINTS); writes regressor (count, JOINTS, LINKS, 10). */
 void planar3_regressorf(size_t count, const float *q, const float *qd, const float *qdd, float *regressor);
 
-/* The same of c2(i, j, k), c1(i, j, k) and g(i, j).
+/* Regressors of c2(i, j, k), c1(i, j, k) and g(i, j), with their zeros.
    Reads q, qd (count, JOINTS);
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS, 10), gravity (count, JOINTS, LINKS, 10). */
 void planar3_coefficient_regressorsf(size_t count, const float *q, const float *qd,
@@ -340,9 +340,9 @@ void planar3_link_2f(const float *q, const float *qd, const float *qdd,
 void planar3_link_3f(const float *q, const float *qd, const float *qdd,
     float *c2, float *c1, float *g, float *tau);
 
-/* What control needs, of one sample, in the world's axes, in m and rad.
+/* Functions for control, of one sample, in the world's axes, in m and rad.
 
-   Matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
+   Pose: the matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
    Reads q (JOINTS); writes pose (4, 4). */
 void planar3_posef(int frame, const float *q, float *pose);
 
@@ -351,7 +351,7 @@ void planar3_posef(int frame, const float *q, float *pose);
    column i times (n, f). Reads q (JOINTS), point (3); writes jacobian (6, JOINTS). */
 void planar3_jacobianf(int frame, const float *point, const float *q, float *jacobian);
 
-/* How it changes with time, the point staying where it is in the frame.
+/* Rate of that Jacobian, the point staying where it is in the frame.
    Reads q, qd (JOINTS), point (3); writes rate (6, JOINTS). */
 void planar3_jacobian_ratef(int frame, const float *point, const float *q, const float *qd, float *rate);
 

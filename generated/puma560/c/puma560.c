@@ -47,7 +47,7 @@ struct results {
     real *c2, *c1, *g, *tau;
 };
 
-/* Where those with their zeros go: see dense.h. */
+/* Where results with their zeros go: see dense.h. */
 struct dense;
 
 SHARED void API(decomposition_one)(const real *q, const real *qd, const real *qdd,
@@ -304,7 +304,7 @@ static void links_1_to_6(size_t blocks, const struct inputs *m, const struct res
         link_6_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].c2 + 35 * W, r[t].c1 + 55 * W, r[t].g + 15 * W, r[t].tau + 15 * W);
 }
 
-/* Their torques alone. */
+/* Torques of these links alone. */
 static void links_1_to_6_torque(size_t blocks, const struct inputs *m, const struct results *r)
 {
     for (size_t t = 0; t < blocks; ++t)

@@ -46,7 +46,7 @@ struct results {
     real *c2, *c1, *g, *tau;
 };
 
-/* Where those with their zeros go: see dense.h. */
+/* Where results with their zeros go: see dense.h. */
 struct dense;
 
 SHARED void API(decomposition_one)(const real *q, const real *qd, const real *qdd,
@@ -286,7 +286,7 @@ static void links_1_to_5(size_t blocks, const struct inputs *m, const struct res
         link_5_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].c2 + 41 * W, r[t].c1 + 66 * W, r[t].g + 16 * W, r[t].tau + 16 * W);
 }
 
-/* Their torques alone. */
+/* Torques of these links alone. */
 static void links_1_to_5_torque(size_t blocks, const struct inputs *m, const struct results *r)
 {
     for (size_t t = 0; t < blocks; ++t)

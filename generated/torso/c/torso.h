@@ -118,7 +118,7 @@ enum {
 void torso_decomposition(size_t count, const double *q, const double *qd, const double *qdd,
     double *c2, double *c1, double *g, double *tau);
 
-/* The same, of blocks of samples.
+/* All quantities but c0, of blocks of samples.
    Reads q, qd, qdd (blocks, JOINTS, BLOCK);
    writes c2 (blocks, C2, BLOCK), c1 (blocks, C1, BLOCK), g, tau (blocks, G, BLOCK). */
 void torso_decomposition_blocks(size_t blocks, const double *q, const double *qd, const double *qdd,
@@ -128,11 +128,11 @@ void torso_decomposition_blocks(size_t blocks, const double *q, const double *qd
    Reads q, qd, qdd (count, JOINTS); writes tau (count, G). */
 void torso_torque(size_t count, const double *q, const double *qd, const double *qdd, double *tau);
 
-/* With their zeros: the torque at every joint through every link, entry (i - 1, j - 1) of a row being tau(i, j).
+/* Partial torques with their zeros, at every joint through every link: entry (i - 1, j - 1) of a row is tau(i, j).
    Reads q, qd, qdd (count, JOINTS); writes torque (count, JOINTS, LINKS). */
 void torso_partial_torque(size_t count, const double *q, const double *qd, const double *qdd, double *torque);
 
-/* Their sums over the links, ordinary inverse dynamics.
+/* Joint torques, ordinary inverse dynamics: sums of tau(i, j) over the links j.
    Reads q, qd, qdd (count, JOINTS); writes torque (count, JOINTS). */
 void torso_inverse_dynamics(size_t count, const double *q, const double *qd, const double *qdd, double *torque);
 
@@ -143,14 +143,14 @@ void torso_inverse_dynamics(size_t count, const double *q, const double *qd, con
 void torso_coefficients(size_t count, const double *q, const double *qd,
     double *acceleration, double *velocity, double *gravity);
 
-/* Torques by each joint's motion, with their zeros: c2(i, j, k) qdd_k and c1(i, j, k) qd_k, and g(i, j). Over k and the
+/* Propagation torques, by each joint's motion, with their zeros: c2(i, j, k) qdd_k and c1(i, j, k) qd_k, and g(i, j). Over k and the
    three they sum to tau(i, j).
    Reads q, qd, qdd (count, JOINTS);
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS), gravity (count, JOINTS, LINKS). */
 void torso_propagation(size_t count, const double *q, const double *qd, const double *qdd,
     double *acceleration, double *velocity, double *gravity);
 
-/* The same, with d(tau)/d(qd) in place of c1: velocities then count twice in that sum. */
+/* Propagation torques with d(tau)/d(qd) in place of c1: velocities then count twice in that sum. */
 void torso_gradient_propagation(size_t count, const double *q, const double *qd, const double *qdd,
     double *acceleration, double *velocity, double *gravity);
 
@@ -158,7 +158,7 @@ void torso_gradient_propagation(size_t count, const double *q, const double *qd,
    Reads q, qd, qdd (count, JOINTS); writes c0 (count, C1). */
 void torso_position_gradient(size_t count, const double *q, const double *qd, const double *qdd, double *c0);
 
-/* The same with its zeros. Reads q, qd, qdd (count, JOINTS); writes gradient (count, JOINTS, LINKS, JOINTS). */
+/* Position gradient with its zeros. Reads q, qd, qdd (count, JOINTS); writes gradient (count, JOINTS, LINKS, JOINTS). */
 void torso_dense_position_gradient(size_t count, const double *q, const double *qd, const double *qdd, double *gradient);
 
 /* Regressors, with their zeros: entry (i - 1, j - 1) of a row is the Y of which tau(i, j) = Y . pi(j), whatever link j
@@ -168,7 +168,7 @@ void torso_dense_position_gradient(size_t count, const double *q, const double *
    Reads q, qd, qdd (count, JOINTS); writes regressor (count, JOINTS, LINKS, 10). */
 void torso_regressor(size_t count, const double *q, const double *qd, const double *qdd, double *regressor);
 
-/* The same of c2(i, j, k), c1(i, j, k) and g(i, j).
+/* Regressors of c2(i, j, k), c1(i, j, k) and g(i, j), with their zeros.
    Reads q, qd (count, JOINTS);
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS, 10), gravity (count, JOINTS, LINKS, 10). */
 void torso_coefficient_regressors(size_t count, const double *q, const double *qd,
@@ -196,9 +196,9 @@ void torso_link_4(const double *q, const double *qd, const double *qdd,
 void torso_link_5(const double *q, const double *qd, const double *qdd,
     double *c2, double *c1, double *g, double *tau);
 
-/* What control needs, of one sample, in the world's axes, in m and rad.
+/* Functions for control, of one sample, in the world's axes, in m and rad.
 
-   Matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
+   Pose: the matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
    Reads q (JOINTS); writes pose (4, 4). */
 void torso_pose(int frame, const double *q, double *pose);
 
@@ -207,7 +207,7 @@ void torso_pose(int frame, const double *q, double *pose);
    column i times (n, f). Reads q (JOINTS), point (3); writes jacobian (6, JOINTS). */
 void torso_jacobian(int frame, const double *point, const double *q, double *jacobian);
 
-/* How it changes with time, the point staying where it is in the frame.
+/* Rate of that Jacobian, the point staying where it is in the frame.
    Reads q, qd (JOINTS), point (3); writes rate (6, JOINTS). */
 void torso_jacobian_rate(int frame, const double *point, const double *q, const double *qd, double *rate);
 
@@ -292,7 +292,7 @@ int torso_frame_partial_impedance(const double *q, const double *qd, const torso
 void torso_decompositionf(size_t count, const float *q, const float *qd, const float *qdd,
     float *c2, float *c1, float *g, float *tau);
 
-/* The same, of blocks of samples.
+/* All quantities but c0, of blocks of samples.
    Reads q, qd, qdd (blocks, JOINTS, BLOCKF);
    writes c2 (blocks, C2, BLOCKF), c1 (blocks, C1, BLOCKF), g, tau (blocks, G, BLOCKF). */
 void torso_decomposition_blocksf(size_t blocks, const float *q, const float *qd, const float *qdd,
@@ -302,11 +302,11 @@ void torso_decomposition_blocksf(size_t blocks, const float *q, const float *qd,
    Reads q, qd, qdd (count, JOINTS); writes tau (count, G). */
 void torso_torquef(size_t count, const float *q, const float *qd, const float *qdd, float *tau);
 
-/* With their zeros: the torque at every joint through every link, entry (i - 1, j - 1) of a row being tau(i, j).
+/* Partial torques with their zeros, at every joint through every link: entry (i - 1, j - 1) of a row is tau(i, j).
    Reads q, qd, qdd (count, JOINTS); writes torque (count, JOINTS, LINKS). */
 void torso_partial_torquef(size_t count, const float *q, const float *qd, const float *qdd, float *torque);
 
-/* Their sums over the links, ordinary inverse dynamics.
+/* Joint torques, ordinary inverse dynamics: sums of tau(i, j) over the links j.
    Reads q, qd, qdd (count, JOINTS); writes torque (count, JOINTS). */
 void torso_inverse_dynamicsf(size_t count, const float *q, const float *qd, const float *qdd, float *torque);
 
@@ -317,14 +317,14 @@ void torso_inverse_dynamicsf(size_t count, const float *q, const float *qd, cons
 void torso_coefficientsf(size_t count, const float *q, const float *qd,
     float *acceleration, float *velocity, float *gravity);
 
-/* Torques by each joint's motion, with their zeros: c2(i, j, k) qdd_k and c1(i, j, k) qd_k, and g(i, j). Over k and the
+/* Propagation torques, by each joint's motion, with their zeros: c2(i, j, k) qdd_k and c1(i, j, k) qd_k, and g(i, j). Over k and the
    three they sum to tau(i, j).
    Reads q, qd, qdd (count, JOINTS);
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS), gravity (count, JOINTS, LINKS). */
 void torso_propagationf(size_t count, const float *q, const float *qd, const float *qdd,
     float *acceleration, float *velocity, float *gravity);
 
-/* The same, with d(tau)/d(qd) in place of c1: velocities then count twice in that sum. */
+/* Propagation torques with d(tau)/d(qd) in place of c1: velocities then count twice in that sum. */
 void torso_gradient_propagationf(size_t count, const float *q, const float *qd, const float *qdd,
     float *acceleration, float *velocity, float *gravity);
 
@@ -332,7 +332,7 @@ void torso_gradient_propagationf(size_t count, const float *q, const float *qd, 
    Reads q, qd, qdd (count, JOINTS); writes c0 (count, C1). */
 void torso_position_gradientf(size_t count, const float *q, const float *qd, const float *qdd, float *c0);
 
-/* The same with its zeros. Reads q, qd, qdd (count, JOINTS); writes gradient (count, JOINTS, LINKS, JOINTS). */
+/* Position gradient with its zeros. Reads q, qd, qdd (count, JOINTS); writes gradient (count, JOINTS, LINKS, JOINTS). */
 void torso_dense_position_gradientf(size_t count, const float *q, const float *qd, const float *qdd, float *gradient);
 
 /* Regressors, with their zeros: entry (i - 1, j - 1) of a row is the Y of which tau(i, j) = Y . pi(j), whatever link j
@@ -342,7 +342,7 @@ void torso_dense_position_gradientf(size_t count, const float *q, const float *q
    Reads q, qd, qdd (count, JOINTS); writes regressor (count, JOINTS, LINKS, 10). */
 void torso_regressorf(size_t count, const float *q, const float *qd, const float *qdd, float *regressor);
 
-/* The same of c2(i, j, k), c1(i, j, k) and g(i, j).
+/* Regressors of c2(i, j, k), c1(i, j, k) and g(i, j), with their zeros.
    Reads q, qd (count, JOINTS);
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS, 10), gravity (count, JOINTS, LINKS, 10). */
 void torso_coefficient_regressorsf(size_t count, const float *q, const float *qd,
@@ -370,9 +370,9 @@ void torso_link_4f(const float *q, const float *qd, const float *qdd,
 void torso_link_5f(const float *q, const float *qd, const float *qdd,
     float *c2, float *c1, float *g, float *tau);
 
-/* What control needs, of one sample, in the world's axes, in m and rad.
+/* Functions for control, of one sample, in the world's axes, in m and rad.
 
-   Matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
+   Pose: the matrix from a frame's coordinates to the world's, row by row. `frame` is one of the constants above.
    Reads q (JOINTS); writes pose (4, 4). */
 void torso_posef(int frame, const float *q, float *pose);
 
@@ -381,7 +381,7 @@ void torso_posef(int frame, const float *q, float *pose);
    column i times (n, f). Reads q (JOINTS), point (3); writes jacobian (6, JOINTS). */
 void torso_jacobianf(int frame, const float *point, const float *q, float *jacobian);
 
-/* How it changes with time, the point staying where it is in the frame.
+/* Rate of that Jacobian, the point staying where it is in the frame.
    Reads q, qd (JOINTS), point (3); writes rate (6, JOINTS). */
 void torso_jacobian_ratef(int frame, const float *point, const float *q, const float *qd, float *rate);
 

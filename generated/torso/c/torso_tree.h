@@ -39,7 +39,7 @@ static const short columns[] = {
 };
 #endif
 
-/* Of each joint: turn, place, ratio. Of each link: mass, centre of mass, inertia. Gravity. */
+/* Turn, place and ratio of each joint; mass, centre of mass and inertia of each link; gravity. */
 static const struct numbers own_numbers = {
     {
         {{R(1.0), R(0.0), R(0.0), R(0.0), R(1.0), R(0.0), R(0.0), R(0.0), R(1.0)}, {R(0.0), R(0.0), R(0.11)}, R(1.0)},
@@ -74,7 +74,7 @@ static const struct named_frame named_frames[] = {
     {7, {R(0.0), R(0.0), R(1.0), R(1.0), R(0.0), R(0.0), R(0.0), R(1.0), R(0.0)}}, /* 7, 'right_forearm' */
 };
 
-/* Their places there. */
+/* Places of named frames there. */
 static const struct offsets own_offsets = {
     {
         {R(0.0), R(0.0), R(0.0)},

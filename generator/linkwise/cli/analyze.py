@@ -50,10 +50,10 @@ def analyze(
     if as_json:
         print(json_text(analysis.record()))
     else:
-        tell(*_told(analysis, files))
+        tell(*_summary(analysis, files))
 
 
-def _told(analysis: Analysis, files: Sequence[Path]) -> list[str]:
+def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
     closure = analysis.closure
     recursion = (
         "no independent value for energies written by hand"

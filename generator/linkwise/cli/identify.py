@@ -66,10 +66,10 @@ def identify(
     if as_json:
         print(json_text(record(found)))
     else:
-        tell(*_told(found, files))
+        tell(*_summary(found, files))
 
 
-def _told(found: Identification, files: Sequence[Path]) -> Iterator[str]:
+def _summary(found: Identification, files: Sequence[Path]) -> Iterator[str]:
     errors, sizes = found.errors(found.unseen if found.unseen.rows else found.seen), found.seen.sizes()
     what = "unseen" if found.unseen.rows else "fitted"
     yield (

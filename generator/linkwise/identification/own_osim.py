@@ -16,10 +16,10 @@ class OwnOsim(OwnFile):
 
     def written(self, links: Mapping[str, LinkMass], friction: Friction) -> bytes:
         """Return the edited file, see OwnFile."""
-        mended = as_xml(self.data)
-        if len(mended) != len(self.data):
+        repaired = as_xml(self.data)
+        if len(repaired) != len(self.data):
             raise self.not_utf8()
-        xml = PlacedXml(self.data, mended)
+        xml = PlacedXml(self.data, repaired)
         model = xml.root.find("Model")
         assert model is not None
         bodies = ((body, links.get(name_of(body))) for body in members(model, "BodySet"))

@@ -33,7 +33,7 @@ def whole_directory(target: Path, refuse: Callable[[Path], None]) -> Iterator[Pa
     """
     if target.name in ("", ".."):
         target = Path(os.path.realpath(target))
-    with _ended_by_signal(), _told(target):
+    with _ended_by_signal(), _failures_named(target):
         sweep(target.parent)
         if os.path.lexists(target):
             refuse(target)
@@ -51,7 +51,7 @@ def write_files(directory: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]
     kill between two leaves both kinds side by side.
     """
     targets = tuple(directory / name for name in files)
-    with _ended_by_signal(), _told(directory):
+    with _ended_by_signal(), _failures_named(directory):
         sweep(directory)
         for target in targets:
             _refuse_unless_replaceable(target)
@@ -74,7 +74,7 @@ def require_writable(directory: Path) -> None:
     place = directory
     while not os.path.lexists(place) and place != place.parent:
         place = place.parent
-    with _told(directory), tempfile.TemporaryFile(dir=place):
+    with _failures_named(directory), tempfile.TemporaryFile(dir=place):
         pass
 
 
@@ -134,21 +134,23 @@ def _folder(directory: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _told(place: Path) -> Iterator[None]:
+def _failures_named(place: Path) -> Iterator[None]:
     """Raise LinkwiseError for an OSError on the way to `place`: a full disk, above all."""
     if ADDRESS.match(place.as_posix()):
         raise LinkwiseError(f"{place}: that is an address, and results are written to folders; choose one")
     try:
         yield
     except OSError as error:
-        blocker, reason, mend = _blocker(place), error.strerror or type(error).__name__, ""
+        blocker, reason, remedy = _blocker(place), error.strerror or type(error).__name__, ""
         if blocker is not None:
             place, reason = blocker, "it is not a folder"
         elif isinstance(error, FileExistsError) and error.filename:
-            place, mend = error.filename, "move it away, or "
+            place, remedy = error.filename, "move it away, or "
         elif isinstance(error, PermissionError) and system_here().keeps_open_files:
-            mend = "close the programs that have files there open, or "
-        raise LinkwiseError(f"{place}: nothing was written: {reason}; {mend}choose another place") from error
+            remedy = "close the programs that have files there open, or "
+        raise LinkwiseError(
+            f"{place}: nothing was written: {reason}; {remedy}choose another place"
+        ) from error
 
 
 def _blocker(place: Path) -> Path | None:

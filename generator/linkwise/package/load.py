@@ -83,8 +83,8 @@ def open_package(directory: Path) -> Package:
     version = manifest.generator.get("linkwise")
     if version != VERSION:
         told = f"its runtime is that of linkwise {version}, which is not at hand to compare with"
-        mend = "its code runs as it is; generate the robot again if you do not know where it comes from"
-        warnings.warn(f"{directory}: {told}: {mend}", LinkwiseWarning, stacklevel=2)
+        remedy = "its code runs as it is; generate the robot again if you do not know where it comes from"
+        warnings.warn(f"{directory}: {told}: {remedy}", LinkwiseWarning, stacklevel=2)
     for fault in foreign(directory, manifest):
         raise LinkwiseError(f"{directory}: {fault}; nothing of it is run: generate the robot again")
     try:

@@ -305,10 +305,6 @@ class Robot:
             at = self.links[at].parent
         return tuple(reversed(chain))
 
-    def joints_to(self, link: int) -> tuple[Joint, ...]:
-        """Return the joints from the root to `link`."""
-        return tuple(self.links[at].joint for at in self.chain(link))
-
 
 LARGEST = 1e12
 """Largest number of a description, in SI units: the product of three still fits single precision."""

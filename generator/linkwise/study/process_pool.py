@@ -74,7 +74,7 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=_work, args=(theirs,), daemon=True)
-        with _born_apart():
+        with _child_environment():
             self.process.start()
         theirs.close()  # so that the pipe ends when the process does
 
@@ -124,7 +124,7 @@ def _end_with_parent() -> None:
 
 
 @contextmanager
-def _born_apart() -> Iterator[None]:
+def _child_environment() -> Iterator[None]:
     """Start processes that know nothing of this one's main program, and keep to one thread.
 
     A process would run a user's script again that has no `if __name__ == "__main__"`, and needs none of it.

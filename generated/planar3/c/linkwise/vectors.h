@@ -89,7 +89,7 @@ INLINE vector turned(matrix m, const real *a)
     return product;
 }
 
-/* The same number in every sample. */
+/* One number in every sample. */
 INLINE number same(real a)
 {
     const number none = {0};

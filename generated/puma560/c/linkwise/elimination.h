@@ -25,7 +25,7 @@ static inline int largest_row(int n, int width, int c, const real *scale, const 
     return row;
 }
 
-/* Of the joint whose pivot is the least beside its inertia, its column, and the part of its inertia that is left when all
+/* Column of the joint whose pivot is the least beside its inertia, and the part of its inertia that is left when all
    others move freely; where far more than rounding is left, when those before it do. Of a matrix that is not known to be
    positive, what is left is 1 by the largest number of its inverse. */
 struct pivot {

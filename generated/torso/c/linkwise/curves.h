@@ -33,7 +33,7 @@ static inline void curve_at(int f, real q, int stride, real *moved)
     moved[3 * stride] = 6 * d[3];
 }
 
-/* The same of all joints of `width` samples, a table for each derivative. */
+/* Displacements of all joints of `width` samples, and their derivatives, a table for each. */
 static inline void displace(int width, const real *q, real *moved)
 {
     for (int f = 0; f < FRAMES; ++f)

@@ -10,7 +10,7 @@ static inline void add_armature(real *mass)
         mass[i * N + i] += passive[i].armature;
 }
 
-/* But friction. */
+/* All of them but friction. */
 static inline void add_passive(const real *q, const real *qd, const real *qdd, real *torque)
 {
     for (int i = 0; i < N; ++i) {
@@ -19,7 +19,7 @@ static inline void add_passive(const real *q, const real *qd, const real *qdd, r
     }
 }
 
-/* Coulomb's, none at rest. */
+/* Coulomb friction, none at rest. */
 static inline void add_friction(const real *qd, real *torque)
 {
     for (int i = 0; i < N; ++i)

@@ -105,13 +105,13 @@ def as_xml(data: bytes) -> bytes:
 
     A repair does not change the length, so that every element keeps its place, except for another encoding.
     """
-    mended = CLASS_OF_CLASS.sub(rb"\1..", COMMENT.sub(lambda found: BLACK.sub(b" ", found[0]), data))
+    repaired = CLASS_OF_CLASS.sub(rb"\1..", COMMENT.sub(lambda found: BLACK.sub(b" ", found[0]), data))
     try:
-        mended.decode("utf-8")
+        repaired.decode("utf-8")
     except UnicodeDecodeError:
-        if b"encoding=" not in mended[:100] or b"UTF-8" in mended[:100].upper():
-            return mended.decode("latin-1").encode("utf-8")
-    return mended
+        if b"encoding=" not in repaired[:100] or b"UTF-8" in repaired[:100].upper():
+            return repaired.decode("latin-1").encode("utf-8")
+    return repaired
 
 
 def members(model: Element, tag: str) -> Iterator[Element]:
