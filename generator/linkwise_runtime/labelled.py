@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .arguments import has_tensors
 from .call_table import CALLS, Call
 from .chosen_names import choice, short
-from .named_arrays import Part, SampleAxes, alone, dataset, samples_along, taken, xarray
+from .named_arrays import Part, SampleAxes, alone, arrays_in_order, dataset, samples_along, xarray
 from .quantities import AppliedLoad
 from .robot_axes import NamedAxis, axes_of, tied_axes
 
@@ -38,7 +38,7 @@ def labelled(
     is_kept = key == "simulate" and asked is not False and robot.backend.ties_joints
     if asked or is_kept or key.startswith(TIED) or key == "induced_reactions":
         ties = ties or asked or robot.constraints
-    arguments, samples = taken(
+    arguments, samples = arrays_in_order(
         arguments, robot.joint_names, ties.independent if ties else (), key in ALONE and bool(ties)
     )
     answer = function(**arguments)

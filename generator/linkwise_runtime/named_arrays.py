@@ -189,7 +189,7 @@ def alone(made: Any) -> Any:
     return made[name].assign_attrs(made.attrs)
 
 
-def taken(
+def arrays_in_order(
     arguments: Mapping[str, object], joints: Sequence[str], independent: Sequence[str], alone: bool = False
 ) -> tuple[dict[str, object], SampleAxes | None]:
     """Return the arguments as arrays, joints in the robot's order; and their samples, where some have names.

@@ -60,7 +60,7 @@ def record(
     """
     recorder, leaves = OperationRecorder(), dict[str, Leaf]()
 
-    def taken(leaf: Leaf, value: float, varies: bool = False) -> Tensor:
+    def tensor_of(leaf: Leaf, value: float, varies: bool = False) -> Tensor:
         leaves[leaf.key] = leaf
         tensor = torch.tensor(value, dtype=torch.float64, device="cpu", requires_grad=varies)
         return recorder.leaf(leaf, tensor)
@@ -69,13 +69,13 @@ def record(
     with torch.inference_mode(False), torch.enable_grad():
         motion = [
             [
-                taken(Leaf(f"{kind}[{k}]", kind, name), 0.3 + 0.1 * k, kind != "qdd")
+                tensor_of(Leaf(f"{kind}[{k}]", kind, name), 0.3 + 0.1 * k, kind != "qdd")
                 for k, name in enumerate(names)
             ]
             for kind in MOTIONS
         ]
         values = {
-            leaf.key: taken(leaf, value.detach().reshape(-1)[0].item()) for leaf, value in beside.items()
+            leaf.key: tensor_of(leaf, value.detach().reshape(-1)[0].item()) for leaf, value in beside.items()
         }
         energies = list(links(values))
         with recorder:

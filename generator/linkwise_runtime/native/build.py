@@ -17,7 +17,7 @@ from pathlib import Path
 from ..structure import Structure
 from .cache import ELSEWHERE, cache_directory, is_whole, keep, locked
 from .compiler import Compiler, find_compiler, processor
-from .process import Tell, run_all, told
+from .process import Tell, run_all, shown_on_one_line
 from .system import system_here
 
 PARTS = {
@@ -132,7 +132,7 @@ def _kept(name: str, what: str, compiler: Compiler, commands: Commands, check: C
     target = cache_directory() / f"{name}{system_here().library}"
     if not is_whole(target):
         lock = target.with_suffix(".lock")
-        with told(f"compiling {what}, once") as tell, locked(lock, tell):
+        with shown_on_one_line(f"compiling {what}, once") as tell, locked(lock, tell):
             if not is_whole(target):
                 _build(compiler, commands, target, tell, check)
     return target

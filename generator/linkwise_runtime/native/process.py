@@ -25,7 +25,7 @@ Tell = Callable[[str], None]
 
 
 @contextmanager
-def told(what: str) -> Iterator[Tell]:
+def shown_on_one_line(what: str) -> Iterator[Tell]:
     """Show on one line of stderr that `what` is going on, and its progress, if stderr is a terminal.
 
     The line is cleared in the end, so that no message is printed behind it.
