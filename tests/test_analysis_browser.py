@@ -12,17 +12,16 @@ import pyarrow.parquet as pq
 import pytest
 import urdf_text
 from linkwise import generate, read_system, write_package
-from linkwise.analysis import Contact, Contacts, Payload, Processing, Reading, analyze
-from linkwise.analysis.job import Wanted
+from linkwise.analysis import Contact, Contacts, Payload, analyze
+from linkwise.analysis.job import Request, Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.payload import carrying
-from linkwise.analysis.result import Totals
+from linkwise.analysis.result import Totals, Work
 from linkwise.analysis.result_rows import Column, ResultRows, torque_places
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import poses, report
 from linkwise.analysis.term_rows import term_rows
-from linkwise.analysis.work import Work
 from linkwise.progress import silent
 from motion_logs import LEG, PLANAR3, smooth, write_csv
 from selenium.webdriver.support.wait import WebDriverWait
@@ -36,7 +35,7 @@ def result(tmp_path_factory) -> Path:
     place = tmp_path_factory.mktemp("page")
     log = write_csv(place / "a<b>.csv", smooth(2000, 3))
     robot = load_robot(PLANAR3)
-    analyze_to(place / "out", log, robot, Reading(), Processing(), Wanted(), silent)
+    analyze_to(place / "out", log, robot, Request(), silent)
     return place / "out"
 
 
@@ -102,7 +101,7 @@ def test_what_rounding_leaves_is_shown_as_nothing(driver, tmp_path):
     log = smooth(300, 3)
     log[:, 2] = 0.3 + 1e-15 * np.sin(40 * log[:, 0])
     path, robot = write_csv(tmp_path / "log.csv", log), load_robot(PLANAR3)
-    analyze_to(tmp_path / "out", path, robot, Reading(), Processing(), Wanted(), silent)
+    analyze_to(tmp_path / "out", path, robot, Request(), silent)
     opened(driver, (tmp_path / "out" / "report.html").as_uri())
     choose(driver, "slider", 150)
     choose(driver, "joint", 0)
@@ -145,7 +144,7 @@ def test_what_accelerates_a_point_is_shown_by_source_and_adds_up(driver, tmp_pat
     log, robot = write_csv(tmp_path / "log.csv", smooth(300, 3)), load_robot(PLANAR3)
     wanted = Wanted("csv", induced=("joints", "link3,0.25,0,0"))
     loads = Loads.of([Load("pull", "link3", force=(0.0, -5.0, 0.0))], None)
-    result, _ = analyze_to(tmp_path / "out", log, robot, Reading(), Processing(), wanted, silent, loads)
+    result, _ = analyze_to(tmp_path / "out", log, robot, Request(wanted=wanted, loads=loads), silent)
     opened(driver, (tmp_path / "out" / "report.html").as_uri())
     curves = "return [...document.getElementById('induced').data].map((c) => [c.name, Array.from(c.y)])"
     choose(driver, "component", 1)
@@ -368,8 +367,7 @@ def test_contacts_are_arrows_and_feed_links_as_they_slip(driver, tmp_path):
     robot = load_robot(tmp_path / "leg")
     log = write_csv(tmp_path / "a.csv", smooth(80, 6) * 0.4, robot.joints)
     contacts, out = Contacts((Contact("foot", name="sole"),)), tmp_path / "out"
-    given = Reading(), Processing(), Wanted(), silent
-    result, _ = analyze_to(out, log, robot, *given, contacts=contacts)
+    result, _ = analyze_to(out, log, robot, Request(contacts=contacts), silent)
     opened(driver, (out / "report.html").as_uri())
     busiest = int(np.abs(result.torque).mean(axis=0).argmax())
     assert driver.find_element("id", "joint").get_attribute("value") == str(busiest)
@@ -398,7 +396,7 @@ def test_loads_are_causes_and_arrows(driver, tmp_path):
     write_package(generate(read_system("planar3"), ["numpy"]), tmp_path / "planar3")
     robot = carrying(load_robot(tmp_path / "planar3"), (Payload("link3", 0.5, (0.25, 0, 0)),))
     out = tmp_path / "out"
-    result, _ = analyze_to(out, log, robot, Reading(), Processing(), Wanted(), silent, loads)
+    result, _ = analyze_to(out, log, robot, Request(loads=loads), silent)
     opened(driver, (out / "report.html").as_uri())
     choose(driver, "slider", 40)
     assert driver.execute_script("return document.getElementById('order').value") == "everything"

@@ -8,9 +8,9 @@ import pyarrow
 import pytest
 from conftest import DATA
 from linkwise import Load, generate, read_system, write_package
-from linkwise.analysis import Processing, Reading, analyze
+from linkwise.analysis import analyze
 from linkwise.analysis.filtering import padding_length
-from linkwise.analysis.job import Wanted
+from linkwise.analysis.job import Request, Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.loads import Loads
 from linkwise.analysis.run import analyze_to
@@ -142,11 +142,8 @@ def test_tables_record_and_pictures_have_each_load(arm: Path, tmp_path: Path) ->
         tmp_path / "out",
         arm / "log.csv",
         load_robot(arm / "arm"),
-        Reading(),
-        Processing(),
-        wanted,
+        Request(wanted=wanted, loads=loads),
         silent,
-        loads,
     )
     header = (tmp_path / "out/analysis.csv").read_text().splitlines()[0].split(",")
     assert {f"{what}/{name}/tool" for what in ("tau_load", "power_load") for name in JOINTS} <= set(header)

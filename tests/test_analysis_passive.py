@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 from linkwise import generate, read_system, write_package
-from linkwise.analysis import Processing, Reading, analyze
-from linkwise.analysis.job import Wanted
+from linkwise.analysis import analyze
+from linkwise.analysis.job import Request, Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import page_data
@@ -61,9 +61,7 @@ def test_every_file_and_picture_has_them(analysed, tmp_path):
         tmp_path / "out",
         folder / "log.csv",
         load_robot(folder / "arm"),
-        Reading(),
-        Processing(),
-        wanted,
+        Request(wanted=wanted),
         silent,
     )
     header = (tmp_path / "out/analysis.csv").read_text().splitlines()[0].split(",")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from conftest import DATA
 from linkwise import Payload, generate, read_system, write_package
-from linkwise.analysis import Processing, Reading, analyze
-from linkwise.analysis.analysis_choices import carried
-from linkwise.analysis.job import Wanted
+from linkwise.analysis import Processing, analyze
+from linkwise.analysis.choices import carried
+from linkwise.analysis.job import Request, Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.payload import carrying
 from linkwise.analysis.run import analyze_to
@@ -91,7 +91,7 @@ def test_files_and_page_list_them(arm, tmp_path):
     loaded = carrying(loaded, carried(["tool=2.5,0.1,0.05,-0.2", "bag:c=1.2"], loaded))
     wanted = Wanted("csv", ("shares", "power", "paper"), page=True)
     log, out = arm / "log.csv", tmp_path / "out"
-    result, _ = analyze_to(out, log, loaded, Reading(), Processing(), wanted, silent)
+    result, _ = analyze_to(out, log, loaded, Request(wanted=wanted), silent)
     record = json.loads((out / "analysis.json").read_text())
     assert record["payloads"] == [
         {"name": "payload tool", "body": "tool", "mass": 2.5, "point": list(POINT)},

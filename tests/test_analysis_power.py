@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from linkwise.analysis import Processing, Reading, analyze
-from linkwise.analysis.job import Wanted
+from linkwise.analysis import Processing, analyze
+from linkwise.analysis.job import Request, Wanted
 from linkwise.analysis.loaded_robot import load_robot
 from linkwise.analysis.paper_motions import SIMULATED, write_motions
 from linkwise.analysis.run import analyze_to
@@ -98,7 +98,9 @@ def test_power_by_cause_and_order_is_written_where_asked_for(tmp_path, conventio
     log = write_csv(tmp_path / "a.csv", smooth(40, 3))
     wanted = Wanted(power_terms=True, page=False)
     processing = Processing(convention=convention)
-    analyze_to(tmp_path / "out", log, load_robot(PLANAR3), Reading(), processing, wanted, silent)
+    analyze_to(
+        tmp_path / "out", log, load_robot(PLANAR3), Request(processing=processing, wanted=wanted), silent
+    )
     table = pq.read_table(tmp_path / "out" / "analysis.parquet")
     read = {name: table[name].to_numpy() for name in table.column_names}
     terms = [name for name in read if name.startswith("power_")]

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from linkwise import Fitting, Options
 from linkwise.analysis import Lowpass, Processing, Reading
-from linkwise.analysis.analysis_choices import AnalysisChoices
+from linkwise.analysis.choices import AnalysisChoices
 from linkwise.analysis.job import Wanted
 from linkwise.analysis.phases import Phase
 from linkwise.cli.app import app
@@ -139,7 +139,7 @@ def test_keys_of_a_study_are_the_flags_of_analyze_by_name_and_default() -> None:
 def test_choices_are_carried_out_as_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
     wanted = chosen(Wanted, {"format": "csv", "figure": ["shares"], "page": False})
     assert wanted == Wanted("csv", ("shares",), False)
-    monkeypatch.setattr("linkwise.analysis.analysis_choices.chosen_contacts", lambda *given: given)
+    monkeypatch.setattr("linkwise.analysis.choices.chosen_contacts", lambda *given: given)
     contacts = ("foot=held",), ("foot=on",), [Path("grf.mot")], 42.0, 31.0, ("base_x",), "the robot"
     assert WRITTEN.contacts("the robot") == contacts  # type: ignore[arg-type, comparison-overlap]
     both = AnalysisChoices(loads=("plate.csv",), contact_loads=("grf.mot",), loads_cutoff=31.0)
@@ -166,9 +166,9 @@ def test_analyze_writes_what_is_asked_for(
     called: Any, monkeypatch: pytest.MonkeyPatch, chosen: dict[str, Any], wanted: Wanted
 ) -> None:
     monkeypatch.setattr("linkwise.cli.analyze.opened_robot", lambda *given: "the robot")
-    out, log, robot, *how = called("analyze", "analyze_to", chosen)
+    out, log, robot, asked, _ = called("analyze", "analyze_to", chosen)
     assert (out, log, robot) == (Path("out"), Path("walk.csv"), "the robot")
-    assert how[:3] == [Reading(), Processing(), wanted]
+    assert (asked.reading, asked.processing, asked.wanted) == (Reading(), Processing(), wanted)
 
 
 def test_every_flag_of_a_robot_is_the_option_of_its_name(called: Any) -> None:

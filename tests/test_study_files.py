@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from linkwise.analysis.analysis_choices import AnalysisChoices
+from linkwise.analysis.choices import AnalysisChoices
 from linkwise.study.inputs import trial_key
 from linkwise.study.plan import StudyPlan, Trial
 

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from linkwise_runtime.chosen_names import STATES, end_of_path, known_as, nearest_first
@@ -64,34 +64,47 @@ def select(
     time = time_column(columns, reading)
     source = _mapped(columns, joints, reading)
     at_column = {column: at for at, column in enumerate(columns)}
-    missing = [joint for joint, column in source.items() if column not in at_column]
     used = {*source.values(), columns[time]}
-    free = [column for column in columns if column not in used and column not in beside]
-    speeds = {f"{column.removesuffix(STATE)}{SPEED}" for column in used if column.endswith(STATE)}
-    speeds |= {f"{column}{OLD_SPEED}" for column in used}
-    if missing:
-        positions = [column for column in free if not column.endswith(SPEED)]
-        raise LinkwiseError(
-            f"no column for joint {with_nearest(missing, positions)}; name it with --map COLUMN={missing[0]}"
-        )
-    unasked = {*speeds, *brought, *(column for column in free if end_of_path(column) in coupled)}
-    extra = [column for column in free if column not in unasked]
-    if extra and not reading.ignore_extra:
-        for column in extra:
-            if (own := source.get(end_of_path(column))) is not None:
-                raise LinkwiseError(
-                    f"columns {own!r} and {column!r} are both of joint {end_of_path(column)!r}; leave what is"
-                    " of none out with --ignore-extra"
-                )
-        raise LinkwiseError(
-            f"no joint for column {listed(map(repr, extra))}; leave such columns out with --ignore-extra,"
-            " or map them with --map COLUMN=JOINT"
-        )
+    free = tuple(column for column in columns if column not in used and column not in beside)
+    _refuse_missing([joint for joint, column in source.items() if column not in at_column], free)
+    if not reading.ignore_extra:
+        allowed = {*_speeds_of(used), *brought}
+        _refuse_extra([one for one in free if one not in allowed and end_of_path(one) not in coupled], source)
     found = tuple(at_column[column] for column in source.values())
     for joint, at in zip(source, found, strict=True):
         if found.count(at) > 1 or at == time:
             raise LinkwiseError(f"column {columns[at]!r} is asked to be joint {joint!r} and more")
-    return Selection(time, found, tuple(free))
+    return Selection(time, found, free)
+
+
+def _speeds_of(positions: Iterable[str]) -> Iterator[str]:
+    """Yield the names that OpenSim has for the speeds of states."""
+    for column in positions:
+        yield f"{column}{OLD_SPEED}"
+        if column.endswith(STATE):
+            yield f"{column.removesuffix(STATE)}{SPEED}"
+
+
+def _refuse_missing(joints: Sequence[str], free: Sequence[str]) -> None:
+    """Raise LinkwiseError for joints without a column, with the nearest of the columns without a joint."""
+    if joints:
+        near = with_nearest(joints, [column for column in free if not column.endswith(SPEED)])
+        raise LinkwiseError(f"no column for joint {near}; name it with --map COLUMN={joints[0]}")
+
+
+def _refuse_extra(columns: Sequence[str], source: Mapping[str, str]) -> None:
+    """Raise LinkwiseError for columns of no joint; source: the column of each joint."""
+    for column in columns:
+        if (own := source.get(end_of_path(column))) is not None:
+            raise LinkwiseError(
+                f"columns {own!r} and {column!r} are both of joint {end_of_path(column)!r}; leave what is"
+                " of none out with --ignore-extra"
+            )
+    if columns:
+        raise LinkwiseError(
+            f"no joint for column {listed(map(repr, columns))}; leave such columns out with --ignore-extra,"
+            " or map them with --map COLUMN=JOINT"
+        )
 
 
 def with_columns(

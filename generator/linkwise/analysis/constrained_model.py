@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 
-from linkwise.analysis.term_rows import Rows, TermArrays
+from linkwise.analysis.term_rows import Rows, TermArrays, mirrored
 from linkwise.package.entries import RigidTree
 from linkwise.package.load import Array
 
@@ -193,16 +193,11 @@ def _layout(own: Any, following: Following) -> TermArrays:
             for mover, *more in product(movers[i], *(movers[e] for e in k))
         }
 
-    inertia = _mirrored(own.acceleration)
+    inertia = _rows({row[:3] for row in mirrored(own)}, 3)
     changing = inertia[[k not in independent for k in inertia[:, 2]]]
     acceleration = _rows({row for row in moved(inertia) if row[0] <= row[2]}, 3)
     velocity = _rows(moved(own.velocity) | moved(changing), 3)
     return TermArrays(acceleration, velocity, _rows(moved(own.gravity), 2), _rows(moved(own.torque), 2))
-
-
-def _mirrored(rows: Rows) -> Rows:
-    """Return the rows of c2, of which only i <= k are stored, both ways."""
-    return np.unique(np.concatenate([rows, rows[:, ::-1]]), axis=0)
 
 
 def _rows(found: set[tuple[int, ...]], width: int) -> Rows:

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.body_names import body_frame
-from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loaded_robot import LoadedRobot, body_frame
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 

@@ -1,7 +1,7 @@
 """One analysis of a log, which is read, filtered and checked for its length before it is carried out."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads import Loads
 from linkwise.analysis.loads.read_loads import placed_loads
 from linkwise.analysis.logs import Log, open_log
-from linkwise.analysis.named_result import named_result, result_table
+from linkwise.analysis.outputs import Format, named_result, record, result_table
 from linkwise.analysis.phases import Phase, PlacedPhase, phase_columns, placed_phases
 from linkwise.analysis.result import AnalysisResult, WholeMovement
 from linkwise.analysis.result_rows import Column
@@ -23,7 +23,6 @@ from linkwise.analysis.samples import Samples, pole_warnings, read_samples
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import draw
 from linkwise.analysis.stream import Sink, span_of, stream
-from linkwise.analysis.tables import Format, record
 from linkwise.analysis.torques import Decomposer
 from linkwise.errors import within
 from linkwise.extras import extra
@@ -105,12 +104,22 @@ class Wanted:
 
 
 @dataclass(frozen=True)
+class Request:
+    """What is asked of a log: how it is read and derived, what the robot bears in it, and what is written."""
+
+    reading: Reading = field(default_factory=Reading)
+    processing: Processing = field(default_factory=Processing)
+    wanted: Wanted = field(default_factory=Wanted)
+    loads: Loads = field(default_factory=Loads)
+    contacts: Contacts = field(default_factory=Contacts)
+
+
+@dataclass(frozen=True)
 class Job:
     """A log that was read, filtered and found long enough; `run` does the rest."""
 
     source: str
-    reading: Reading
-    processing: Processing
+    asked: Request
     samples: Samples
     decomposer: Decomposer
     closed: ClosedLog | None = None
@@ -120,7 +129,7 @@ class Job:
     def run(self, sink: Sink, progress: Progress) -> WholeMovement:
         """Analyse every sample, handing the blocks to `sink`."""
         with within(self.source):
-            return stream(self.samples, self.decomposer, self.processing, sink, progress)
+            return stream(self.samples, self.decomposer, self.asked.processing, sink, progress)
 
     def note(self) -> dict[str, Any]:
         """Return the description that a table carries: log, robot and all choices."""
@@ -128,7 +137,7 @@ class Job:
         return {
             "log": self.source,
             "robot": robot.name,
-            **choices(self.reading, self.processing),
+            **choices(self.asked.reading, self.asked.processing),
             "payloads": [payload.record() for payload in robot.payloads],
             "loads": [borne.record() for borne in self.decomposer.loads],
             "contacts": [] if robot.contacts is None else list(robot.contacts.names),
@@ -143,7 +152,7 @@ class Job:
     @property
     def count(self) -> int:
         """Number of samples that will be analysed."""
-        start, stop = span_of(self.samples, self.processing)
+        start, stop = span_of(self.samples, self.asked.processing)
         return stop - start
 
     def analysis(self, done: WholeMovement, values: Array) -> Analysis:
@@ -155,8 +164,8 @@ class Job:
         return Analysis(
             **vars(done),
             robot=self.decomposer.robot,
-            reading=self.reading,
-            processing=self.processing,
+            reading=self.asked.reading,
+            processing=self.asked.processing,
             source=self.source,
             rate=self.samples.rate,
             rows=self.decomposer.rows,
@@ -202,32 +211,29 @@ class Job:
 def prepared(
     log: Path,
     robot: LoadedRobot,
-    reading: Reading,
-    processing: Processing,
-    loads: Loads,
-    contacts: Contacts,
+    asked: Request,
     progress: Progress,
-    wanted: Wanted,
     buffer: Path | None = None,
 ) -> Job:
-    """Read and filter a log, and return the job that analyses it.
+    """Read and filter the log of a robot that stands on its contacts; return the job that analyses it.
 
     buffer: a directory that keeps the samples in a disk buffer, not in memory
     """
+    reading, processing, wanted = asked.reading, asked.processing, asked.wanted
     points = induced_points(wanted.induced, robot)
     opened = open_log(log, reading, robot.joints, robot.file_joints, robot.qpos)
-    switches = (*switch_columns(contacts, opened), *phase_columns(wanted.phases, opened))
+    switches = (*switch_columns(asked.contacts, opened), *phase_columns(wanted.phases, opened))
     samples, closed = _samples(opened, robot, reading, switches, progress, buffer)
     with within(str(log)):
         span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
-    borne = placed_loads(loads, robot, samples.time, reading.ignore_extra, progress, buffer)
-    times = contact_times(contacts, opened, robot, reading, samples.time, progress, buffer)
+    borne = placed_loads(asked.loads, robot, samples.time, reading.ignore_extra, progress, buffer)
+    times = contact_times(asked.contacts, opened, robot, reading, samples.time, progress, buffer)
     decomposer = Decomposer.of(robot, processing.convention, wanted.power_terms, borne, points, times)
     every = (*borne, *(() if times is None else times.loads))
     phases = placed_phases(wanted.phases, opened, robot, every, reading, progress)
-    return Job(log.name, reading, processing, samples, decomposer, closed, phases)
+    return Job(log.name, asked, samples, decomposer, closed, phases)
 
 
 def _samples(
@@ -244,16 +250,13 @@ def _samples(
 
     switches: columns of the log that say when contacts are on
     """
-    if robot.constrained is None:
-        joints = robot.joints, robot.units_in_logs
-        return read_samples(
-            log, *joints, reading, progress, buffer, switches, robot.reach, robot.followers
-        ), None
-    followers = set(robot.constrained.constraints.dependent)
+    tied = () if robot.constrained is None else robot.constrained.constraints.dependent
     with within(str(log.path)):
-        there = with_columns(log.columns, robot.joints, followers, reading)
+        there = with_columns(log.columns, robot.joints, tied, reading)
     names, units = (tuple(given[k] for k in there) for given in (robot.joints, robot.units_in_logs))
     reach = [robot.reach[k] for k in there]
     samples = read_samples(log, names, units, reading, progress, buffer, switches, reach, robot.followers)
+    if robot.constrained is None:
+        return samples, None
     with within(str(log.path)):
         return closed_samples(samples, there, robot.constrained, reading.loop_tolerance, progress, buffer)

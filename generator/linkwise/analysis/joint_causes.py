@@ -7,14 +7,14 @@ from typing import Any, Literal
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_quantities import PASSIVE
+from linkwise.analysis.result_quantities import MOTION, PASSIVE
 from linkwise.analysis.result_rows import Indices
 from linkwise.package.load import Array
 
 MOTIONS: dict[str, tuple[str, ...]] = {
-    "acceleration": ("tau_qdd",),
-    "velocity": ("tau_qd",),
-    "motion": ("tau_qdd", "tau_qd"),
+    "acceleration": MOTION[:1],
+    "velocity": MOTION[1:],
+    "motion": MOTION,
 }
 FEW = 7
 """Most joints for which a joint's acceleration and velocity are two causes, unless chosen otherwise."""

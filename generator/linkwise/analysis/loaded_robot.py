@@ -1,26 +1,37 @@
-"""A generated robot package as the analysis uses it: names, a back end that works here, bodies, an oracle."""
+"""A generated robot package as the analysis uses it: names, a back end that works here, bodies, an oracle.
+
+Loads, payloads and contacts find the bodies of the robot's file here, by name.
+"""
 
 import hashlib
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
+from linkwise_runtime.chosen_names import known_as, nearest_first
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.file_joints import FileJoint, Order
 from linkwise_runtime.qpos_motion import Qpos
+from linkwise_runtime.rule.joint_tree import TreeFrame
 
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.contacts.ground_contacts import GroundContacts
-from linkwise.analysis.follower_columns import FollowingJoint
+from linkwise.analysis.samples import FollowingJoint
 from linkwise.analysis.settings import Payload
 from linkwise.errors import LinkwiseError
-from linkwise.escape import without_ending
+from linkwise.escape import listed, without_ending
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import Package, open_package
 from linkwise.package.manifest import FILE, BodyEntry, PassiveEntry
 from linkwise.package.potential_word import potential_word
+
+
+def load_unit(unit: str) -> str:
+    """Return the unit of torque or force where motion is in `unit`, "rad" or "m"; both for another."""
+    return {"rad": "N·m", "m": "N"}.get(unit, "N·m or N")
 
 
 @dataclass(frozen=True)
@@ -90,6 +101,11 @@ class LoadedRobot:
             "always rad" if name in always else unit
             for name, unit in zip(self.joints, self.units, strict=True)
         )
+
+    @property
+    def torque_units(self) -> tuple[str, ...]:
+        """Unit of each joint's torque, N·m or N."""
+        return tuple(map(load_unit, self.units))
 
     @property
     def reach(self) -> tuple[float, ...]:
@@ -210,3 +226,40 @@ def _load(package: Package, backends: Sequence[str]) -> tuple[str, Dynamics]:
         f"{package.directory}: no back end for the analysis ({'; '.join(reasons) or 'the package has none'});"
         " generate the robot again, with a back end that can be loaded here"
     )
+
+
+def body_frame(what: str, body: str, robot: LoadedRobot) -> TreeFrame:
+    """Return the frame of a body of the robot's file.
+
+    what: how the message begins
+
+    Raises LinkwiseError, which lists the nearest names first, where there is no such body.
+    """
+    tree = robot.package.manifest.tree
+    frames = {} if tree is None else {frame.name: frame for frame in tree.frames}
+    name = known_as(body, frames)
+    if name is None:
+        near = listed(nearest_first(body, frames))
+        raise LinkwiseError(f"{what} {body!r}: {robot.name} has no such body; its bodies are {near}")
+    return frames[name]
+
+
+def named_body(text: str, robot: LoadedRobot) -> tuple[str, str]:
+    """Return the name and the body of NAME:BODY; the name is empty for BODY alone.
+
+    A body whose own name contains a colon is found too.
+    """
+    tree = robot.package.manifest.tree
+    name, colon, body = text.partition(":")
+    if not colon or (tree is not None and any(frame.name == text for frame in tree.frames)):
+        return "", text
+    return name, body
+
+
+def told_apart(
+    what: str, names: Sequence[str], others: Sequence[str], mend: str = "tell them apart as NAME:BODY"
+) -> None:
+    """Raise LinkwiseError for a name that is given twice, or that another object has already."""
+    twice = [name for name, count in Counter(names).items() if count > 1 or name in others]
+    if twice:
+        raise LinkwiseError(f"{what} {listed(map(repr, twice))}: another has that name; {mend}")

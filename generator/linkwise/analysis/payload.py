@@ -8,9 +8,8 @@ import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.rule.joint_tree import TreeFrame
 
-from linkwise.analysis.body_names import body_frame, told_apart
 from linkwise.analysis.constrained_model import ConstrainedModel
-from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loaded_robot import LoadedRobot, body_frame, told_apart
 from linkwise.analysis.settings import Payload
 from linkwise.analysis.term_rows import NAMES, TermArrays
 from linkwise.errors import LinkwiseError

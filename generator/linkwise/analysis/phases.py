@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwise.analysis.contacts import THRESHOLD, WhileColumn
 from linkwise.analysis.contacts.contact_times import Switch, read_switch
-from linkwise.analysis.contacts.given_contacts import THRESHOLD, WhileColumn
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad, model_pose
 from linkwise.analysis.logs import Log

@@ -16,13 +16,26 @@ from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result_rows import Column, ResultRows
 from linkwise.analysis.settings import Processing, Reading
 from linkwise.analysis.verify import Closure
-from linkwise.analysis.work import Work
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, printable
 from linkwise.package.load import Array
 
 PART_BYTES, LEAST = 4 << 20, 256
 """Approximate size in bytes of a part of a result, and its fewest samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """Energy in J that joints gave, ∫ max(P, 0) dt, and took back, ∫ max(-P, 0) dt: arrays of one shape."""
+
+    given: Array
+    taken: Array
+
+    @property
+    def net(self) -> Array:
+        """∫ P dt in J: what was given less what was taken back."""
+        net: Array = self.given - self.taken
+        return net
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from linkwise_runtime import call_table
 from linkwise_runtime.call_table import CALLS, PASSIVE_KINDS, PROPAGATION, TORQUE, Quantity
 
-TERMS = ("tau_qdd", "tau_qd", "tau_gravity")
+MOTION = ("tau_qdd", "tau_qd")
+"""The parts of a partial torque by the motion of each joint."""
+TERMS = (*MOTION, "tau_gravity")
 """The parts that sum to a partial torque."""
 PASSIVE = {
     "tau_spring": "stiffness",
@@ -31,84 +33,93 @@ GROUND = ("contact", "slip", "force_measured", "tau_as_loads", "power_contact")
 LOSSES = ("acc_spring", "acc_damping", "acc_friction")
 """Shares of passive torques in an acceleration, in the order of `passive_torque`."""
 
-MEANING = {
-    "time": "time",
-    "q": "joint coordinate",
-    "qd": "joint velocity",
-    "qdd": "joint acceleration",
-    "tau": "joint torque: all links together, what the joint has of its own, and all loads",
-    "tau_link": "partial torque: on the joint, through the link",
-    "tau_qdd": "propagation torque: on the joint, through the link, by the cause's acceleration",
-    "tau_qd": "propagation torque: on the joint, through the link, by the cause's velocity",
-    "tau_gravity": "on the joint, through the link, by gravity and other potentials",
-    "tau_spring": "what the joint takes for its own spring",
-    "tau_damping": "what the joint takes for its own damping",
-    "tau_friction": "what the joint takes for its own Coulomb friction",
-    "tau_armature": "what the joint takes for its own armature, the inertia behind its gear",
-    "tau_load": "what the joint takes to bear the load",
-    "tau_as_loads": "joint torque with what was measured in place of what contacts bear",
-    "force": "what the constraint bears: all links together, what joints have of their own, and loads",
-    "force_link": "what the constraint bears of the link",
-    "force_load": "what the constraint bears of the load",
-    "force_spring": "what the constraint bears of joints' own springs",
-    "force_damping": "what the constraint bears of joints' own damping",
-    "force_friction": "what the constraint bears of joints' own Coulomb friction",
-    "force_armature": "what the constraint bears of joints' own armatures",
-    "force_measured": "what was measured of the contact",
-    "contact": "share of the contact in what several could bear; 0 while it is off",
-    "slip": "velocity of what the contact holds, while it is on",
-    "power": "power of the joint: what it sends into all links together, what it has of its own, and loads",
-    "power_link": "power that the joint sends into the link",
-    "power_load": "power that the joint sends out against the load",
-    "power_contact": "power that the contact feeds into the link as what it holds slips",
-    "power_qdd": "power that the joint sends into the link, by the cause's acceleration",
-    "power_qd": "power that the joint sends into the link, by the cause's velocity",
-    "power_gravity": "power that the joint sends into the link, by gravity and other potentials",
-    "power_spring": "power that the joint sends into its own spring",
-    "power_damping": "power that the joint's own damping takes",
-    "power_friction": "power that the joint's own Coulomb friction takes",
-    "power_armature": "power that the joint sends into its own armature",
-    "acc": "acceleration of the point, or joint: all sources together",
-    "acc_tau": "acceleration by what the cause's joint gives alone",
-    "acc_qd": "acceleration by velocity forces on the link, by the cause's velocity",
-    "acc_gravity": "acceleration by the link's weight and other potentials alone",
-    "acc_spring": "acceleration by the spring of the cause's joint alone",
-    "acc_damping": "acceleration by the damping of the cause's joint alone",
-    "acc_friction": "acceleration by the Coulomb friction of the cause's joint alone",
-    "acc_armature": "none, as an armature is inertia; it is an entry of the array with the other three",
-    "acc_load": "acceleration by the load alone",
-    "acc_constraint": "acceleration by constraints that turn with the cause's velocity",
-    "acc_contact": "acceleration by what the contact itself does, as what it holds turns and slips",
-    "acc_kinematic": "acceleration of the point by the cause's velocity, without any of a joint",
+TABLE = {
+    "time": ("time", "time"),
+    "q": ("q joint", "joint coordinate"),
+    "qd": ("qd joint", "joint velocity"),
+    "qdd": ("qdd joint", "joint acceleration"),
+    "tau": ("torque joint", "joint torque: all links together, what the joint has of its own, and all loads"),
+    "tau_link": ("", "partial torque: on the joint, through the link"),
+    "tau_qdd": ("", "propagation torque: on the joint, through the link, by the cause's acceleration"),
+    "tau_qd": ("", "propagation torque: on the joint, through the link, by the cause's velocity"),
+    "tau_gravity": ("", "on the joint, through the link, by gravity and other potentials"),
+    "tau_spring": ("", "what the joint takes for its own spring"),
+    "tau_damping": ("", "what the joint takes for its own damping"),
+    "tau_friction": ("", "what the joint takes for its own Coulomb friction"),
+    "tau_armature": ("", "what the joint takes for its own armature, the inertia behind its gear"),
+    "tau_load": ("load_torque joint load", "what the joint takes to bear the load"),
+    "tau_as_loads": (
+        "torque_as_loads joint",
+        "joint torque with what was measured in place of what contacts bear",
+    ),
+    "force": (
+        "constraint_force constraint",
+        "what the constraint bears: all links together, what joints have of their own, and loads",
+    ),
+    "force_link": ("constraint_force_by_link link constraint", "what the constraint bears of the link"),
+    "force_load": ("constraint_force_by_load constraint load", "what the constraint bears of the load"),
+    "force_spring": ("", "what the constraint bears of joints' own springs"),
+    "force_damping": ("", "what the constraint bears of joints' own damping"),
+    "force_friction": ("", "what the constraint bears of joints' own Coulomb friction"),
+    "force_armature": ("", "what the constraint bears of joints' own armatures"),
+    "force_measured": ("measured_force constraint", "what was measured of the contact"),
+    "contact": (
+        "contact_share contact",
+        "share of the contact in what several could bear; 0 while it is off",
+    ),
+    "slip": ("slip constraint", "velocity of what the contact holds, while it is on"),
+    "power": (
+        "joint_power joint",
+        "power of the joint: what it sends into all links together, what it has of its own, and loads",
+    ),
+    "power_link": ("power joint link", "power that the joint sends into the link"),
+    "power_load": ("load_power joint load", "power that the joint sends out against the load"),
+    "power_contact": (
+        "contact_power link contact",
+        "power that the contact feeds into the link as what it holds slips",
+    ),
+    "power_qdd": ("", "power that the joint sends into the link, by the cause's acceleration"),
+    "power_qd": ("", "power that the joint sends into the link, by the cause's velocity"),
+    "power_gravity": ("", "power that the joint sends into the link, by gravity and other potentials"),
+    "power_spring": ("", "power that the joint sends into its own spring"),
+    "power_damping": ("", "power that the joint's own damping takes"),
+    "power_friction": ("", "power that the joint's own Coulomb friction takes"),
+    "power_armature": ("", "power that the joint sends into its own armature"),
+    "acc": ("induced point component", "acceleration of the point, or joint: all sources together"),
+    "acc_tau": (
+        "induced_actuators point component cause",
+        "acceleration by what the cause's joint gives alone",
+    ),
+    "acc_qd": (
+        "induced_velocity point component link cause",
+        "acceleration by velocity forces on the link, by the cause's velocity",
+    ),
+    "acc_gravity": (
+        "induced_gravity point component link",
+        "acceleration by the link's weight and other potentials alone",
+    ),
+    "acc_spring": ("", "acceleration by the spring of the cause's joint alone"),
+    "acc_damping": ("", "acceleration by the damping of the cause's joint alone"),
+    "acc_friction": ("", "acceleration by the Coulomb friction of the cause's joint alone"),
+    "acc_armature": ("", "none, as an armature is inertia; it is an entry of the array with the other three"),
+    "acc_load": ("induced_loads point component load", "acceleration by the load alone"),
+    "acc_constraint": (
+        "induced_constraints point component cause",
+        "acceleration by constraints that turn with the cause's velocity",
+    ),
+    "acc_contact": (
+        "induced_contacts point component contact",
+        "acceleration by what the contact itself does, as what it holds turns and slips",
+    ),
+    "acc_kinematic": (
+        "induced_kinematic point component cause",
+        "acceleration of the point by the cause's velocity, without any of a joint",
+    ),
 }
-ARRAYS = {
-    "time": "time",
-    "q": "q joint",
-    "qd": "qd joint",
-    "qdd": "qdd joint",
-    "tau": "torque joint",
-    "tau_load": "load_torque joint load",
-    "tau_as_loads": "torque_as_loads joint",
-    "force": "constraint_force constraint",
-    "force_link": "constraint_force_by_link link constraint",
-    "force_load": "constraint_force_by_load constraint load",
-    "force_measured": "measured_force constraint",
-    "contact": "contact_share contact",
-    "slip": "slip constraint",
-    "power": "joint_power joint",
-    "power_link": "power joint link",
-    "power_load": "load_power joint load",
-    "power_contact": "contact_power link contact",
-    "acc": "induced point component",
-    "acc_tau": "induced_actuators point component cause",
-    "acc_qd": "induced_velocity point component link cause",
-    "acc_gravity": "induced_gravity point component link",
-    "acc_load": "induced_loads point component load",
-    "acc_constraint": "induced_constraints point component cause",
-    "acc_contact": "induced_contacts point component contact",
-    "acc_kinematic": "induced_kinematic point component cause",
-}
-"""Name and axes of the array that a quantity is, among the arrays of a Dataset."""
+"""Quantities, in the order of a Dataset: the array there with its axes, and the meaning.
+
+An array without a name is called as in packages, or stands beside others of BY_SOURCE.
+"""
 BY_SOURCE = {
     "force": (
         "constraint_force_by_source constraint",
@@ -163,24 +174,32 @@ def _array(name: str) -> Quantity:
         return OF_PACKAGES[name]
     first, _, source = name.partition("_")
     beside = ("source", source) if source in PASSIVE_KINDS else None
-    text, meaning = (ARRAYS[name], MEANING[name]) if beside is None else BY_SOURCE[first]
+    text, meaning = TABLE[name] if beside is None else BY_SOURCE[first]
     array, *axes = text.split()
     return Quantity(array, tuple(axes), UNITS[first], meaning, beside)
 
 
 QUANTITIES: Mapping[str, ResultQuantity] = {
-    name: ResultQuantity(name, meaning, _array(name)) for name, meaning in MEANING.items()
+    name: ResultQuantity(name, meaning, _array(name)) for name, (_, meaning) in TABLE.items()
 }
 """All quantities by name, in the order of a Dataset."""
 INDUCED = tuple(name for name in QUANTITIES if name.partition("_")[0] == "acc")
 """An acceleration, and its shares by source."""
-WORKS: Mapping[str, Quantity] = {
-    name: Quantity(name, axes, "J", meaning)
-    for name, axes, meaning in (
-        ("work", ("joint", "link"), "what the joint gave to the link, and took back"),
-        ("joint_work", ("joint",), "what the joint gave to all links together, and took back"),
-        ("load_work", ("joint", "load"), "what the joint gave against the load, and took back"),
-        ("contact_work", ("link", "contact"), "what the contact fed into the link, and took back"),
-    )
+POWER_OF = {
+    "work": "power_link",
+    "joint_work": "power",
+    "load_work": "power_load",
+    "contact_work": "power_contact",
 }
-"""Work over the whole movement, by the result's own names."""
+"""The power that a work over the whole movement is the integral of, by the result's own names."""
+_GIVEN = (
+    "what the joint gave to the link, and took back",
+    "what the joint gave to all links together, and took back",
+    "what the joint gave against the load, and took back",
+    "what the contact fed into the link, and took back",
+)
+WORKS: Mapping[str, Quantity] = {
+    name: Quantity(name, QUANTITIES[power].axes, "J", meaning)
+    for (name, power), meaning in zip(POWER_OF.items(), _GIVEN, strict=True)
+}
+"""Work over the whole movement."""

@@ -14,7 +14,7 @@ from linkwise_runtime.robot_axes import NamedAxis, axes_of
 from numpy.typing import NDArray
 
 from linkwise.analysis.induced_points import InducedPoint
-from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loaded_robot import LoadedRobot, load_unit
 from linkwise.analysis.loads.placed_load import PlacedLoad
 from linkwise.analysis.result_quantities import (
     FORCE_OF,
@@ -70,11 +70,6 @@ class Column:
     point: int | None = None
     row: int | None = None
     load: int | None = None
-
-
-def load_unit(unit: str) -> str:
-    """Return the unit of torque or force where motion is in `unit`, "rad" or "m"; both for another."""
-    return {"rad": "N·m", "m": "N"}.get(unit, "N·m or N")
 
 
 @dataclass(frozen=True, eq=False)

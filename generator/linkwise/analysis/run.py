@@ -10,15 +10,15 @@ from linkwise_runtime.quantities import Contact
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.standing_robot import standing_on
 from linkwise.analysis.disk_rows import EverySample
-from linkwise.analysis.job import Analysis, Wanted, prepared
+from linkwise.analysis.job import Analysis, Request, Wanted, prepared
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
 from linkwise.analysis.loads import Load, Loads
+from linkwise.analysis.outputs import open_table
 from linkwise.analysis.payload import carrying
 from linkwise.analysis.phases import Phase
 from linkwise.analysis.settings import Payload, Processing, Reading
 from linkwise.analysis.show import check_figure, figure_png
 from linkwise.analysis.show.page import report
-from linkwise.analysis.tables import open_table
 from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names, json_text
 from linkwise.input_file import is_inside
@@ -27,8 +27,6 @@ from linkwise.package.load import Array
 from linkwise.package.write import refuse_inside_package
 from linkwise.progress import Progress, silent
 
-NO_LOADS = Loads()
-NO_CONTACTS = Contacts()
 RECORD = "analysis.json"
 """File of the record, by which a directory is known to hold a former result."""
 
@@ -61,25 +59,15 @@ def analyze(
     held = Contacts.of(contacts)
     loaded = carrying(robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot)), payloads)
     loaded, borne = standing_on(loaded, held), Loads.of(loads, loads_cutoff)
-    wanted, made = (
-        Wanted(induced=tuple(induced), phases=tuple(map(Phase.of, phases))),
-        (reading or Reading(), processing or Processing()),
-    )
-    job = prepared(Path(log), loaded, *made, borne, held, progress, wanted)
+    wanted = Wanted(induced=tuple(induced), phases=tuple(map(Phase.of, phases)))
+    asked = Request(reading or Reading(), processing or Processing(), wanted, borne, held)
+    job = prepared(Path(log), loaded, asked, progress)
     with EverySample(len(job.columns), job.count) as kept:
         return job.analysis(job.run(kept, progress), kept.values)
 
 
 def analyze_to(
-    out: Path,
-    log: Path,
-    robot: LoadedRobot,
-    reading: Reading,
-    processing: Processing,
-    wanted: Wanted,
-    progress: Progress,
-    loads: Loads = NO_LOADS,
-    contacts: Contacts = NO_CONTACTS,
+    out: Path, log: Path, robot: LoadedRobot, asked: Request, progress: Progress
 ) -> tuple[Analysis, Sequence[Path]]:
     """Analyse a log of any length with flat memory; `out` appears when everything is done.
 
@@ -87,15 +75,15 @@ def analyze_to(
     name where figures or a page are wanted; otherwise it has none. Raises LinkwiseError, as `analyze` does,
     and where `out` holds something else than a former result or cannot be written.
     """
-    robot = standing_on(robot, contacts)
+    robot, wanted = standing_on(robot, asked.contacts), asked.wanted
     for name in wanted.figures:
         check_figure(name, robot, wanted.induced)
     refuse_inside_package(out)
-    for file in (log, *loads.paths, *contacts.measured.paths):
+    for file in (log, *asked.loads.paths, *asked.contacts.measured.paths):
         if is_inside(file, out):
             raise LinkwiseError(f"--out {out} is to be replaced and holds the log {file}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:
-        job = prepared(log, robot, reading, processing, loads, contacts, progress, wanted, draft)
+        job = prepared(log, robot, asked, progress, draft)
         note = json_text(job.note())
         keep = (job.count, draft) if wanted.page or wanted.figures else (0, None)
         with (

@@ -1,21 +1,34 @@
-"""A log brought to evenly spaced joint coordinates in SI units, checked row by row."""
+"""A log brought to evenly spaced joint coordinates in SI units, checked row by row.
+
+Columns of joints that follow others by the robot's file, or are held, are left out, but checked.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
+from linkwise_runtime.chosen_names import end_of_path
+from linkwise_runtime.rule.joint_tree import TreeCurve
+from numpy.polynomial import polynomial
 
-from linkwise.analysis.column_matching import Peak, far_warnings, radians_per_unit, select, unit_warnings
+from linkwise.analysis.column_matching import (
+    SPEED,
+    Peak,
+    far_warnings,
+    radians_per_unit,
+    select,
+    unit_warnings,
+)
 from linkwise.analysis.disk_rows import collected, first_column
 from linkwise.analysis.even_time import TOLERANCE, even_rate, resampled
-from linkwise.analysis.follower_columns import FollowerColumns, FollowingJoint
 from linkwise.analysis.logs import Log
 from linkwise.analysis.logs.log_checks import require_finite
 from linkwise.analysis.settings import Reading
 from linkwise.errors import within
 from linkwise.package.load import Array
-from linkwise.package.manifest import BodyEntry
+from linkwise.package.manifest import BodyEntry, Manifest
 from linkwise.progress import Progress
 
 SLOW = 5.0
@@ -35,6 +48,94 @@ class Samples:
     warnings: tuple[str, ...]
     first_row: int | None = None
     """Number of the first sample's row in the log; None where they were resampled."""
+
+
+CLOSE = {"rad": 0.01, "m": 0.001}
+"""Largest difference between a column and the motion of its joint: logs are rounded, joints have play."""
+
+
+@dataclass(frozen=True)
+class FollowingJoint:
+    """A joint of the file that is no joint of the robot, but follows one by a curve.
+
+    A joint without a leader is held.
+    """
+
+    name: str
+    unit: Literal["rad", "m"]
+    is_always_in_radians: bool
+    leader: str | None
+    curve: TreeCurve
+
+    @classmethod
+    def of(cls, manifest: Manifest) -> tuple["FollowingJoint", ...]:
+        """Return all joints that a package knows to follow or to be held."""
+        return tuple(
+            cls(
+                one.name,
+                one.unit,
+                one.name in manifest.in_radians,
+                None if one.joint is None else manifest.joints[one.joint].name,
+                one.curve,
+            )
+            for one in manifest.followers
+        )
+
+    def at(self, leader: Array) -> Array:
+        """Return the joint's position (S,), in its unit, at positions (S,) of its leader."""
+        starts = np.array(self.curve.starts)
+        piece = np.searchsorted(starts[1:], leader, side="right")
+        found = np.zeros_like(leader)
+        for number, powers in enumerate(self.curve.pieces):
+            inside = piece == number
+            found[inside] = polynomial.polyval(leader[inside] - starts[number], powers)
+        return found
+
+
+class FollowerColumns:
+    """Columns of following and held joints among a log's free ones, and their distance from these joints.
+
+    columns: all names of the log's columns; free: those that no joint has
+    joints: those that are read, in their order; radians: factor that brings the log's angles to radians
+    """
+
+    def __init__(
+        self,
+        columns: Sequence[str],
+        free: Sequence[str],
+        followers: Sequence[FollowingJoint],
+        joints: Sequence[str],
+        radians: float,
+    ) -> None:
+        by_name = {one.name: one for one in followers if one.leader is None or one.leader in joints}
+        positions = [name for name in free if not name.endswith(SPEED)]
+        self._names = [name for name in positions if end_of_path(name) in by_name]
+        self._followers = [by_name[end_of_path(name)] for name in self._names]
+        self._leaders = [0 if one.leader is None else joints.index(one.leader) for one in self._followers]
+        turned = [one.unit == "rad" and not one.is_always_in_radians for one in self._followers]
+        self._factors = np.where(turned, radians, 1.0)
+        self._largest = [0.0] * len(self._names)
+        self.numbers = tuple(columns.index(name) for name in self._names)
+
+    def look(self, q: Array, own: Array) -> None:
+        """Note the distances in a block; NaN counts as no value.
+
+        q: positions of the joints (S, joints) in rad or m; own: the columns (S, columns) as in the log
+        """
+        for at, (follower, leader) in enumerate(zip(self._followers, self._leaders, strict=True)):
+            apart = np.abs(own[:, at] * self._factors[at] - follower.at(q[:, leader]))
+            self._largest[at] = float(np.fmax.reduce(apart, initial=self._largest[at]))
+
+    def warnings(self) -> Iterator[str]:
+        """Yield a warning for each column that is far from its joint."""
+        for name, one, largest in zip(self._names, self._followers, self._largest, strict=True):
+            if largest > CLOSE[one.unit]:
+                held = f"where the robot holds {one.name!r}"
+                following = f"what {one.name!r} does by following {one.leader!r}"
+                yield (
+                    f"column {name!r} is left out, and is up to {largest:.3g} {one.unit} from"
+                    f" {held if one.leader is None else following}"
+                )
 
 
 def read_samples(
@@ -83,14 +184,22 @@ def read_samples(
             rate = reading.resample
             samples = collected(resampled(samples, rate, progress=progress), width, buffer)
             time = first_column(samples)
-    by_unit: dict[str, list[Peak]] = {"rad": [], "m": []}
-    for at, unit in enumerate(joint_units):
-        size = peaks[at + 1], reach[at] if reach else np.inf
-        by_unit.get(unit, []).append(Peak(log.columns[selection.joints[at]], *map(float, size)))
+    columns = [log.columns[at] for at in selection.joints]
+    largest = map(Peak, columns, peaks[1:].tolist(), reach or [np.inf] * len(joints))
     with within(str(log.path)):
-        warnings += unit_warnings(log, reading, by_unit["rad"]) + far_warnings(by_unit["m"])
+        warnings += _size_warnings(log, reading, joint_units, tuple(largest))
     first_row = log.first_row if reading.resample is None else None
     return Samples(time, samples[:, 1:], rate, selection.ignored, warnings, first_row)
+
+
+def _size_warnings(
+    log: Log, reading: Reading, units: Sequence[str], largest: Sequence[Peak]
+) -> tuple[str, ...]:
+    """Return warnings about joints whose largest magnitudes are hardly in the unit of the log."""
+    angles, lengths = (
+        [peak for peak, own in zip(largest, units, strict=True) if own == unit] for unit in ("rad", "m")
+    )
+    return unit_warnings(log, reading, angles) + far_warnings(lengths)
 
 
 def finite_blocks(

@@ -7,12 +7,13 @@ import numpy as np
 
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.filtering import derivatives
-from linkwise.analysis.result import Totals, WholeMovement
+from linkwise.analysis.result import Totals, WholeMovement, Work
+from linkwise.analysis.result_quantities import POWER_OF
+from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import Processing
 from linkwise.analysis.torques import Decomposer
 from linkwise.analysis.verify import Closure, against_recursion
-from linkwise.analysis.work import WorkSum
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 from linkwise.progress import Progress
@@ -42,6 +43,52 @@ def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
     return cut, count - cut
 
 
+class MovementSums:
+    """Totals, work and errors of a movement, added up block by block.
+
+    Samples are evenly spaced, and work is summed by the trapezoidal rule: with Δt between them
+    ∫ P dt = Δt (Σ_s P_s - (P_first + P_last)/2), so that blocks join without knowing of each other.
+    """
+
+    def __init__(self, rows: ResultRows) -> None:
+        self.closure, self._rows, self._samples = Closure(), rows, 0
+        self._total, self._peak = np.zeros((2, len(rows)))
+        self._power = rows.numbers(*POWER_OF.values())
+        self._energy = np.zeros((2, len(self._power)))
+        self._first: Array | None = None
+        self._last = self._energy
+
+    def add(self, block: Array, closure: Closure) -> bool:
+        """Add a block (rows, samples) and its errors; return whether all of its values are finite."""
+        self.closure |= closure
+        magnitude = np.abs(block)
+        added = magnitude.sum(axis=1)
+        if not np.isfinite(added).all():
+            return False
+        self._samples += block.shape[1]
+        self._total += added
+        np.maximum(self._peak, magnitude.max(axis=1), out=self._peak)
+        power = block[self._power]
+        parts = np.stack([np.maximum(power, 0.0), np.maximum(-power, 0.0)])
+        self._energy += parts.sum(axis=-1)
+        if self._first is None:
+            self._first = parts[..., 0].copy()
+        self._last = parts[..., -1].copy()
+        return True
+
+    def movement(self, step: float) -> WholeMovement:
+        """Return what the whole movement comes to; samples are `step` s apart."""
+        first = self._last if self._first is None else self._first
+        energy = np.zeros((2, len(self._rows), 1))
+        energy[:, self._power, 0] = step * (self._energy - 0.5 * (first + self._last))
+        works = {
+            name: Work(*(self._rows.dense(power, way)[0] for way in energy))
+            for name, power in POWER_OF.items()
+        }
+        totals = Totals(self._total / self._samples, self._peak)
+        return WholeMovement(totals=totals, closure=self.closure, total=self._samples, **works)
+
+
 def stream(
     samples: Samples, decomposer: Decomposer, processing: Processing, sink: Sink, progress: Progress
 ) -> WholeMovement:
@@ -49,30 +96,20 @@ def stream(
 
     Raises LinkwiseError for too few samples, results that overflow, and a robot whose torques do not add up.
     """
-    start, stop = span_of(samples, processing)
-    total = np.zeros(len(decomposer.rows))
-    peak = np.zeros(len(decomposer.rows))
-    work = WorkSum(decomposer.rows)
-    closure = Closure()
-    inner = _at_once(len(decomposer.rows))
+    (start, stop), rows = span_of(samples, processing), decomposer.rows
+    sums, inner = MovementSums(rows), _at_once(len(rows))
     with ThreadPoolExecutor(1) as writer, np.errstate(over="ignore", invalid="ignore"):
         pending: Future[None] | None = None
-        for first, last in _blocks(start, stop, len(decomposer.rows)):
-            block = np.empty((len(decomposer.rows), last - first))
+        for first, last in _blocks(start, stop, len(rows)):
+            block = np.empty((len(rows), last - first))
             for at in range(first, last, inner):
                 end = min(at + inner, last)
                 q, qd, qdd = derivatives(samples.q, samples.rate, at, end, processing)
                 out = block[:, at - first : end - first]
-                closure |= decomposer.fill(out, samples.time[at:end], q, qd, qdd)
-                magnitude = np.abs(out)
-                added = magnitude.sum(axis=1)
-                if not np.isfinite(added).all():
+                if not sums.add(out, decomposer.fill(out, samples.time[at:end], q, qd, qdd)):
                     raise _overflow(samples, decomposer, out, at)
-                total += added
-                np.maximum(peak, magnitude.max(axis=1), out=peak)
-                work(out)
-            closure |= against_recursion(decomposer.robot, decomposer.loads, decomposer.rows, block)
-            closure.check()
+            sums.closure |= against_recursion(decomposer.robot, decomposer.loads, rows, block)
+            sums.closure.check()
             if pending is not None:
                 pending.result()
             pending = writer.submit(sink, block)
@@ -80,8 +117,7 @@ def stream(
             progress("analysing", last - start, stop - start)
         if pending is not None:
             pending.result()
-    totals, works = Totals(total / (stop - start), peak), work.work(1 / samples.rate)
-    return WholeMovement(totals, *works, closure, stop - start)
+    return sums.movement(1 / samples.rate)
 
 
 def _overflow(samples: Samples, decomposer: Decomposer, out: Array, start: int) -> LinkwiseError:

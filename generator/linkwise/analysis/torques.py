@@ -8,14 +8,13 @@ import numpy as np
 
 from linkwise.analysis.borne_forces import BorneForces
 from linkwise.analysis.closed_motion import reason_of
-from linkwise.analysis.contacts.contact_terms import ContactTerms
 from linkwise.analysis.contacts.contact_times import ContactTimes
-from linkwise.analysis.contacts.ground_contacts import Standing
+from linkwise.analysis.contacts.ground_contacts import ContactTerms, Standing
 from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.induced_shares import InducedShares
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed_load import PlacedLoad
-from linkwise.analysis.result_quantities import PASSIVE, POWER, POWER_TERMS, QUANTITIES, TERMS, TORQUE_OF
+from linkwise.analysis.result_quantities import PASSIVE, QUANTITIES, TERMS, TORQUE_OF
 from linkwise.analysis.result_rows import QuantityRows, ResultRows, torque_places
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.term_rows import TermArrays, term_rows
@@ -89,14 +88,7 @@ class Decomposer:
         Where joints are tied, the motion of the independent ones counts. Raises LinkwiseError, with the time,
         where ties cannot be closed or joints do not follow.
         """
-        if self.robot.constrained is not None:
-            try:
-                q, qd, qdd = self.robot.constrained.consistent(q, qd, qdd)
-            except ValueError as error:
-                raise LinkwiseError(
-                    f"between {time[0]:.6g} and {time[-1]:.6g} s: {reason_of(error)}; mend the log, or filter"
-                    " it less where a filter carries joints out of reach"
-                ) from None
+        q, qd, qdd = self._consistent(time, q, qd, qdd)
         packed: Any = self.robot.model.packed(q, qd, qdd)
         standing = self._standing(time, q)
         unborne, free = packed, self.robot.model.inverse_dynamics(q, qd, qdd)
@@ -119,12 +111,30 @@ class Decomposer:
         if self.convention == "gradient":
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
             rows.put(out, "tau_qd", _left(standing, velocity))
-        for name in (*POWER, *POWER_TERMS):
-            powers, torques = rows[name], rows[TORQUE_OF[name] if name in rows else name]
-            joints = powers.at[:, 0].tolist()
-            for power, torque, i in zip(out[powers.rows], out[torques.rows], joints, strict=True):
-                np.multiply(torque, qd[:, i], out=power)
+        self._fill_power(out, qd)
         return closure
+
+    def _consistent(self, time: Array, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+        """Return the motion in which ties close; raise LinkwiseError, with the time, where they cannot."""
+        if self.robot.constrained is None:
+            return q, qd, qdd
+        try:
+            return self.robot.constrained.consistent(q, qd, qdd)
+        except ValueError as error:
+            raise LinkwiseError(
+                f"between {time[0]:.6g} and {time[-1]:.6g} s: {reason_of(error)}; mend the log, or filter"
+                " it less where a filter carries joints out of reach"
+            ) from None
+
+    def _fill_power(self, out: Array, qd: Array) -> None:
+        """Fill the powers P = τ q̇_i from the torques."""
+        for name, torque in TORQUE_OF.items():
+            if name in self.rows:
+                powers, torques = self.rows[name], self.rows[torque]
+                for power, values, i in zip(
+                    out[powers.rows], out[torques.rows], powers.at[:, 0].tolist(), strict=True
+                ):
+                    np.multiply(values, qd[:, i], out=power)
 
     def _dense(self, torque: Array, n: int) -> Array:
         """Return tau_ij (S, n, N) from packed values, before contacts carry any; empty without contacts."""

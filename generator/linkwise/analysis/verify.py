@@ -126,37 +126,50 @@ def against_recursion(
         return Closure()
     partial = robot.recursion.partial_torque(q, qd, qdd)
     asked = [load_torque(robot.recursion, borne, block[0], q) for borne in loads]
-    expected = np.concatenate([partial, *(torque[:, :, None] for torque in asked)], axis=2)
-    tree, mapped = robot.package.manifest.tree, None
-    if robot.constrained is not None and tree is not None:
-        mapped = LoopEquations(robot.recursion, tree).velocity_map(q)
-        projected = np.einsum("snm,snj->smj", mapped, expected)
-        expected = np.zeros_like(expected)
-        expected[:, list(robot.driven)] = projected
-    free = expected
-    if robot.contacts is not None and tree is not None:
-        reference = ContactReference(robot.recursion, tree, robot.contacts)
-        expected = reference.left(expected, q, rows.dense("contact", block), mapped)
+    every = np.concatenate([partial, *(torque[:, :, None] for torque in asked)], axis=2)
+    free, left = _borne(robot, robot.recursion, every, q, rows.dense("contact", block))
     ours = np.concatenate([rows.dense(name, block) for name in ("tau_link", "tau_load")], axis=2)
-    fed = rows.dense("power_link", block).sum(axis=1) + rows.dense("power_contact", block).sum(axis=2)
-    absolute, relative, watts = 0.0, 0.0, 0.0
-    for unit in set(robot.units):
+    apart, watts = [(0.0, 0.0)], 0.0
+    for unit in dict.fromkeys(robot.units):
         alike = [i for i, other in enumerate(robot.units) if other == unit]
-        error = float(np.abs(ours - expected)[:, alike].max(initial=0.0))
         # What contacts leave may be only the rounding of what they carry.
-        scale = float(max(np.abs(a).sum(axis=2)[:, alike].max(initial=0.0) for a in (expected, free)))
-        absolute = max(absolute, error)
-        relative = max(relative, error / scale if scale else error)
+        scale = max(_largest_sum(left, alike), _largest_sum(free, alike))
+        error = float(np.abs(ours - left)[:, alike].max(initial=0.0))
+        apart.append((error, error / scale if scale else error))
         # Power that is only rounding is measured by the torques and speeds that it is made of.
-        carried = float(np.abs(partial).sum(axis=2)[:, alike].max(initial=0.0))
-        watts += carried * float(np.abs(qd[:, alike]).max(initial=0.0))
-    apart = float(np.abs(fed - _gain(robot.recursion, q, qd, qdd)).max(initial=0.0))
+        watts += _largest_sum(partial, alike) * float(np.abs(qd[:, alike]).max(initial=0.0))
+    fed = rows.dense("power_link", block).sum(axis=1) + rows.dense("power_contact", block).sum(axis=2)
+    lost = float(np.abs(fed - _gain(robot.recursion, q, qd, qdd)).max(initial=0.0))
+    absolute, relative = (max(errors) for errors in zip(*apart, strict=True))
     return Closure(
         recursion_absolute=absolute,
         recursion_relative=relative,
-        energy_absolute=apart,
-        energy_relative=apart / watts if watts else apart,
+        energy_absolute=lost,
+        energy_relative=lost / watts if watts else lost,
     )
+
+
+def _borne(
+    robot: LoadedRobot, recursion: NewtonEuler, torque: Array, q: Array, shares: Array
+) -> tuple[Array, Array]:
+    """Return what joints carry of torques (S, n, X) of the open tree: without contacts, and with them.
+
+    shares: those of the contacts, (S, contacts)
+    """
+    tree, mapped = robot.package.manifest.tree, None
+    if robot.constrained is not None and tree is not None:
+        mapped = LoopEquations(recursion, tree).velocity_map(q)
+        projected = np.einsum("snm,snj->smj", mapped, torque)
+        torque = np.zeros_like(torque)
+        torque[:, list(robot.driven)] = projected
+    if robot.contacts is None or tree is None:
+        return torque, torque
+    return torque, ContactReference(recursion, tree, robot.contacts).left(torque, q, shares, mapped)
+
+
+def _largest_sum(torque: Array, joints: list[int]) -> float:
+    """Return the largest sum of magnitudes of torques (S, n, X) on one of the joints."""
+    return float(np.abs(torque).sum(axis=2)[:, joints].max(initial=0.0))
 
 
 def load_torque(recursion: NewtonEuler, borne: PlacedLoad, time: Array, q: Array) -> Array:

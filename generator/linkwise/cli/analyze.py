@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from linkwise.analysis import Analysis
-from linkwise.analysis.analysis_choices import AnalysisChoices
+from linkwise.analysis.choices import AnalysisChoices
 from linkwise.analysis.payload import carrying
 from linkwise.analysis.run import analyze_to
 from linkwise.cli import Json, tell
@@ -37,10 +37,9 @@ def analyze(
     with shown_progress() as progress:
         package = opened_robot(robot, backend, options, progress)
     package = carrying(package, chosen.payloads(package))
-    put = chosen.borne(package), chosen.contacts(package)
-    how = chosen.reading, chosen.processing, chosen.wanted
+    asked = chosen.request(package)
     with shown_progress(UNITS) as progress:
-        analysis, files = analyze_to(out, log, package, *how, progress, *put)
+        analysis, files = analyze_to(out, log, package, asked, progress)
     for warning in analysis.warnings:
         tell(f"warning: {log}: {warning}", err=True)
     for warning in analysis.load_warnings:

@@ -8,7 +8,7 @@ from typing import Any
 
 from linkwise_runtime.chosen_names import nearest_first
 
-from linkwise.analysis.analysis_choices import AnalysisChoices
+from linkwise.analysis.choices import AnalysisChoices
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file

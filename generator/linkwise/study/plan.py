@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from linkwise.analysis.analysis_choices import AnalysisChoices
+from linkwise.analysis.choices import AnalysisChoices
 from linkwise.analysis.phases import Phase
 from linkwise.errors import LinkwiseError
 from linkwise.option import written

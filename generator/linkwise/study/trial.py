@@ -133,10 +133,11 @@ def prepared_trial(plan: StudyPlan, trial: Trial, buffer: Path) -> Job:
 
     buffer: a directory that keeps the samples
     """
-    loaded, choices = loaded_robot(trial.robot, plan), trial.choices
-    robot = standing_on(carrying(loaded, choices.payloads(loaded)), choices.contacts(loaded))
-    wanted = replace(choices.wanted, page=plan.pages)
+    loaded = loaded_robot(trial.robot, plan)
+    robot = carrying(loaded, trial.choices.payloads(loaded))
+    asked = trial.choices.request(robot)
+    robot = standing_on(robot, asked.contacts)
+    wanted = replace(asked.wanted, page=plan.pages)
     if plan.cycles is not None and plan.cycles.what:
         wanted = replace(wanted, phases=(*wanted.phases, Phase.of(f"cycle={plan.cycles.what}")))
-    put = choices.borne(robot), choices.contacts(robot)
-    return prepared(Path(trial.log), robot, choices.reading, choices.processing, *put, silent, wanted, buffer)
+    return prepared(Path(trial.log), robot, replace(asked, wanted=wanted), silent, buffer)

@@ -11,10 +11,10 @@ from linkwise_runtime.dynamics import Dynamics
 from numpy.typing import NDArray
 
 from linkwise.analysis.column_matching import time_column
-from linkwise.analysis.contacts.given_contacts import Contacts, WhileColumn
+from linkwise.analysis.contacts import Contacts, WhileColumn
 from linkwise.analysis.disk_rows import collected
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.given_loads import FORCE
+from linkwise.analysis.loads import FORCE
 from linkwise.analysis.loads.placed_load import PlacedLoad, Wrench, model_pose
 from linkwise.analysis.loads.read_loads import placed_loads
 from linkwise.analysis.logs import Log

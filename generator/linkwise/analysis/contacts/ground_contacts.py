@@ -14,7 +14,7 @@ to their shares. If they cannot carry it, as a foot that touches at a single poi
 the joints b: a residual.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -25,6 +25,7 @@ from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.constrained_model import ConstrainedModel
+from linkwise.analysis.term_rows import NAMES, Rows, TermArrays
 from linkwise.package.load import Array
 
 WRENCH = ("moment_x", "moment_y", "moment_z", "force_x", "force_y", "force_z")
@@ -221,55 +222,79 @@ class Standing:
         return found
 
 
-HELD_RANK = 1e-11
-"""Eigenvalues of A M⁻¹ Aᵀ below this part of the largest are zero."""
+@dataclass(frozen=True, eq=False)
+class _Kind:
+    """Values of one kind: a block (joints, pairs) for joints that contacts load, then those of others."""
+
+    rows: tuple[tuple[int, ...], ...]
+    block: tuple[int, int]
+    places: tuple[Rows, Rows]
+    """Row and column in the block of each packed value of its joints."""
+    sources: Rows
+    """Indices of these packed values."""
+    others: Rows
+    """Indices of the packed values of the other joints."""
+
+    @classmethod
+    def of(cls, rows: Sequence[tuple[int, ...]], joints: Sequence[int]) -> "_Kind":
+        """Return the kind for rows (i, j[, k], source) of the free robot."""
+        mine = [row for row in rows if row[0] in joints]
+        rest = [row for row in rows if row[0] not in joints]
+        pairs = sorted({row[1:-1] for row in mine})
+        place = {pair: at for at, pair in enumerate(pairs)}
+        size = len(joints) * len(pairs)
+        made = [(i, *pair, a * len(pairs) + b) for a, i in enumerate(joints) for b, pair in enumerate(pairs)]
+        made += [(*row[:-1], size + at) for at, row in enumerate(rest)]
+        return cls(
+            tuple(sorted(made)),
+            (len(joints), len(pairs)),
+            (_index(joints.index(row[0]) for row in mine), _index(place[row[1:-1]] for row in mine)),
+            _index(row[-1] for row in mine),
+            _index(row[-1] for row in rest),
+        )
+
+    def left(self, packed: Array, standing: Standing, joints: Sequence[int], n: int) -> Array:
+        """Return the values (S, count) that contacts leave, in the order of the sources of `rows`."""
+        samples = len(packed)
+        whole = np.zeros((samples, n, self.block[1]))
+        whole[:, np.asarray(joints)[self.places[0]], self.places[1]] = packed[:, self.sources]
+        block = standing.left(whole)[:, list(joints)].reshape(samples, -1)
+        return np.concatenate([block, packed[:, self.others]], axis=1)
 
 
-@dataclass(frozen=True)
-class StandingResponse:
-    """Response of a robot to forces at S samples, while contacts hold frames of it.
+@dataclass(frozen=True, eq=False)
+class ContactTerms:
+    """Torque terms of a robot on contacts: each link's weight and motion load joints through the ground too.
 
-    With the rows A of the contacts that are on, and the mass matrix M of the response without contacts,
+    With T of `Standing.transfer`, each term c_ijk of the free robot becomes
 
-        q̈_x = P M⁻¹ F_x        P = 1 − K A        K = M⁻¹ Aᵀ (A M⁻¹ Aᵀ)⁺
+        c^_ijk = c_ijk - sum_b T_ib c_bjk
 
-    is the acceleration due to a force while the held frames stay fixed. In a measured motion they are not
-    quite fixed: K A q̈ is the acceleration due to the contacts themselves, as the held frames turn and slip,
-    and with it all sources sum to q̈. Forces that contacts could carry move nothing, so that it does not
-    matter how contacts share them.
+    at joint i. It belongs to the link j and the cause k of c_bjk, and is no longer symmetric in i and k.
     """
 
-    free: Any
-    """Response of the robot without contacts."""
-    rows: Array
-    """Contact rows A (S, C, n)."""
+    kinds: tuple[_Kind, ...]
+    joints: tuple[int, ...]
 
-    def accelerations(self, forces: Array) -> Array:
-        """Return the accelerations (S, n, X) due to columns of forces (S, n, X)."""
-        return self._kept(self.free.accelerations(forces))
+    @classmethod
+    def of(cls, free: TermArrays, contacts: GroundContacts) -> "ContactTerms":
+        """Return the terms for those of the free robot."""
+        kinds = tuple(_Kind.of(getattr(free, name), contacts.joints) for name in NAMES)
+        return cls(kinds, contacts.joints)
 
-    def of_velocities(self) -> Array:
-        """Return the accelerations due to the velocity terms of ties, by cause (S, n, n)."""
-        return self._kept(self.free.of_velocities())
+    @property
+    def rows(self) -> TermArrays:
+        """Rows (i, j[, k], source) of the values that `left` returns."""
+        return TermArrays(*(kind.rows for kind in self.kinds))
 
-    def of_contacts(self, qdd: Array, owners: Array, count: int) -> Array:
-        """Return the accelerations (S, n, contacts) due to each contact itself.
+    def left(self, packed: TermArrays, standing: Standing, n: int) -> TermArrays:
+        """Return the values that contacts leave, from the packed ones of the free robot with n joints."""
+        found = (
+            kind.left(np.asarray(getattr(packed, name)), standing, self.joints, n)
+            for name, kind in zip(NAMES, self.kinds, strict=True)
+        )
+        return TermArrays(*found)
 
-        owners: contact of each row; count: number of contacts
-        """
-        moved = np.einsum("scn,sn->sc", self.rows, qdd)
-        each = np.zeros((*moved.shape, count))
-        each[:, np.arange(len(owners)), owners] = moved
-        found: Array = self._by_rows @ each
-        return found
 
-    def _kept(self, accelerations: Array) -> Array:
-        kept: Array = accelerations - self._by_rows @ (self.rows @ accelerations)
-        return kept
-
-    @cached_property
-    def _by_rows(self) -> Array:
-        """Matrix K (S, n, C)."""
-        answered = self.free.accelerations(np.swapaxes(self.rows, 1, 2))
-        found: Array = answered @ np.linalg.pinv(self.rows @ answered, rcond=HELD_RANK, hermitian=True)
-        return found
+def _index(numbers: Iterable[int]) -> Rows:
+    return np.fromiter(numbers, dtype=np.intp)

@@ -9,10 +9,9 @@ from linkwise_runtime.constraints.held_frames import ground_normal
 from linkwise_runtime.constraints.independent_joints import loose_base
 from linkwise_runtime.quantities import Contact
 
-from linkwise.analysis.body_names import body_frame
-from linkwise.analysis.contacts.given_contacts import Contacts
+from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.ground_contacts import GroundContacts
-from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.loaded_robot import LoadedRobot, body_frame
 from linkwise.analysis.loads.placed_load import moving_joints
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed

@@ -13,9 +13,8 @@ import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.rule.joint_tree import TreeFrame
 
-from linkwise.analysis.body_names import body_frame
-from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WORLD
+from linkwise.analysis.loaded_robot import LoadedRobot, body_frame
+from linkwise.analysis.loads import FORCE, MOMENT, POINT, WORLD
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 from linkwise.package.manifest import RigidTree

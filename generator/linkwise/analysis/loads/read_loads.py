@@ -1,26 +1,29 @@
 """Loads on a robot, read from files and values and checked against its bodies and the motion's time."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from linkwise_runtime.chosen_names import end_of_path
 
-from linkwise.analysis.body_names import told_apart
-from linkwise.analysis.column_matching import FAR
+from linkwise.analysis.column_matching import FAR, time_column, with_nearest
 from linkwise.analysis.disk_rows import collected
 from linkwise.analysis.even_time import even_rate, usual_step
 from linkwise.analysis.filtering import lowpass
-from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WIDTH, Load, Loads
-from linkwise.analysis.loads.load_files import PARTS, LoadColumns, external_loads, load_columns
+from linkwise.analysis.loaded_robot import LoadedRobot, named_body, told_apart
+from linkwise.analysis.loads import FORCE, MOMENT, PARTS, POINT, WIDTH, WORLD, Load, LoadColumns, Loads
 from linkwise.analysis.loads.placed_load import PlacedLoad, Seat, seat_of
 from linkwise.analysis.logs import open_log
 from linkwise.analysis.samples import finite_blocks, slowness
-from linkwise.analysis.settings import Lowpass
+from linkwise.analysis.settings import Lowpass, Reading
 from linkwise.errors import LinkwiseError, within
+from linkwise.escape import listed
 from linkwise.package.load import Array
 from linkwise.progress import Progress
+
+NAMED = re.compile(r"(?P<load>.+)/(?P<part>force|moment|point)_(?P<axis>[xyz])")
 
 
 def placed_loads(
@@ -39,8 +42,8 @@ def placed_loads(
     short.
     """
     loads = [_given(load, robot, motion) for load in wanted.given]
-    listed = [(one, path) for path in wanted.paths for one in _listed(path, robot, ignore_extra)]
-    for columns, path in _with_doubles_told(listed):
+    in_files = [(one, path) for path in wanted.paths for one in _listed(path, robot, ignore_extra)]
+    for columns, path in _with_doubles_told(in_files):
         loads.append(_read(columns, path, wanted.cutoff, robot, motion, progress, buffer))
     told_apart("load", [load.name for load in loads], (), "tell them apart as NAME:BODY, or by name= in XML")
     return tuple(loads)
@@ -48,10 +51,59 @@ def placed_loads(
 
 def _listed(path: Path, robot: LoadedRobot, ignore_extra: bool) -> tuple[LoadColumns, ...]:
     if path.suffix.lower() == ".xml":
+        # Imported here, as the readers need SymPy, which other loads can do without.
+        from linkwise.analysis.loads.external_loads import external_loads
+
         return external_loads(path)
     log = open_log(path)
     with within(str(path)):
         return load_columns(path, log.columns, robot, ignore_extra)
+
+
+def load_columns(
+    log: Path, columns: Sequence[str], robot: LoadedRobot, ignore_extra: bool
+) -> tuple[LoadColumns, ...]:
+    """Return the loads of a log, all in the world's axes; raise LinkwiseError for columns that form none."""
+    time = time_column(columns, Reading())
+    found: dict[str, dict[str, dict[str, int]]] = {}
+    extra = []
+    for at, column in enumerate(columns):
+        match = NAMED.fullmatch(column)
+        if match:
+            found.setdefault(match["load"], {}).setdefault(match["part"], {})[match["axis"]] = at
+        elif at != time:
+            extra.append(column)
+    if not found:
+        raise LinkwiseError(
+            f"no column of a load in {listed(map(repr, columns))}; name them BODY/force_x, BODY/force_y, …,"
+            " or give OpenSim's XML of external loads"
+        )
+    if extra and not ignore_extra:
+        raise LinkwiseError(
+            f"no load for column {listed(map(repr, extra))}; name columns BODY/force_x, BODY/moment_x or"
+            " BODY/point_x, or leave such columns out with --ignore-extra"
+        )
+    return tuple(_load(log, time, load, parts, robot, columns) for load, parts in found.items())
+
+
+def _load(
+    log: Path,
+    time: int,
+    load: str,
+    parts: dict[str, dict[str, int]],
+    robot: LoadedRobot,
+    there: Sequence[str],
+) -> LoadColumns:
+    name, body = named_body(load, robot)
+    missing = [f"{load}/{part}_{axis}" for part, axes in parts.items() for axis in "xyz" if axis not in axes]
+    if missing:
+        raise LinkwiseError(f"no column {with_nearest(missing, there)}; a load has x, y and z of what it has")
+    if not {"force", "moment"} & set(parts):
+        raise LinkwiseError(f"load {load!r} has a point and neither force nor moment; add {load}/force_x, …")
+    columns = {part: tuple(parts[part][axis] for axis in "xyz") for part in parts}
+    return LoadColumns(
+        name or end_of_path(body), body, log, time, columns, point_in=WORLD if "point" in parts else None
+    )
 
 
 def _with_doubles_told(loads: Sequence[tuple[LoadColumns, Path]]) -> Iterator[tuple[LoadColumns, Path]]:

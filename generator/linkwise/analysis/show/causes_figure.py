@@ -15,14 +15,15 @@ from linkwise.analysis.joint_causes import Cause, causes_of, curves
 from linkwise.analysis.loads.placed_load import moving_joints
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_rows import load_unit
 from linkwise.analysis.show.drawn_curves import (
     drawn_curves,
     foot,
     largest_few,
     new_figure,
+    time_axis,
     write_note,
     write_title,
+    zero_line,
 )
 from linkwise.errors import LinkwiseError
 from linkwise.escape import printable
@@ -206,7 +207,7 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
     means = figure.add_subplot(grid[1, 0])
     sizes = figure.add_subplot(grid[1, 1], sharey=means)
     _over_time(over_time, result, i, numbers)
-    _both_bars(means, sizes, numbers, load_unit(result.robot.units[i]))
+    _both_bars(means, sizes, numbers, result.robot.torque_units[i])
     over_time.legend(
         *means.get_legend_handles_labels(),
         loc="lower right",
@@ -241,11 +242,10 @@ def _over_time(panel: Any, result: AnalysisResult, i: int, numbers: CauseNumbers
                 edges[start], edges[end], low, high, color=colour(at), alpha=0.16, linewidth=0, zorder=0
             )
     panel.plot(found.time[0], found.values[0], color=INK, linewidth=1.6)
-    panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
+    zero_line(panel)
     panel.set_title("all causes together")
-    panel.set_ylabel(load_unit(result.robot.units[i]))
-    panel.set_xlabel("time (s)")
-    panel.set_xlim(result.time[0], result.time[-1])
+    panel.set_ylabel(result.robot.torque_units[i])
+    time_axis(panel, result)
 
 
 def _both_bars(means: Any, sizes: Any, numbers: CauseNumbers, unit: str) -> None:

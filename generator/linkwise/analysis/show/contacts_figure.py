@@ -1,14 +1,23 @@
 """Figure of the ground's forces at each contact, by link, and the torques of the joints above it."""
 
 import textwrap
+from collections.abc import Iterable
 from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_rows import Indices, load_unit
-from linkwise.analysis.show.drawn_curves import drawn_curves, foot, largest_few, new_figure, write_title
+from linkwise.analysis.result_rows import Indices
+from linkwise.analysis.show.drawn_curves import (
+    drawn_curves,
+    foot,
+    largest_few,
+    new_figure,
+    time_axis,
+    write_title,
+    zero_line,
+)
 from linkwise.package.load import Array
 from linkwise.plotstyle import GRAVITY, INK, drawn, tone
 
@@ -45,14 +54,20 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
         drawn_here = len(shown) + len(joints[c])
         for panel in panels[drawn_here:, c]:
             panel.set_axis_off()
-        panels[drawn_here - 1, c].set_xlabel("time (s)")
+        time_axis(panels[drawn_here - 1, c], result)
         panels[drawn_here - 1, c].tick_params(labelbottom=True)
-        panels[-1, c].set_xlim(result.time[0], result.time[-1])
     for panel, axis in zip(panels[:, 0], shown, strict=False):
         panel.set_ylabel(f"force {PARTS[axis]} (N)")
     figure.align_ylabels(panels[:, 0])
+    _legend(figure, panels.flat, foot(result))
+    write_title(figure, result, "What the ground bears")
+    return figure
+
+
+def _legend(figure: Any, panels: Iterable[Any], note: str) -> None:
+    """Draw one legend of all panels below the figure, with a note."""
     handles: dict[str, Any] = {}
-    for panel in panels.flat:
+    for panel in panels:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     figure.legend(
@@ -62,11 +77,9 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
         ncols=4,
         handlelength=2,
         fontsize=8,
-        title=textwrap.fill(foot(result), round(15 * float(figure.get_figwidth()))),
+        title=textwrap.fill(note, round(15 * float(figure.get_figwidth()))),
         title_fontsize=7,
     )
-    write_title(figure, result, "What the ground bears")
-    return figure
 
 
 def _forces(result: AnalysisResult) -> Array:
@@ -145,7 +158,7 @@ def _draw_force(
             base = top
     panel.plot(found.time[-1], found.values[-1], color=INK, linewidth=1.6, label="found from the motion")
     _draw_measured(panel, result, contact, axis)
-    panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
+    zero_line(panel)
 
 
 def _draw_measured(panel: Any, result: AnalysisResult, contact: int, axis: int) -> None:
@@ -161,11 +174,11 @@ def _draw_measured(panel: Any, result: AnalysisResult, contact: int, axis: int) 
 
 def _draw_torque(panel: Any, result: AnalysisResult, contact: int, i: int) -> None:
     _shade(panel, result, contact)
-    name, unit = drawn(result.robot.plot_joints[i]), load_unit(result.robot.units[i])
+    name, unit = drawn(result.robot.plot_joints[i]), result.robot.torque_units[i]
     found, measured = (result.rows.numbers(kind, joint=i) for kind in ("tau", "tau_as_loads"))
     _draw_rows(panel, result, found, color=INK, linewidth=1.6, label="found from the motion")
     _draw_rows(panel, result, measured, color="#C21E56", linestyle="dotted", label="by what was measured")
-    panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
+    zero_line(panel)
     panel.set_title(f"torque of {name} ({unit})", fontsize=9)
 
 

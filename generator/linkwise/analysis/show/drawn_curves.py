@@ -88,6 +88,17 @@ def new_figure(width: float, height: float) -> "Figure":
     return figure
 
 
+def zero_line(panel: Any) -> None:
+    """Draw a thin line at zero, behind all curves."""
+    panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
+
+
+def time_axis(panel: Any, result: AnalysisResult) -> None:
+    """Label a panel's time, from the first sample to the last."""
+    panel.set_xlabel("time (s)")
+    panel.set_xlim(result.time[0], result.time[-1])
+
+
 def write_title(figure: Any, result: AnalysisResult, *what: str) -> None:
     """Write above a figure what it shows, of which robot and log."""
     told = " · ".join([*what, drawn(result.robot.name, 40), drawn(result.source, 50)])

@@ -20,8 +20,10 @@ from linkwise.analysis.show.drawn_curves import (
     foot,
     largest_few,
     new_figure,
+    time_axis,
     write_note,
     write_title,
+    zero_line,
 )
 from linkwise.escape import column_part
 from linkwise.package.load import Array
@@ -135,11 +137,10 @@ def induced(result: AnalysisResult, point: int) -> "Figure":
         for source, found in curves:
             look = _look(source, len(result.robot.driven))
             panel.plot(found.time[at], found.values[at], label=drawn(source.label, 34), **look)
-        panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
+        zero_line(panel)
         panel.set_ylabel(f"{drawn(component)} ({unit})")
     panels[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8, handlelength=2.6)
-    panels[-1].set_xlabel("time (s)")
-    panels[-1].set_xlim(result.time[0], result.time[-1])
+    time_axis(panels[-1], result)
     write_title(figure, result, f"What accelerates {drawn(TITLES.get(name, name))}")
     write_note(figure, foot(result))
     return figure

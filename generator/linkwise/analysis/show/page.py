@@ -9,8 +9,8 @@ import numpy as np
 from linkwise.analysis.joint_causes import are_motions_whole
 from linkwise.analysis.loads.placed_load import model_pose
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_quantities import FORCES, GROUND, INDUCED, TORQUE_OF
-from linkwise.analysis.result_rows import ResultRows
+from linkwise.analysis.result_quantities import FORCES, GROUND, INDUCED, MOTION, TORQUE_OF
+from linkwise.analysis.result_rows import Column, ResultRows
 from linkwise.analysis.show.induced_figure import TITLES, components, numbers_of_curves, source_curves
 from linkwise.analysis.show.page_curves import (
     CurveSums,
@@ -75,11 +75,10 @@ def page_data(result: AnalysisResult) -> str:
     stride = stride_for(result.total, numbers_on_page(result.rows), NUMBERS, SAMPLES)
     instants = replace(result, values=at_instants(result, stride))
     largest = _largest_forces(result)
-    place = {i: at for at, i in enumerate(robot.driven)}
     shown = [
         at
         for at, c in enumerate(result.columns)
-        if c.quantity not in OFF_PAGE and (c.joint is None or c.joint in place)
+        if c.quantity not in OFF_PAGE and (c.joint is None or c.joint in robot.driven)
     ]
     data = {
         "robot": printable(robot.name),
@@ -92,19 +91,7 @@ def page_data(result: AnalysisResult) -> str:
         "convention": result.processing.convention,
         "joints": _joints(result),
         "links": list(map(printable, robot.links)),
-        "columns": [
-            {
-                "quantity": c.quantity,
-                "name": c.name,
-                "unit": c.unit,
-                "i": None if c.joint is None else place[c.joint],
-                "j": c.link,
-                "k": place.get(c.cause)
-                if c.quantity in ("tau_qdd", "tau_qd") and c.cause is not None
-                else c.cause,
-            }
-            for c in (result.columns[at] for at in shown)
-        ],
+        "columns": [_column(result.columns[at], robot.driven) for at in shown],
         "values": encoded(instants.values[shown]),
         "together": are_motions_whole(result),
         "curves": curve_data(result, stride > 1),
@@ -121,6 +108,22 @@ def page_data(result: AnalysisResult) -> str:
         "induced": [_induced(result, point, stride > 1) for point in range(len(result.induced))],
     }
     return script_data(data)
+
+
+def _column(column: Column, driven: Sequence[int]) -> dict[str, Any]:
+    """Return a column's name, unit and indices, with joints as the page counts them."""
+
+    def place(joint: int | None) -> int | None:
+        return None if joint is None or joint not in driven else driven.index(joint)
+
+    return {
+        "quantity": column.quantity,
+        "name": column.name,
+        "unit": column.unit,
+        "i": place(column.joint),
+        "j": column.link,
+        "k": place(column.cause) if column.quantity in MOTION else column.cause,
+    }
 
 
 def _joints(result: AnalysisResult) -> list[dict[str, str]]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_quantities import PASSIVE, QUANTITIES
+from linkwise.analysis.result_quantities import MOTION, PASSIVE, QUANTITIES
 from linkwise.analysis.show.drawn_curves import DrawnCurves, drawn_curves, piece_size
 from linkwise.analysis.show.induced_figure import numbers_of_curves
 from linkwise.extras import extra
@@ -33,7 +33,6 @@ def encoded(values: Array, kind: str = "<f8") -> str:
 
 PIECES, POINTS = 750, 1_000_000
 """Most pieces of a long curve, and most points of all curves together; a point takes five bytes."""
-MOTION = ("tau_qdd", "tau_qd")
 KINDS = {"tau": ("whole",), "tau_link": ("whole",), **{name: (name, "motion") for name in MOTION}}
 KINDS |= {name: (name,) for name in ("tau_gravity", *PASSIVE, "tau_load")}
 """Kinds of the curves in which a quantity counts."""

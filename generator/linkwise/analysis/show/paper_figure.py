@@ -5,8 +5,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_rows import load_unit
-from linkwise.analysis.show.drawn_curves import drawn_curves, foot, new_figure, write_note
+from linkwise.analysis.show.drawn_curves import (
+    drawn_curves,
+    foot,
+    new_figure,
+    time_axis,
+    write_note,
+    zero_line,
+)
 from linkwise.extras import extra
 from linkwise.plotstyle import colour, dash, drawn
 
@@ -41,8 +47,7 @@ def paper(result: AnalysisResult, i: int) -> "Figure":
         axis.tick_params(labelbottom=False)
     for axis, panel in zip(axes, panels, strict=True):
         _draw(axis, result, panel)
-    axes[-1].set_xlabel("time (s)")
-    axes[-1].set_xlim(result.time[0], result.time[-1])
+    time_axis(axes[-1], result)
     figure.align_ylabels(axes)
     for row, (title, names) in enumerate(named, len(panels)):
         _legend(figure.add_subplot(grid[row]), title, names)
@@ -54,8 +59,8 @@ def paper(result: AnalysisResult, i: int) -> "Figure":
 def _panels(result: AnalysisResult, i: int) -> tuple[_Panel, ...]:
     robot = result.robot
     units = " or ".join(dict.fromkeys(robot.units))
-    loads = " or ".join(dict.fromkeys(map(load_unit, robot.units)))
-    on = f"on {drawn(robot.joints[i])} ({load_unit(robot.units[i])})"
+    loads = " or ".join(dict.fromkeys(robot.torque_units))
+    on = f"on {drawn(robot.joints[i])} ({robot.torque_units[i]})"
     rows, number = result.rows, i + 1
 
     def lines(name: str, axis: str, first: int = 0, **where: int) -> list[tuple[int, int]]:
@@ -103,7 +108,7 @@ def _draw(axis: Any, result: AnalysisResult, panel: _Panel) -> None:
     found = drawn_curves(result, lambda part: part.values[[row for row, _ in panel.lines]])
     for (_, at), time, values in zip(panel.lines, found.time, found.values, strict=True):
         axis.plot(time, values, **_style(at))
-    axis.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
+    zero_line(axis)
     axis.set_title(panel.title)
     axis.set_ylabel(panel.symbol, fontsize=11, parse_math=True)
 

@@ -4,16 +4,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.result import AnalysisResult, Work
 from linkwise.analysis.show.drawn_curves import (
     drawn_curves,
     foot,
     largest_few,
     new_figure,
+    time_axis,
     write_note,
     write_title,
+    zero_line,
 )
-from linkwise.analysis.work import Work
 from linkwise.package.load import Array
 from linkwise.plotstyle import INK, colour, dash, drawn, tone
 
@@ -63,11 +64,10 @@ def _curves(panel: Any, result: AnalysisResult, joints: list[str]) -> None:
     for at, i in enumerate(rest):
         label = f"{len(rest)} others" if at == 0 else None
         panel.plot(found.time[i], found.values[i], label=label, color=REST, linewidth=0.7, zorder=1.5)
-    panel.axhline(0, color="#9AA3AF", linewidth=0.6, zorder=0)
+    zero_line(panel)
     panel.set_title("Power of each joint")
     panel.set_ylabel("W")
-    panel.set_xlabel("time (s)")
-    panel.set_xlim(result.time[0], result.time[-1])
+    time_axis(panel, result)
     _legend(panel, "joint")
 
 

@@ -1,93 +1,49 @@
-"""Files of loads: columns such as BODY/force_x in a log, and OpenSim's ExternalLoads.
+"""OpenSim's ExternalLoads: which columns of a storage file are forces on which body, and in whose axes.
 
-The latter says which columns of a storage file are forces on which body, and in whose axes.
+A misspelt name would silently move or remove a force, so that names close to known ones are refused.
 """
 
-import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import zip_longest
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from linkwise_runtime.chosen_names import end_of_path, nearest_first
+from linkwise_runtime.chosen_names import nearest_first
 
-from linkwise.analysis.body_names import named_body
-from linkwise.analysis.column_matching import time_column, with_nearest
-from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.given_loads import FORCE, MOMENT, POINT, WORLD
+from linkwise.analysis.column_matching import time_column
+from linkwise.analysis.loads import WORLD, LoadColumns
 from linkwise.analysis.logs import open_log
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
+from linkwise.robot.notes import effects
+from linkwise.robot.readers.osim.document import yes
+from linkwise.robot.readers.xml_file import parse
+from linkwise.robot.readers.xml_names import Known, ignored, names
 
-PARTS = {"force": FORCE, "moment": MOMENT, "point": POINT}
-NAMED = re.compile(r"(?P<load>.+)/(?P<part>force|moment|point)_(?P<axis>[xyz])")
-
-
-@dataclass(frozen=True)
-class LoadColumns:
-    """A load in a log: numbers of its time column, and of its three columns of force, moment and point."""
-
-    name: str
-    body: str
-    log: Path
-    time: int
-    columns: dict[str, tuple[int, ...]]
-    axes: str = WORLD
-    point_in: str | None = None
-    """None for the loaded body; a force without a point acts at its origin."""
-    warnings: tuple[str, ...] = ()
-    """Warnings about the file that describes the load; each names the file."""
-
-
-def load_columns(
-    log: Path, columns: Sequence[str], robot: LoadedRobot, ignore_extra: bool
-) -> tuple[LoadColumns, ...]:
-    """Return the loads of a log, all in the world's axes; raise LinkwiseError for columns that form none."""
-    time = time_column(columns, Reading())
-    found: dict[str, dict[str, dict[str, int]]] = {}
-    extra = []
-    for at, column in enumerate(columns):
-        match = NAMED.fullmatch(column)
-        if match:
-            found.setdefault(match["load"], {}).setdefault(match["part"], {})[match["axis"]] = at
-        elif at != time:
-            extra.append(column)
-    if not found:
-        raise LinkwiseError(
-            f"no column of a load in {listed(map(repr, columns))}; name them BODY/force_x, BODY/force_y, …,"
-            " or give OpenSim's XML of external loads"
-        )
-    if extra and not ignore_extra:
-        raise LinkwiseError(
-            f"no load for column {listed(map(repr, extra))}; name columns BODY/force_x, BODY/moment_x or"
-            " BODY/point_x, or leave such columns out with --ignore-extra"
-        )
-    return tuple(_load(log, time, load, parts, robot, columns) for load, parts in found.items())
-
-
-def _load(
-    log: Path,
-    time: int,
-    load: str,
-    parts: dict[str, dict[str, int]],
-    robot: LoadedRobot,
-    there: Sequence[str],
-) -> LoadColumns:
-    name, body = named_body(load, robot)
-    missing = [f"{load}/{part}_{axis}" for part, axes in parts.items() for axis in "xyz" if axis not in axes]
-    if missing:
-        raise LinkwiseError(f"no column {with_nearest(missing, there)}; a load has x, y and z of what it has")
-    if not {"force", "moment"} & set(parts):
-        raise LinkwiseError(f"load {load!r} has a point and neither force nor moment; add {load}/force_x, …")
-    columns = {part: tuple(parts[part][axis] for axis in "xyz") for part in parts}
-    return LoadColumns(
-        name or end_of_path(body), body, log, time, columns, point_in=WORLD if "point" in parts else None
-    )
-
-
+NAME = names("name")
+OF_TAG = {
+    "OpenSimDocument": Known(once=names("ExternalLoads"), attributes=names("Version")),
+    "ExternalLoads": Known(
+        once=names("objects datafile"),
+        attributes=NAME,
+        idle=names(
+            "defaults groups data_source_name external_loads_model_kinematics_file_name "
+            "lowpass_cutoff_frequency_for_load_kinematics"
+        ),
+    ),
+    "objects": Known(many=names("ExternalForce")),
+    "ExternalForce": Known(
+        once=names(
+            "applied_to_body force_expressed_in_body point_expressed_in_body force_identifier "
+            "point_identifier torque_identifier data_source_name isDisabled appliesForce"
+        ),
+        attributes=NAME,
+    ),
+}
+"""Names read in each element; no force here depends on the model's kinematics, which are the log's."""
 GROUND = "ground"
 LOADS_TAG, FORCE_TAG = "ExternalLoads", "ExternalForce"
 """Names of elements; an element inside <defaults> is no load."""
@@ -127,16 +83,12 @@ def data_files(path: Path) -> tuple[Path, ...]:
 
 def _forces(path: Path) -> tuple[list[tuple[Element, Path]], list[str]]:
     """Return the forces that are on, each with its data file, and notes on what is left out."""
-    # Imported here, as the readers need SymPy, which other loads can do without.
-    from linkwise.analysis.loads.external_names import unread_names
-    from linkwise.robot.readers.osim.document import yes
-    from linkwise.robot.readers.xml_file import parse
-
     require_file(path)
     root = parse(path)
     loads = root if root.tag == LOADS_TAG else root.find(LOADS_TAG)
     there = [] if loads is None else loads.findall(f"objects/{FORCE_TAG}")
-    told = list(unread_names(root))
+    unread = ignored([root], lambda element: OF_TAG.get(str(element.tag)), "OpenSim's ExternalLoads")
+    told = list(effects(unread))
     # Files of OpenSim 3 say isDisabled, those of 4 appliesForce.
     is_on = [yes(force, "appliesForce", True) and not yes(force, "isDisabled") for force in there]
     forces = [force for force, on in zip(there, is_on, strict=True) if on]

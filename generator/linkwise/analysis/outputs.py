@@ -1,4 +1,4 @@
-"""Results on disk: tables written block by block, Parquet or CSV, and the record of all else."""
+"""A result as others read it: Parquet or CSV, the record, xarray's Dataset, the table of a notebook."""
 
 import csv
 from collections.abc import Callable, Iterator, Sequence
@@ -7,12 +7,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+from linkwise_runtime.html_tables import page_part, remark, table
+from linkwise_runtime.named_arrays import Part, dataset
+from linkwise_runtime.version import VERSION
+
 from linkwise.analysis.closed_motion import ClosedLog
-from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_quantities import MEANING
+from linkwise.analysis.joint_causes import are_motions_whole, causes_of, sizes
+from linkwise.analysis.result import AnalysisResult, Work
+from linkwise.analysis.result_quantities import QUANTITIES, WORKS
 from linkwise.analysis.result_rows import Column
 from linkwise.analysis.settings import choices
-from linkwise.analysis.work import Work
 from linkwise.extras import extra
 from linkwise.package.load import Array
 
@@ -49,7 +54,7 @@ def _metadata(column: Column) -> dict[str, str]:
     indices = {name: getattr(column, name) for name in ("joint", "link", "cause", "point", "row")}
     return {
         "unit": column.unit,
-        "meaning": MEANING[column.quantity],
+        "meaning": QUANTITIES[column.quantity].meaning,
         **{name: str(at) for name, at in indices.items() if at is not None},
     }
 
@@ -88,7 +93,7 @@ def record(result: AnalysisResult) -> dict[str, Any]:
             {
                 "name": column.name,
                 "unit": column.unit,
-                "meaning": MEANING[column.quantity],
+                "meaning": QUANTITIES[column.quantity].meaning,
                 "mean_magnitude": float(mean),
                 "peak_magnitude": float(peak),
             }
@@ -146,3 +151,76 @@ def _fed(result: AnalysisResult, entry: Callable[..., dict[str, float]]) -> dict
         for j, link in enumerate(links)
     ]
     return {"of_contacts": fed}
+
+
+def named_result(result: AnalysisResult) -> Any:
+    """Return the Dataset of `Analysis.to_xarray`."""
+    extra("xarray")
+    arrays = {one.array.name for name, one in QUANTITIES.items() if name in result.rows and name != "time"}
+    parts: list[Part] = [
+        (one.array, _values(result, name)) for name, one in QUANTITIES.items() if one.array.name in arrays
+    ]
+    about = {
+        "robot": result.robot.name,
+        "log": result.source,
+        "backend": result.robot.backend,
+        "convention": result.processing.convention,
+        "rate_hz": result.rate,
+        "provenance": result.provenance,
+        "linkwise": VERSION,
+    }
+    found = dataset(parts, result.rows.axes, ["time"], {"time": ("time", result.time, {"units": "s"})}, about)
+    return found.merge(dataset(list(_works(result)), result.rows.axes, [], {}, {}))
+
+
+def _works(result: AnalysisResult) -> Iterator[Part]:
+    """Yield the work that was given and the work that was taken back, over the whole movement."""
+    for name, quantity in WORKS.items():
+        if all(result.rows.axes[axis].names for axis in quantity.axes):
+            for way in ("given", "taken"):
+                yield quantity._replace(beside=("way", way)), getattr(getattr(result, name), way)
+
+
+def _values(result: AnalysisResult, name: str) -> Array:
+    """Return a quantity as one array, zeros where it has no row, NaN for components that a point lacks."""
+    out = result.dense(name)
+    if "point" in QUANTITIES[name].axes:
+        components = result.rows.axes["component"].names
+        for number, point in enumerate(result.rows.points):
+            out[:, number, [at for at, row in enumerate(components) if row not in point.rows]] = np.nan
+    return out
+
+
+HEAD = ("joint", "peak |τ|", "mean |τ|", "largest cause", "its share", "gave", "took back")
+
+
+def result_table(result: AnalysisResult) -> str:
+    """Return the HTML of a result; peaks, means, shares and work are over all samples of the movement.
+
+    Causes and shares are those of `--figure shares`.
+    """
+    joints, torques = result.robot.joints, result.rows["tau"].rows
+    mean, peak = result.totals.mean[torques], result.totals.peak[torques]
+    causes = causes_of(result, joints, together=are_motions_whole(result))
+    rows = []
+    for at, (i, loading) in enumerate(zip(result.robot.driven, sizes(result, causes).T, strict=True)):
+        unit = result.robot.torque_units[i]
+        most, whole = int(loading.argmax()), float(loading.sum())
+        rows.append(
+            (
+                joints[i],
+                f"{peak[at]:.4g} {unit}",
+                f"{mean[at]:.4g} {unit}",
+                causes[most].label if whole else "",
+                f"{100 * loading[most] / whole:.0f} %" if whole else "",
+                *_told(result.joint_work, i),
+            )
+        )
+    title = f"{result.robot.name}: who loads whom in {result.source}"
+    warnings = (*result.warnings, *result.load_warnings)
+    return page_part(title, table(HEAD, rows)) + remark(result.provenance, *warnings)
+
+
+def _told(work: Work, joint: int) -> tuple[str, str]:
+    """Return the work that a joint gave and the work that it took back, as text in J."""
+    return f"{work.given[joint]:.4g} J", f"{work.taken[joint]:.4g} J"
