@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.contacts.contact_times import ContactTimes
-from linkwise.analysis.contacts.ground_contacts import Standing
+from linkwise.analysis.contacts.ground import Standing
+from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.placed_load import PlacedLoad
+from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.result_quantities import FORCE_OF, PASSIVE
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.package.load import Array

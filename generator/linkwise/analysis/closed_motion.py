@@ -45,18 +45,22 @@ class ClosedLog:
 def closed_samples(
     samples: Samples,
     there: Sequence[int],
-    model: ConstrainedModel,
+    model: ConstrainedModel | None,
     tolerance: float,
     progress: Progress,
     buffer: Path | None = None,
-) -> tuple[Samples, ClosedLog]:
+) -> tuple[Samples, ClosedLog | None]:
     """Return samples of all joints, and the largest violation by the log's own positions.
+
+    Without a model no joints are tied: samples are returned as they are, and None.
 
     samples: those of the joints with the numbers `there`, which the log has
 
     Raises LinkwiseError, with the time, where ties cannot be closed or the log is off by more than the
     tolerance, in m and rad.
     """
+    if model is None:
+        return samples, None
     n, missing = len(model.joint_names), [k for k in range(len(model.joint_names)) if k not in there]
     worst = ClosedLog(None if missing else 0.0)
 

@@ -27,7 +27,7 @@ from typing import Any, cast
 import numpy as np
 from linkwise_runtime.motion.induced_accelerations import Response, response_of
 
-from linkwise.analysis.contacts.ground_contacts import Standing
+from linkwise.analysis.contacts.ground import Standing
 from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.result_quantities import LOSSES, PASSIVE

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples
 from linkwise.analysis.column_matching import with_columns
 from linkwise.analysis.contacts import Contacts
-from linkwise.analysis.contacts.contact_times import contact_times, switch_columns
+from linkwise.analysis.contacts.times import contact_times, switch_columns
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.induced_points import induced_points
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads import Loads
-from linkwise.analysis.loads.read_loads import placed_loads
+from linkwise.analysis.loads.read import placed_loads
 from linkwise.analysis.logs import Log, open_log
 from linkwise.analysis.outputs import Format, named_result, record, result_table
 from linkwise.analysis.phases import Phase, PlacedPhase, phase_columns, placed_phases
@@ -250,13 +250,10 @@ def _samples(
 
     switches: columns of the log that say when contacts are on
     """
-    tied = () if robot.constrained is None else robot.constrained.constraints.dependent
     with within(str(log.path)):
-        there = with_columns(log.columns, robot.joints, tied, reading)
+        there = with_columns(log.columns, robot.joints, robot.dependent_joints, reading)
     names, units = (tuple(given[k] for k in there) for given in (robot.joints, robot.units_in_logs))
     reach = [robot.reach[k] for k in there]
     samples = read_samples(log, names, units, reading, progress, buffer, switches, reach, robot.followers)
-    if robot.constrained is None:
-        return samples, None
     with within(str(log.path)):
         return closed_samples(samples, there, robot.constrained, reading.loop_tolerance, progress, buffer)

@@ -18,7 +18,7 @@ from linkwise_runtime.qpos_motion import Qpos
 from linkwise_runtime.rule.joint_tree import TreeFrame
 
 from linkwise.analysis.constrained_model import ConstrainedModel
-from linkwise.analysis.contacts.ground_contacts import GroundContacts
+from linkwise.analysis.contacts.ground import GroundContacts
 from linkwise.analysis.samples import FollowingJoint
 from linkwise.analysis.settings import Payload
 from linkwise.errors import LinkwiseError
@@ -126,6 +126,11 @@ class LoadedRobot:
     def driven_joints(self) -> tuple[str, ...]:
         """Names of the joints that have torques."""
         return tuple(self.joints[i] for i in self.driven)
+
+    @property
+    def dependent_joints(self) -> tuple[str, ...]:
+        """Names of the joints that follow others, and have no torque; none where joints are free."""
+        return () if self.constrained is None else tuple(self.constrained.constraints.dependent)
 
     @property
     def plot_joints(self) -> tuple[str, ...]:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwise.analysis.contacts import THRESHOLD, WhileColumn
-from linkwise.analysis.contacts.contact_times import Switch, read_switch
+from linkwise.analysis.contacts.times import Switch, read_switch
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.placed_load import PlacedLoad, model_pose
+from linkwise.analysis.loads.placed import PlacedLoad, model_pose
 from linkwise.analysis.logs import Log
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError

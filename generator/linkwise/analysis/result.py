@@ -8,10 +8,10 @@ import numpy as np
 from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.analysis.closed_motion import ClosedLog
-from linkwise.analysis.contacts.contact_times import ContactTimes
+from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.placed_load import PlacedLoad
+from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result_rows import Column, ResultRows
 from linkwise.analysis.settings import Processing, Reading

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.loaded_robot import LoadedRobot, load_unit
-from linkwise.analysis.loads.placed_load import PlacedLoad
+from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.result_quantities import (
     FORCE_OF,
     PASSIVE,

@@ -8,7 +8,7 @@ from pathlib import Path
 from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.contacts import Contacts
-from linkwise.analysis.contacts.standing_robot import standing_on
+from linkwise.analysis.contacts.standing import standing_on
 from linkwise.analysis.disk_rows import EverySample
 from linkwise.analysis.job import Analysis, Request, Wanted, prepared
 from linkwise.analysis.loaded_robot import LoadedRobot, load_robot

@@ -24,7 +24,7 @@ from linkwise.analysis.column_matching import (
 from linkwise.analysis.disk_rows import collected, first_column
 from linkwise.analysis.even_time import TOLERANCE, even_rate, resampled
 from linkwise.analysis.logs import Log
-from linkwise.analysis.logs.log_checks import require_finite
+from linkwise.analysis.logs.checks import require_finite
 from linkwise.analysis.settings import Reading
 from linkwise.errors import within
 from linkwise.package.load import Array

@@ -8,12 +8,12 @@ import numpy as np
 
 from linkwise.analysis.borne_forces import BorneForces
 from linkwise.analysis.closed_motion import reason_of
-from linkwise.analysis.contacts.contact_times import ContactTimes
-from linkwise.analysis.contacts.ground_contacts import ContactTerms, Standing
+from linkwise.analysis.contacts.ground import ContactTerms, Standing
+from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.induced_shares import InducedShares
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.placed_load import PlacedLoad
+from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.result_quantities import PASSIVE, QUANTITIES, TERMS, TORQUE_OF
 from linkwise.analysis.result_rows import QuantityRows, ResultRows, torque_places
 from linkwise.analysis.settings import Convention

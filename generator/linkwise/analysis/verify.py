@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from linkwise_runtime.rule.joint_tree import TreeFrame
 
-from linkwise.analysis.contacts.ground_contacts import GroundContacts
+from linkwise.analysis.contacts.ground import GroundContacts
 from linkwise.analysis.loaded_robot import LoadedRobot
-from linkwise.analysis.loads.placed_load import PlacedLoad
+from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.errors import LinkwiseError
 from linkwise.oracle.contacts import contact_rows

@@ -13,7 +13,7 @@ from linkwise.analysis.column_matching import TIMES, with_columns, with_nearest
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.logs import open_log
-from linkwise.analysis.samples import Samples, read_samples
+from linkwise.analysis.samples import read_samples
 from linkwise.analysis.settings import Lowpass, Processing, Reading
 from linkwise.analysis.stream import span_of
 from linkwise.errors import LinkwiseError, within
@@ -75,7 +75,7 @@ def read_torque_log(
         columns = _torque_columns(log.columns, robot.joints, [robot.joints[i] for i in measured], torques)
         if not reading.ignore_extra:
             _refuse_more_torques(log.columns, robot, columns, measured)
-        moving = with_columns(log.columns, robot.joints, followers(robot), reading)
+        moving = with_columns(log.columns, robot.joints, robot.dependent_joints, reading)
     names = tuple(f"torque of {robot.joints[i]}" for i in measured)
     mapping = (*reading.pairs, *zip(columns, names, strict=True))
     samples = read_samples(
@@ -89,9 +89,9 @@ def read_torque_log(
     )
     torque = samples.q[:, len(moving) :] * factor
     with within(str(path)):
-        q, closed = _positions(
-            replace(samples, q=samples.q[:, : len(moving)]), moving, robot, reading, progress
-        )
+        moved = replace(samples, q=samples.q[:, : len(moving)])
+        found, closed = closed_samples(moved, moving, robot.constrained, reading.loop_tolerance, progress)
+        q = found.q.copy()
         noise = position_noise(q)
         _refuse_endless(q, robot.joints, "position")
         _refuse_endless(torque, [robot.joints[i] for i in measured], "torque")
@@ -104,32 +104,13 @@ def read_torque_log(
     return TorqueLog(path.name, samples.rate, q, noise, measured, torque, start, stop, *told, closed)
 
 
-def followers(robot: LoadedRobot) -> tuple[str, ...]:
-    """Return the joints that follow others, and have no torque; () where joints are free."""
-    return () if robot.constrained is None else tuple(robot.constrained.constraints.dependent)
-
-
-def _positions(
-    samples: Samples, moving: Sequence[int], robot: LoadedRobot, reading: Reading, progress: Progress
-) -> tuple[Array, ClosedLog | None]:
-    """Return positions of all joints, from those of `moving`.
-
-    Tied joints get positions in which ties close.
-    """
-    if robot.constrained is None:
-        return samples.q.copy(), None
-    told = reading.loop_tolerance
-    found, closed = closed_samples(samples, moving, robot.constrained, told, progress)
-    return found.q.copy(), closed
-
-
 def _measured(
     robot: LoadedRobot, torques: Sequence[tuple[str, str]], unmeasured: Sequence[str]
 ) -> tuple[int, ...]:
     """Return the joints that must have a torque, from 0; raise LinkwiseError for impossible choices."""
     joints = robot.driven_joints
     for joint in (*unmeasured, *(joint for _, joint in torques)):
-        if joint in followers(robot):
+        if joint in robot.dependent_joints:
             raise LinkwiseError(
                 f"{joint} follows {listed(map(repr, joints))} and gives no torque; leave it out, or generate"
                 " the robot with --independent and other joints"

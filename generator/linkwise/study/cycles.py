@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.job import Job
-from linkwise.analysis.logs.log_checks import named_once
+from linkwise.analysis.logs.checks import named_once
 from linkwise.errors import LinkwiseError, within
 from linkwise.extras import extra
 from linkwise.package.load import Array

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from linkwise.analysis.loads.external_loads import data_files
+from linkwise.analysis.loads.external import data_files
 from linkwise.errors import LinkwiseError
 from linkwise.generator_fingerprint import fingerprint
 from linkwise.package.manifest import FILE

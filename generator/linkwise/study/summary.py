@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from linkwise.analysis.logs.log_checks import read_as
+from linkwise.analysis.logs.checks import read_as
 from linkwise.package.load import Array
 from linkwise.study.ledger import CURVES, SUMMARY
 from linkwise.study.paths import require_own

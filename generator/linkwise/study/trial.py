@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from linkwise.analysis.contacts.standing_robot import standing_on
+from linkwise.analysis.contacts.standing import standing_on
 from linkwise.analysis.disk_rows import EverySample
 from linkwise.analysis.job import Job, prepared
 from linkwise.analysis.payload import carrying

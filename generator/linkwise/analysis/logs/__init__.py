@@ -9,7 +9,7 @@ from linkwise_runtime.file_joints import FileJoint
 from linkwise.analysis.logs.array_files import Hdf5Arrays, NpzArrays
 from linkwise.analysis.logs.array_log import ArrayFile, ArrayLog, QposLog, QposOf
 from linkwise.analysis.logs.bag import BagLog
-from linkwise.analysis.logs.log_checks import named_once
+from linkwise.analysis.logs.checks import named_once
 from linkwise.analysis.logs.parquet import ParquetLog
 from linkwise.analysis.logs.text import open_delimited, open_storage
 from linkwise.analysis.settings import Reading

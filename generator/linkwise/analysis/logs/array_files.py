@@ -12,7 +12,7 @@ from typing import IO, Any
 import numpy as np
 
 from linkwise.analysis.logs.array_columns import NAMES, NUMBERS, StoredArray, names_joints
-from linkwise.analysis.logs.log_checks import named_once, read_as, require_held
+from linkwise.analysis.logs.checks import named_once, read_as, require_held
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import short
 from linkwise.extras import extra

@@ -25,7 +25,7 @@ from linkwise.analysis.logs.array_columns import (
     names_beside,
     word_of,
 )
-from linkwise.analysis.logs.log_checks import named_once, require_finite, require_held
+from linkwise.analysis.logs.checks import named_once, require_finite, require_held
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.logs.log_checks import named_once, read_as
+from linkwise.analysis.logs.checks import named_once, read_as
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed, short
 from linkwise.extras import extra

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.logs.log_checks import require_held
+from linkwise.analysis.logs.checks import require_held
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import one_line
 from linkwise.extras import extra

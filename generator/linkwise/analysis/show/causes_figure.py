@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwise.analysis.joint_causes import Cause, causes_of, curves
-from linkwise.analysis.loads.placed_load import moving_joints
+from linkwise.analysis.loads.placed import moving_joints
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.drawn_curves import (

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from linkwise.analysis.joint_causes import are_motions_whole
-from linkwise.analysis.loads.placed_load import model_pose
+from linkwise.analysis.loads.placed import model_pose
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import FORCES, GROUND, INDUCED, MOTION, TORQUE_OF
 from linkwise.analysis.result_rows import Column, ResultRows

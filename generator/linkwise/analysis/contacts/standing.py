@@ -10,9 +10,9 @@ from linkwise_runtime.constraints.independent_joints import loose_base
 from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.contacts import Contacts
-from linkwise.analysis.contacts.ground_contacts import GroundContacts
+from linkwise.analysis.contacts.ground import GroundContacts
 from linkwise.analysis.loaded_robot import LoadedRobot, body_frame
-from linkwise.analysis.loads.placed_load import moving_joints
+from linkwise.analysis.loads.placed import moving_joints
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 

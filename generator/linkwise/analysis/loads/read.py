@@ -14,7 +14,7 @@ from linkwise.analysis.even_time import even_rate, usual_step
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loaded_robot import LoadedRobot, named_body, told_apart
 from linkwise.analysis.loads import FORCE, MOMENT, PARTS, POINT, WIDTH, WORLD, Load, LoadColumns, Loads
-from linkwise.analysis.loads.placed_load import PlacedLoad, Seat, seat_of
+from linkwise.analysis.loads.placed import PlacedLoad, Seat, seat_of
 from linkwise.analysis.logs import open_log
 from linkwise.analysis.samples import finite_blocks, slowness
 from linkwise.analysis.settings import Lowpass, Reading
@@ -52,7 +52,7 @@ def placed_loads(
 def _listed(path: Path, robot: LoadedRobot, ignore_extra: bool) -> tuple[LoadColumns, ...]:
     if path.suffix.lower() == ".xml":
         # Imported here, as the readers need SymPy, which other loads can do without.
-        from linkwise.analysis.loads.external_loads import external_loads
+        from linkwise.analysis.loads.external import external_loads
 
         return external_loads(path)
     log = open_log(path)

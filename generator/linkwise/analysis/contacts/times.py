@@ -15,8 +15,8 @@ from linkwise.analysis.contacts import Contacts, WhileColumn
 from linkwise.analysis.disk_rows import collected
 from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads import FORCE
-from linkwise.analysis.loads.placed_load import PlacedLoad, Wrench, model_pose
-from linkwise.analysis.loads.read_loads import placed_loads
+from linkwise.analysis.loads.placed import PlacedLoad, Wrench, model_pose
+from linkwise.analysis.loads.read import placed_loads
 from linkwise.analysis.logs import Log
 from linkwise.analysis.samples import finite_blocks
 from linkwise.analysis.settings import Reading
