@@ -160,10 +160,12 @@ class Job:
 
         values: all samples, (rows, S)
         """
-        warnings = (*self.samples.warnings, *self._twice_borne(), *self._near_poles(), *self._never_on(done))
+        robot = self.decomposer.robot
+        poles = pole_warnings(robot.bodies, robot.joints, self.samples)
+        warnings = (*self.samples.warnings, *self._twice_borne(), *poles, *self._never_on(done))
         return Analysis(
             **vars(done),
-            robot=self.decomposer.robot,
+            robot=robot,
             reading=self.asked.reading,
             processing=self.asked.processing,
             source=self.source,
@@ -178,11 +180,6 @@ class Job:
             times=self.decomposer.times,
             phases=self.phases,
         )
-
-    def _near_poles(self) -> Iterator[str]:
-        """Yield warnings about turns that the log brings near a pole."""
-        robot = self.decomposer.robot
-        return pole_warnings(robot.bodies, robot.joints, self.samples)
 
     def _never_on(self, done: WholeMovement) -> Iterator[str]:
         """Yield warnings about contacts that are off throughout."""

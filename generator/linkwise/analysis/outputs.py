@@ -15,7 +15,7 @@ from linkwise_runtime.version import VERSION
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.joint_causes import are_motions_whole, causes_of, sizes
 from linkwise.analysis.result import AnalysisResult, Work
-from linkwise.analysis.result_quantities import QUANTITIES, WORKS
+from linkwise.analysis.result_quantities import POWER_OF, QUANTITIES, WORKS, ResultQuantity
 from linkwise.analysis.result_rows import Column
 from linkwise.analysis.settings import choices
 from linkwise.extras import extra
@@ -116,41 +116,38 @@ def _contacts(result: AnalysisResult) -> dict[str, Any]:
     return record
 
 
+WORK_KEYS = {
+    "joint_work": "of_joints",
+    "work": "into_links",
+    "load_work": "against_loads",
+    "contact_work": "of_contacts",
+}
+
+
 def _work(result: AnalysisResult) -> dict[str, Any]:
     """Return the work in J of each joint in all, into each link that it moves, and against each load.
 
     Work of contacts is added where there are any.
     """
-    joints, links = result.robot.joints, result.robot.links
-
-    def entry(work: Work, *at: int) -> dict[str, float]:
-        given, taken = float(work.given[at]), float(work.taken[at])
-        return {"given": given, "taken_back": taken, "net": given - taken}
-
-    borne, pairs = (result.rows[name].at.tolist() for name in ("power_load", "power_link"))
-    return {
-        "unit": "J",
-        "of_joints": [{"joint": name, **entry(result.joint_work, i)} for i, name in enumerate(joints)],
-        "into_links": [{"joint": joints[i], "link": links[j], **entry(result.work, i, j)} for i, j in pairs],
-        "against_loads": [
-            {"joint": joints[i], "load": result.loads[e].name, **entry(result.load_work, i, e)}
-            for i, e in borne
-        ],
-        **_fed(result, entry),
-    }
+    found: dict[str, Any] = {"unit": "J"}
+    for name, key in WORK_KEYS.items():
+        if name == "contact_work" and result.robot.contacts is None:
+            continue
+        work, power = getattr(result, name), QUANTITIES[POWER_OF[name]]
+        places = result.rows[power.name].at.tolist()
+        if name == "joint_work":  # joints that follow others too, whose work is none
+            places = [[i] for i in range(len(result.robot.joints))]
+        found[key] = [_entry(result, work, power, tuple(at)) for at in places]
+    return found
 
 
-def _fed(result: AnalysisResult, entry: Callable[..., dict[str, float]]) -> dict[str, Any]:
-    """Return the work of contacts that slip, where there are any."""
-    ground, links = result.robot.contacts, result.robot.links
-    if ground is None:
-        return {}
-    fed = [
-        {"contact": name, "link": link, **entry(result.contact_work, j, c)}
-        for c, name in enumerate(ground.names)
-        for j, link in enumerate(links)
-    ]
-    return {"of_contacts": fed}
+def _entry(
+    result: AnalysisResult, work: Work, power: ResultQuantity, at: tuple[int, ...]
+) -> dict[str, str | float]:
+    """Return a work by the names along the axes of its power."""
+    index, (given, taken) = dict(zip(power.axes, at, strict=True)), (work.given[at], work.taken[at])
+    names = {axis: result.rows.axes[axis].names[index[axis]] for axis in power.written_axes}
+    return {**names, "given": float(given), "taken_back": float(taken), "net": float(given - taken)}
 
 
 def named_result(result: AnalysisResult) -> Any:

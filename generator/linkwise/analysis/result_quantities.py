@@ -185,21 +185,16 @@ QUANTITIES: Mapping[str, ResultQuantity] = {
 """All quantities by name, in the order of a Dataset."""
 INDUCED = tuple(name for name in QUANTITIES if name.partition("_")[0] == "acc")
 """An acceleration, and its shares by source."""
-POWER_OF = {
-    "work": "power_link",
-    "joint_work": "power",
-    "load_work": "power_load",
-    "contact_work": "power_contact",
+OVER_MOVEMENT = {
+    "work": ("power_link", "what the joint gave to the link, and took back"),
+    "joint_work": ("power", "what the joint gave to all links together, and took back"),
+    "load_work": ("power_load", "what the joint gave against the load, and took back"),
+    "contact_work": ("power_contact", "what the contact fed into the link, and took back"),
 }
+POWER_OF = {name: power for name, (power, _) in OVER_MOVEMENT.items()}
 """The power that a work over the whole movement is the integral of, by the result's own names."""
-_GIVEN = (
-    "what the joint gave to the link, and took back",
-    "what the joint gave to all links together, and took back",
-    "what the joint gave against the load, and took back",
-    "what the contact fed into the link, and took back",
-)
 WORKS: Mapping[str, Quantity] = {
     name: Quantity(name, QUANTITIES[power].axes, "J", meaning)
-    for (name, power), meaning in zip(POWER_OF.items(), _GIVEN, strict=True)
+    for name, (power, meaning) in OVER_MOVEMENT.items()
 }
 """Work over the whole movement."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import reduce
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from linkwise_runtime.rule.joint_tree import TreeFrame
@@ -164,7 +164,7 @@ def _borne(
         torque[:, list(robot.driven)] = projected
     if robot.contacts is None or tree is None:
         return torque, torque
-    return torque, ContactReference(recursion, tree, robot.contacts).left(torque, q, shares, mapped)
+    return torque, _left(recursion, tree, robot.contacts, torque, q, shares, mapped)
 
 
 def _largest_sum(torque: Array, joints: list[int]) -> float:
@@ -203,38 +203,34 @@ RANK = 1e-11
 """Eigenvalues of B w B^T below this part of the largest are zero."""
 
 
-class ContactReference(NamedTuple):
-    """Contacts of a tree whose frames move as the recursion computes."""
+def _left(
+    recursion: NewtonEuler,
+    tree: RigidTree,
+    ground: GroundContacts,
+    torque: Array,
+    q: Array,
+    shares: Array,
+    mapped: Array | None,
+) -> Array:
+    """Return what contacts with shares (S, contacts) leave of torques (S, n, X).
 
-    recursion: NewtonEuler
-    tree: RigidTree
-    contacts: GroundContacts
-
-    def left(self, torque: Array, q: Array, shares: Array, mapped: Array | None) -> Array:
-        """Return what contacts with shares (S, contacts) leave of torques (S, n, X), of that shape.
-
-        mapped: G (S, n, m) from the m joints that do not follow others, at whose indices the torques stand to
-        all joints; None if no joint follows
-        """
-        frames = {frame.name: frame for frame in self.tree.frames}
-        each = [
-            contact_rows(self.recursion, frames[str(contact.frame)], contact, q)
-            for contact in self.contacts.contacts
-        ]
-        weights = np.concatenate(
-            [np.repeat(shares[:, [c]], one.shape[1], 1) for c, one in enumerate(each)], 1
-        )
-        rows = np.concatenate(each, axis=1) * (weights > 0.0)[..., None]
-        if mapped is not None:
-            assert self.contacts.tied is not None
-            own = list(self.contacts.tied.following.independent)
-            projected = np.zeros_like(rows)
-            projected[..., own] = rows @ mapped
-            rows = projected
-        base = list(self.contacts.unactuated)
-        forces = _least(np.swapaxes(rows[..., base], 1, 2), weights, torque[:, base])
-        left: Array = torque - np.swapaxes(rows, 1, 2) @ forces
-        return left
+    mapped: G (S, n, m) from the m joints that do not follow others, at whose indices the torques stand to
+    all joints; None if no joint follows
+    """
+    frames = {frame.name: frame for frame in tree.frames}
+    each = [contact_rows(recursion, frames[str(one.frame)], one, q) for one in ground.contacts]
+    weights = np.concatenate([np.repeat(shares[:, [c]], one.shape[1], 1) for c, one in enumerate(each)], 1)
+    rows = np.concatenate(each, axis=1) * (weights > 0.0)[..., None]
+    if mapped is not None:
+        assert ground.tied is not None
+        own = list(ground.tied.following.independent)
+        projected = np.zeros_like(rows)
+        projected[..., own] = rows @ mapped
+        rows = projected
+    base = list(ground.unactuated)
+    forces = _least(np.swapaxes(rows[..., base], 1, 2), weights, torque[:, base])
+    left: Array = torque - np.swapaxes(rows, 1, 2) @ forces
+    return left
 
 
 def _least(equations: Array, weights: Array, torque: Array) -> Array:

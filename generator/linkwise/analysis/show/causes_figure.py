@@ -71,12 +71,9 @@ def require_samples(
     """
     empty = [phase.label for phase, count in zip(phases, counts, strict=True) if not count]
     if empty and result.phases:
-        raise LinkwiseError(f"--phase: {empty[0]} has no sample between {_span(result)}")
+        span = f"{result.time[0]:.4g} and {result.time[-1]:.4g} s"
+        raise LinkwiseError(f"--phase: {empty[0]} has no sample between {span}")
     return [ShownPhase("the whole movement")] if empty or not phases else phases
-
-
-def _span(result: AnalysisResult) -> str:
-    return f"{result.time[0]:.4g} and {result.time[-1]:.4g} s"
 
 
 def asked_phases(result: AnalysisResult, i: int) -> tuple[PlacedPhase, ...]:
@@ -156,7 +153,7 @@ def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
     every, tallies = _Tally(1 + len(causes)), [_Tally(1 + len(causes)) for _ in asked]
     peaks, apart = np.zeros(len(causes)), True
     for part in result.parts():
-        values = np.concatenate([torque_curve(part, i), curves(part, causes, i)])
+        values = np.concatenate([part.torque[:, [i]].T, curves(part, causes, i)])
         on = [phase.on(part) for phase in asked]
         np.maximum(peaks, np.abs(values[1:]).max(axis=1), out=peaks)
         apart &= not on or int(np.sum(on, axis=0).max()) <= 1
@@ -168,12 +165,6 @@ def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
     found = zip(shown, tallies if shown == asked else [every], strict=True)
     numbers = tuple(PhaseNumbers(phase, tally.mean(rows), tally.rms(rows)) for phase, tally in found)
     return CauseNumbers(labels, numbers, apart)
-
-
-def torque_curve(result: AnalysisResult, i: int) -> Array:
-    """Return the joint's torque, (1, S) in its unit."""
-    found: Array = result.torque[:, [i]].T
-    return found
 
 
 def _rows(causes: Sequence[Cause], every: _Tally, there: Array) -> tuple[tuple[str, ...], Array]:
@@ -229,7 +220,7 @@ def _over_time(panel: Any, result: AnalysisResult, i: int, numbers: CauseNumbers
     phases = [one.phase for one in numbers.phases]
 
     def curves(part: AnalysisResult) -> Any:
-        return np.concatenate([torque_curve(part, i), [phase.on(part) for phase in phases]])
+        return np.concatenate([part.torque[:, [i]].T, [phase.on(part) for phase in phases]])
 
     found = drawn_curves(result, curves)
     time = found.middle

@@ -1,7 +1,7 @@
 """`report.html`: the analysis as one file that needs no network."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -74,7 +74,7 @@ def page_data(result: AnalysisResult) -> str:
     robot = result.robot
     stride = stride_for(result.total, numbers_on_page(result.rows), NUMBERS, SAMPLES)
     instants = replace(result, values=at_instants(result, stride))
-    largest = _largest_forces(result)
+    force, pressed = _largest_forces(result)
     shown = [
         at
         for at, c in enumerate(result.columns)
@@ -102,9 +102,9 @@ def page_data(result: AnalysisResult) -> str:
         "potential": robot.potential,
         "gravityColour": GRAVITY,
         "bodies": _bodies(instants),
-        "largestForce": largest.force,
+        "largestForce": force,
         "loads": _loads(instants),
-        "reactions": _reactions(instants, largest.pressed),
+        "reactions": _reactions(instants, pressed),
         "induced": [_induced(result, point, stride > 1) for point in range(len(result.induced))],
     }
     return script_data(data)
@@ -170,26 +170,17 @@ def _loads(result: AnalysisResult) -> list[dict[str, str]]:
     ]
 
 
-@dataclass(frozen=True, eq=False)
-class _LargestForces:
-    """Largest forces over all samples, in N: of any load or contact, and upright of each contact."""
-
-    force: float
-    pressed: Array
-
-
-def _largest_forces(result: AnalysisResult) -> _LargestForces:
+def _largest_forces(result: AnalysisResult) -> tuple[float, Array]:
+    """Return the largest force of any load or contact, and upright of each contact, in N over all samples."""
     up, ground, pose = _upright(result), result.robot.contacts, model_pose(result.robot.model)
     force, pressed = 0.0, np.zeros(0 if ground is None else len(ground.names))
-    if not result.loads and ground is None:
-        return _LargestForces(force, pressed)
-    for part in result.parts():
+    for part in result.parts() if result.loads or ground is not None else ():
         borne = [load.wrench(part.time, part.q, pose).force for load in result.loads]
         forces = part.contact_wrench[..., 3:]
         every = np.concatenate([*(one[:, None] for one in borne), forces], axis=1)
         force = max(force, float(np.linalg.norm(every, axis=-1).max(initial=0.0)))
         np.maximum(pressed, np.abs(forces @ up).max(axis=0, initial=0.0), out=pressed)
-    return _LargestForces(force, pressed)
+    return force, pressed
 
 
 def _largest_power(result: AnalysisResult) -> float:
