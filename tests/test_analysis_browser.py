@@ -13,10 +13,10 @@ import pytest
 import urdf_text
 from linkwise import generate, read_system, write_package
 from linkwise.analysis import Contact, Contacts, Payload, analyze
-from linkwise.analysis.job import Request, Wanted
-from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.job import Outputs, Request
 from linkwise.analysis.loads import Load, Loads
-from linkwise.analysis.payload import carrying
+from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.result import Totals, Work
 from linkwise.analysis.result_rows import Column, ResultRows, torque_places
 from linkwise.analysis.run import analyze_to
@@ -142,9 +142,9 @@ def test_numbers_in_the_table_are_the_files(page, result):
 
 def test_what_accelerates_a_point_is_shown_by_source_and_adds_up(driver, tmp_path):
     log, robot = write_csv(tmp_path / "log.csv", smooth(300, 3)), load_robot(PLANAR3)
-    wanted = Wanted("csv", induced=("joints", "link3,0.25,0,0"))
+    wanted = Outputs("csv", induced=("joints", "link3,0.25,0,0"))
     loads = Loads.of([Load("pull", "link3", force=(0.0, -5.0, 0.0))], None)
-    result, _ = analyze_to(tmp_path / "out", log, robot, Request(wanted=wanted, loads=loads), silent)
+    result, _ = analyze_to(tmp_path / "out", log, robot, Request(outputs=wanted, loads=loads), silent)
     opened(driver, (tmp_path / "out" / "report.html").as_uri())
     curves = "return [...document.getElementById('induced').data].map((c) => [c.name, Array.from(c.y)])"
     choose(driver, "component", 1)
@@ -394,7 +394,7 @@ def test_loads_are_causes_and_arrows(driver, tmp_path):
         (Load("hand", "link3", push, point=(0.25, 0, 0), time=time), Load("rope", "link2", (0, 9, 0)))
     )
     write_package(generate(read_system("planar3"), ["numpy"]), tmp_path / "planar3")
-    robot = carrying(load_robot(tmp_path / "planar3"), (Payload("link3", 0.5, (0.25, 0, 0)),))
+    robot = with_payloads(load_robot(tmp_path / "planar3"), (Payload("link3", 0.5, (0.25, 0, 0)),))
     out = tmp_path / "out"
     result, _ = analyze_to(out, log, robot, Request(loads=loads), silent)
     opened(driver, (out / "report.html").as_uri())

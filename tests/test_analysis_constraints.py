@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from linkwise import LinkwiseError, Load, Payload, generate, identify, read_system, write_package
 from linkwise.analysis import Processing, Reading, analyze
-from linkwise.analysis.job import Request, Wanted
-from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.job import Outputs, Request
+from linkwise.analysis.opened_robot import load_robot
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.settings import Lowpass
 from linkwise.analysis.show.page import page_data
@@ -295,8 +295,8 @@ def test_a_motion_that_a_filter_carries_out_of_reach_is_refused(folder: Path, tm
 
 
 def test_page_table_and_record_have_the_joints_that_are_driven(folder: Path, tmp_path: Path) -> None:
-    robot, wanted = load_robot(folder / "robot"), Wanted("csv", ("paper", "shares", "power"))
-    result, files = analyze_to(tmp_path / "out", folder / "crank.csv", robot, Request(wanted=wanted), silent)
+    robot, wanted = load_robot(folder / "robot"), Outputs("csv", ("paper", "shares", "power"))
+    result, files = analyze_to(tmp_path / "out", folder / "crank.csv", robot, Request(outputs=wanted), silent)
     assert {file.name for file in files} >= {
         "analysis.csv",
         "paper.png",

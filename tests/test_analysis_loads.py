@@ -10,9 +10,9 @@ from conftest import DATA
 from linkwise import Load, generate, read_system, write_package
 from linkwise.analysis import analyze
 from linkwise.analysis.filtering import padding_length
-from linkwise.analysis.job import Request, Wanted
-from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.job import Outputs, Request
 from linkwise.analysis.loads import Loads
+from linkwise.analysis.opened_robot import load_robot
 from linkwise.analysis.run import analyze_to
 from linkwise.errors import LinkwiseError
 from linkwise.progress import silent
@@ -136,13 +136,13 @@ def test_a_leg_that_stands_on_its_foot_needs_no_force_at_the_pelvis(tmp_path: Pa
 
 def test_tables_record_and_pictures_have_each_load(arm: Path, tmp_path: Path) -> None:
     file = write_mot(tmp_path / "plate.mot", measured(columns=3), FORCE)
-    wanted = Wanted("csv", ("shares", "paper", "power"), page=True)
+    wanted = Outputs("csv", ("shares", "paper", "power"), page=True)
     loads = Loads.of([file])
     result, _ = analyze_to(
         tmp_path / "out",
         arm / "log.csv",
         load_robot(arm / "arm"),
-        Request(wanted=wanted, loads=loads),
+        Request(outputs=wanted, loads=loads),
         silent,
     )
     header = (tmp_path / "out/analysis.csv").read_text().splitlines()[0].split(",")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from linkwise import generate, read_system, write_package
 from linkwise.analysis import analyze
-from linkwise.analysis.job import Request, Wanted
-from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.job import Outputs, Request
+from linkwise.analysis.opened_robot import load_robot
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import page_data
 from linkwise.progress import silent
@@ -56,12 +56,12 @@ def test_they_have_columns_where_the_file_has_them_and_the_joint_torque_sums_the
 
 def test_every_file_and_picture_has_them(analysed, tmp_path):
     folder, result = analysed
-    wanted = Wanted("csv", ("shares",), page=False, power_terms=True)
+    wanted = Outputs("csv", ("shares",), page=False, power_terms=True)
     analyze_to(
         tmp_path / "out",
         folder / "log.csv",
         load_robot(folder / "arm"),
-        Request(wanted=wanted),
+        Request(outputs=wanted),
         silent,
     )
     header = (tmp_path / "out/analysis.csv").read_text().splitlines()[0].split(",")

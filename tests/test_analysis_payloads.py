@@ -8,9 +8,9 @@ from conftest import DATA
 from linkwise import Payload, generate, read_system, write_package
 from linkwise.analysis import Processing, analyze
 from linkwise.analysis.choices import carried
-from linkwise.analysis.job import Request, Wanted
-from linkwise.analysis.loaded_robot import load_robot
-from linkwise.analysis.payload import carrying
+from linkwise.analysis.job import Outputs, Request
+from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import page_data
 from linkwise.errors import LinkwiseError
@@ -88,10 +88,10 @@ def test_the_convention_of_velocities_holds_for_payloads(arm):
 
 def test_files_and_page_list_them(arm, tmp_path):
     loaded = load_robot(arm / "arm")
-    loaded = carrying(loaded, carried(["tool=2.5,0.1,0.05,-0.2", "bag:c=1.2"], loaded))
-    wanted = Wanted("csv", ("shares", "power", "paper"), page=True)
+    loaded = with_payloads(loaded, carried(["tool=2.5,0.1,0.05,-0.2", "bag:c=1.2"], loaded))
+    wanted = Outputs("csv", ("shares", "power", "paper"), page=True)
     log, out = arm / "log.csv", tmp_path / "out"
-    result, _ = analyze_to(out, log, loaded, Request(wanted=wanted), silent)
+    result, _ = analyze_to(out, log, loaded, Request(outputs=wanted), silent)
     record = json.loads((out / "analysis.json").read_text())
     assert record["payloads"] == [
         {"name": "payload tool", "body": "tool", "mass": 2.5, "point": list(POINT)},
@@ -107,10 +107,10 @@ def test_files_and_page_list_them(arm, tmp_path):
 def test_robots_that_take_no_payload_say_why(arm, tmp_path):
     write_package(generate(read_system(arm / "arm.urdf"), ["autograd"]), tmp_path / "arm")
     with pytest.raises(LinkwiseError, match="no back end takes a payload's mass; generate the robot again"):
-        carrying(load_robot(tmp_path / "arm"), PAYLOADS)
+        with_payloads(load_robot(tmp_path / "arm"), PAYLOADS)
     write_package(generate(read_system(str(DATA / "cart_pendulum.py")), ["numpy"]), tmp_path / "cart")
     with pytest.raises(LinkwiseError, match=r"payload on 'tool': the links of .* are energies, which do not"):
-        carrying(load_robot(tmp_path / "cart"), PAYLOADS)
+        with_payloads(load_robot(tmp_path / "cart"), PAYLOADS)
 
 
 def test_what_cannot_carry_a_payload_is_named(arm):
@@ -127,7 +127,7 @@ def test_what_cannot_carry_a_payload_is_named(arm):
     }
     for text, message in refused.items():
         with pytest.raises(LinkwiseError) as refusal:
-            carrying(loaded, carried([text], loaded))
+            with_payloads(loaded, carried([text], loaded))
         assert str(refusal.value) == message
     with pytest.raises(LinkwiseError, match="'payload tool': another has that name"):
-        carrying(loaded, carried(["tool=1", "tool=2"], loaded))
+        with_payloads(loaded, carried(["tool=1", "tool=2"], loaded))

@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 import pytest
 from linkwise.analysis import Load, Reading, analyze
-from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.opened_robot import load_robot
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.show import figure_png
 from linkwise.analysis.show.drawn_curves import largest_few

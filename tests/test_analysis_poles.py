@@ -6,7 +6,7 @@ import numpy as np
 import urdf_text
 from linkwise import Options, generate, read_system, write_package
 from linkwise.analysis import analyze
-from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.opened_robot import load_robot
 from linkwise.analysis.samples import Samples, pole_warnings
 from motion_logs import write_csv
 

@@ -8,8 +8,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from linkwise.analysis import Processing, analyze
-from linkwise.analysis.job import Request, Wanted
-from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.job import Outputs, Request
+from linkwise.analysis.opened_robot import load_robot
 from linkwise.analysis.paper_motions import SIMULATED, write_motions
 from linkwise.analysis.run import analyze_to
 from linkwise.errors import LinkwiseError
@@ -96,10 +96,10 @@ def test_joints_at_rest_send_no_power(tmp_path):
 @pytest.mark.parametrize("convention", ["closing", "gradient"])
 def test_power_by_cause_and_order_is_written_where_asked_for(tmp_path, convention):
     log = write_csv(tmp_path / "a.csv", smooth(40, 3))
-    wanted = Wanted(power_terms=True, page=False)
+    wanted = Outputs(power_terms=True, page=False)
     processing = Processing(convention=convention)
     analyze_to(
-        tmp_path / "out", log, load_robot(PLANAR3), Request(processing=processing, wanted=wanted), silent
+        tmp_path / "out", log, load_robot(PLANAR3), Request(processing=processing, outputs=wanted), silent
     )
     table = pq.read_table(tmp_path / "out" / "analysis.parquet")
     read = {name: table[name].to_numpy() for name in table.column_names}

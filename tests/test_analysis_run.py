@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 from linkwise import Options, generate, read_system, write_package
 from linkwise.analysis import Lowpass, Processing, Reading, analyze, stream
-from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.opened_robot import load_robot
 from linkwise.analysis.paper_motions import MOTIONS, SIMULATED, write_motions
 from linkwise.analysis.verify import Closure
 from linkwise.errors import LinkwiseError

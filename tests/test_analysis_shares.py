@@ -16,8 +16,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from linkwise.analysis import Analysis, analyze
-from linkwise.analysis.job import Request, Wanted
-from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.job import Outputs, Request
+from linkwise.analysis.opened_robot import load_robot
 from linkwise.analysis.result import Totals, Work
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.run import analyze_to
@@ -81,7 +81,7 @@ def folded() -> NDArray[np.float64]:
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder that the command writes, while values lie in a file."""
     made: Path = tmp_path_factory.mktemp("shares")
-    given = Request(wanted=Wanted(figures=("shares",))), silent
+    given = Request(outputs=Outputs(figures=("shares",))), silent
     analyze_to(made / "out", write_csv(made / "log.csv", folded()), load_robot(PLANAR3), *given)
     return made
 

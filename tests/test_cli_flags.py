@@ -8,7 +8,7 @@ import pytest
 from linkwise import Fitting, Options
 from linkwise.analysis import Lowpass, Processing, Reading
 from linkwise.analysis.choices import AnalysisChoices
-from linkwise.analysis.job import Wanted
+from linkwise.analysis.job import Outputs
 from linkwise.analysis.phases import Phase
 from linkwise.cli.app import app
 from linkwise.option import chosen, written
@@ -74,7 +74,7 @@ READ = Reading("deg", "t", (("a", "elbow"), ("b", "wrist")), True, 125.0, 0.25, 
 WRITTEN = AnalysisChoices(
     READ,
     Processing("savitzky-golay", 9, 3, SMOOTHED, "trim", "gradient"),
-    Wanted(phases=(Phase("stance", "", "push", None),), power_terms=True, induced=("joints",)),
+    Outputs(phases=(Phase("stance", "", "push", None),), power_terms=True, induced=("joints",)),
     payload=("hand=2",),
     load=("hand=1,2,3",),
     loads=("plate.csv",),
@@ -122,8 +122,8 @@ def test_every_flag_of_analyze_is_the_choice_of_its_name(
 ) -> None:
     monkeypatch.setattr("linkwise.cli.analyze.opened_robot", lambda *given: "the robot")
     monkeypatch.setattr(AnalysisChoices, "payloads", lambda own, _: own)
-    assert called("analyze", "carrying", ANALYSIS | {"qpos": None})[1] == WRITTEN
-    assert called("analyze", "carrying", {"qpos": "mujoco"})[1].reading == Reading(qpos="mujoco")
+    assert called("analyze", "with_payloads", ANALYSIS | {"qpos": None})[1] == WRITTEN
+    assert called("analyze", "with_payloads", {"qpos": "mujoco"})[1].reading == Reading(qpos="mujoco")
 
 
 def test_keys_of_a_study_are_the_flags_of_analyze_by_name_and_default() -> None:
@@ -137,8 +137,8 @@ def test_keys_of_a_study_are_the_flags_of_analyze_by_name_and_default() -> None:
 
 
 def test_choices_are_carried_out_as_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
-    wanted = chosen(Wanted, {"format": "csv", "figure": ["shares"], "page": False})
-    assert wanted == Wanted("csv", ("shares",), False)
+    wanted = chosen(Outputs, {"format": "csv", "figure": ["shares"], "page": False})
+    assert wanted == Outputs("csv", ("shares",), False)
     monkeypatch.setattr("linkwise.analysis.choices.chosen_contacts", lambda *given: given)
     contacts = ("foot=held",), ("foot=on",), [Path("grf.mot")], 42.0, 31.0, ("base_x",), "the robot"
     assert WRITTEN.contacts("the robot") == contacts  # type: ignore[arg-type, comparison-overlap]
@@ -154,16 +154,16 @@ def test_choices_are_carried_out_as_they_say(monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.parametrize(
     ("chosen", "wanted"),
     [
-        ({}, Wanted()),
+        ({}, Outputs()),
         (
             {"format": "csv", "figure": ("shares", "power"), "page": False, "power_terms": True},
-            Wanted("csv", ("shares", "power"), False, power_terms=True),
+            Outputs("csv", ("shares", "power"), False, power_terms=True),
         ),
     ],
     ids=["usual", "all"],
 )
 def test_analyze_writes_what_is_asked_for(
-    called: Any, monkeypatch: pytest.MonkeyPatch, chosen: dict[str, Any], wanted: Wanted
+    called: Any, monkeypatch: pytest.MonkeyPatch, chosen: dict[str, Any], wanted: Outputs
 ) -> None:
     monkeypatch.setattr("linkwise.cli.analyze.opened_robot", lambda *given: "the robot")
     out, log, robot, asked, _ = called("analyze", "analyze_to", chosen)

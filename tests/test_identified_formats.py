@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from linkwise import generate, read_robot, read_system, write_package
-from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.opened_robot import load_robot
 from linkwise.cli.app import app
 from motion_logs import write_csv
 from shown_model import ShownModel

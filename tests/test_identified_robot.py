@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import DATA
 from linkwise import LinkwiseError, generate, read_robot, read_system, write_package
-from linkwise.analysis.loaded_robot import load_robot
+from linkwise.analysis.opened_robot import load_robot
 from linkwise.cli.app import app
 from linkwise.identification.pseudo_inertia import shared_mass
 from motion_logs import write_csv

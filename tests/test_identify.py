@@ -24,7 +24,7 @@ from linkwise import (
     write_package,
 )
 from linkwise.analysis import Lowpass, Processing, Reading
-from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
+from linkwise.analysis.opened_robot import OpenedRobot, load_robot
 from linkwise.cli.app import app
 from linkwise.identification.base_parameters import base_parameters
 from linkwise.identification.identified_files import page
@@ -59,7 +59,7 @@ def swings(joints: int, seconds: float, rate: float, seed: int = 1) -> tuple[Any
     )
 
 
-def own_parameters(robot: LoadedRobot) -> Any:
+def own_parameters(robot: OpenedRobot) -> Any:
     """Parameters of the links as the robot has them."""
     bodies = {body.link: body for body in robot.bodies or ()}
     chosen = [bodies[link] for link in robot.links]
@@ -80,17 +80,17 @@ def other_bodies(pi: Any, seed: int = 2) -> Any:
 
 
 @pytest.fixture(scope="module")
-def planar3(directory_of: Callable[[str], Path]) -> LoadedRobot:
+def planar3(directory_of: Callable[[str], Path]) -> OpenedRobot:
     return load_robot(directory_of("planar3"), "numpy")
 
 
 @pytest.fixture(scope="module")
-def panda(directory_of: Callable[[str], Path]) -> LoadedRobot:
+def panda(directory_of: Callable[[str], Path]) -> OpenedRobot:
     return load_robot(directory_of(str(PANDA)), "numpy")
 
 
 def test_a_minute_of_panda_is_identified_to_the_noise_of_its_torques(
-    panda: LoadedRobot, tmp_path: Path
+    panda: OpenedRobot, tmp_path: Path
 ) -> None:
     """200 Hz x 60 s, joints of other bodies than the package's, with friction; encoders of 1e-5 rad."""
     t, q, qd, qdd = swings(7, 60, 200)
@@ -142,7 +142,7 @@ def test_noise_and_errors_are_those_of_least_squares(tmp_path: Path) -> None:
     assert seen == pytest.approx([np.sqrt(left / len(t))], rel=1e-6)
 
 
-def test_base_parameters_of_a_planar_arm_are_the_textbooks(planar3: LoadedRobot) -> None:
+def test_base_parameters_of_a_planar_arm_are_the_textbooks(planar3: OpenedRobot) -> None:
     base = base_parameters(planar3.model)
     assert base.texts() == [
         "mcx(link1) + 0.25 m(link2) + 0.25 m(link3)",
@@ -158,7 +158,7 @@ def test_base_parameters_of_a_planar_arm_are_the_textbooks(planar3: LoadedRobot)
     assert base.units[:3] == ("kg m", "kg m", "kg m^2")
 
 
-def test_without_the_shoulders_torque_its_link_is_not_told(planar3: LoadedRobot, tmp_path: Path) -> None:
+def test_without_the_shoulders_torque_its_link_is_not_told(planar3: OpenedRobot, tmp_path: Path) -> None:
     table = np.loadtxt(planar_log(planar3, tmp_path, noise=0.01), delimiter=",", skiprows=1)
     log = write_csv(tmp_path / "two.csv", np.delete(table, 4, axis=1), (*JOINTS, *TORQUES[1:]))
     found = identify(log, planar3, fitting=Fitting(unmeasured=("joint1",)))
@@ -213,7 +213,7 @@ def test_a_robot_on_a_floating_base_is_identified_without_the_grounds_forces(tmp
     assert "Without friction, as what floats has no bearings: base_x, " in page(found, ())
 
 
-def test_bodies_can_exist_where_least_squares_has_none(planar3: LoadedRobot, tmp_path: Path) -> None:
+def test_bodies_can_exist_where_least_squares_has_none(planar3: OpenedRobot, tmp_path: Path) -> None:
     """Noise as large as what the last link asks for: its inertia comes out negative without the condition."""
     for seed in range(20):
         log = planar_log(planar3, tmp_path, noise=2.0, seed=seed)
@@ -226,7 +226,7 @@ def test_bodies_can_exist_where_least_squares_has_none(planar3: LoadedRobot, tmp
 
 
 def planar_log(
-    robot: LoadedRobot,
+    robot: OpenedRobot,
     folder: Path,
     seconds: float = 10,
     noise: float = 0.0,
@@ -274,7 +274,7 @@ def test_the_urdf_file_makes_the_same_torques(robot: str, tmp_path: Path) -> Non
 
 
 def test_the_command_writes_a_page_a_record_and_a_robot(
-    planar3: LoadedRobot, directory_of: Callable[[str], Path], tmp_path: Path
+    planar3: OpenedRobot, directory_of: Callable[[str], Path], tmp_path: Path
 ) -> None:
     log, package = planar_log(planar3, tmp_path, noise=0.01), str(directory_of("planar3"))
     command = [
@@ -310,7 +310,7 @@ def test_the_command_writes_a_page_a_record_and_a_robot(
     read_system(tmp_path / "out/planar3.urdf")
 
 
-BAD: dict[str, tuple[Callable[[LoadedRobot, Path], dict[str, Any]], str]] = {
+BAD: dict[str, tuple[Callable[[OpenedRobot, Path], dict[str, Any]], str]] = {
     "a joint that stands still": (
         lambda robot, folder: {"log": planar_log(robot, folder, swing=(1, 1e-3, 1))},
         "too little excitation: joint 'joint2' moves by 0.0018 rad in all; record a motion of every joint, "
@@ -405,7 +405,7 @@ BAD: dict[str, tuple[Callable[[LoadedRobot, Path], dict[str, Any]], str]] = {
 
 
 def test_the_command_says_what_a_missing_torque_leaves_open(
-    planar3: LoadedRobot, directory_of: Callable[[str], Path], tmp_path: Path
+    planar3: OpenedRobot, directory_of: Callable[[str], Path], tmp_path: Path
 ) -> None:
     log, out = planar_log(planar3, tmp_path, noise=0.01), tmp_path / "out"
     package = str(directory_of("planar3"))
@@ -433,7 +433,7 @@ def energies(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_what_cannot_be_identified_is_said_in_a_line(case: str, planar3: LoadedRobot, tmp_path: Path) -> None:
+def test_what_cannot_be_identified_is_said_in_a_line(case: str, planar3: OpenedRobot, tmp_path: Path) -> None:
     made, message = BAD[case]
     with pytest.raises(LinkwiseError) as raised:
         identify(**({"robot": planar3} | made(planar3, tmp_path)))
@@ -448,7 +448,7 @@ def altered(log: Path, change: Callable[[Any], Any], *more: str) -> Path:
     return write_csv(log, change(table), (*JOINTS, *TORQUES, *more))
 
 
-def test_noise_of_positions_is_told_from_a_poor_motion(planar3: LoadedRobot, tmp_path: Path) -> None:
+def test_noise_of_positions_is_told_from_a_poor_motion(planar3: OpenedRobot, tmp_path: Path) -> None:
     def shaken(table: Any) -> Any:
         table[:, 1:4] += 1e-4 * np.random.default_rng(5).standard_normal((len(table), 3))
         return table
@@ -499,7 +499,7 @@ CONTRADICTIONS: dict[str, tuple[Callable[[Any], Any], str]] = {
 
 @pytest.mark.parametrize("case", CONTRADICTIONS)
 def test_torques_that_contradict_the_robot_are_asked_about(
-    case: str, planar3: LoadedRobot, tmp_path: Path
+    case: str, planar3: OpenedRobot, tmp_path: Path
 ) -> None:
     change, message = CONTRADICTIONS[case]
     log = altered(planar_log(planar3, tmp_path, seconds=20, noise=0.01), change)
@@ -508,7 +508,7 @@ def test_torques_that_contradict_the_robot_are_asked_about(
     assert "\n" not in warning
 
 
-def test_torques_of_no_body_that_can_exist_are_asked_about(planar3: LoadedRobot, tmp_path: Path) -> None:
+def test_torques_of_no_body_that_can_exist_are_asked_about(planar3: OpenedRobot, tmp_path: Path) -> None:
     """Weights of the robot, and an inertia below zero."""
     pi = own_parameters(planar3)
     pi[2, -1] = -0.1
@@ -523,20 +523,20 @@ def test_torques_of_no_body_that_can_exist_are_asked_about(planar3: LoadedRobot,
     assert "see the signs, units and order of the torques" in warning
 
 
-def test_zeros_for_a_torque_do_not_outweigh_the_others(planar3: LoadedRobot, tmp_path: Path) -> None:
+def test_zeros_for_a_torque_do_not_outweigh_the_others(planar3: OpenedRobot, tmp_path: Path) -> None:
     log = altered(planar_log(planar3, tmp_path, seconds=20, noise=0.01), lambda t: t * [1, 1, 1, 1, 1, 1, 0])
     noise = identify(log, planar3).fit.noise
     assert noise[2] >= 0.5 * noise[:2].min()
 
 
-def test_torques_of_another_unit_are_asked_about(planar3: LoadedRobot, tmp_path: Path) -> None:
+def test_torques_of_another_unit_are_asked_about(planar3: OpenedRobot, tmp_path: Path) -> None:
     log = planar_log(planar3, tmp_path, noise=0.01, factor=1000.0)
     (warning,) = identify(log, planar3).warnings
     assert "if it is in another unit, pass --torque-factor, 0.001 for N mm" in warning
     assert identify(log, planar3, fitting=Fitting(factor=0.001)).warnings == ()
 
 
-def test_degrees_and_other_names_are_taken_as_told(planar3: LoadedRobot, tmp_path: Path) -> None:
+def test_degrees_and_other_names_are_taken_as_told(planar3: OpenedRobot, tmp_path: Path) -> None:
     table = np.loadtxt(planar_log(planar3, tmp_path, noise=0.01), delimiter=",", skiprows=1)
     table[:, 1:4] *= 180 / np.pi
     log = write_csv(tmp_path / "deg.csv", table, ("a", "b", "joint3", "joint1_moment", "joint2_effort", "u"))

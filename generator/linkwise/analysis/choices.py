@@ -7,9 +7,9 @@ from pathlib import Path
 from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.contacts import Contacts, WhileColumn
-from linkwise.analysis.job import Request, Wanted
-from linkwise.analysis.loaded_robot import LoadedRobot, named_body
+from linkwise.analysis.job import Outputs, Request
 from linkwise.analysis.loads import Load, Loads
+from linkwise.analysis.opened_robot import OpenedRobot, named_body
 from linkwise.analysis.settings import Payload, Processing, Reading
 from linkwise.errors import LinkwiseError
 from linkwise.option import option
@@ -24,7 +24,7 @@ class AnalysisChoices:
 
     reading: Reading = field(default_factory=Reading)
     processing: Processing = field(default_factory=Processing)
-    wanted: Wanted = field(default_factory=Wanted)
+    outputs: Outputs = field(default_factory=Outputs)
     payload: tuple[str, ...] = option(
         (),
         "Point mass on a body, at a point in its axes, m; NAME:BODY=… names it; may be repeated",
@@ -71,27 +71,27 @@ class AnalysisChoices:
         metavar="JOINT",
     )
 
-    def request(self, robot: LoadedRobot) -> Request:
+    def request(self, robot: OpenedRobot) -> Request:
         """Return what is asked of a robot's log."""
-        return Request(self.reading, self.processing, self.wanted, self.borne(robot), self.contacts(robot))
+        return Request(self.reading, self.processing, self.outputs, self.borne(robot), self.contacts(robot))
 
-    def payloads(self, robot: LoadedRobot) -> tuple[Payload, ...]:
+    def payloads(self, robot: OpenedRobot) -> tuple[Payload, ...]:
         """Return the point masses that a robot carries."""
         return carried(self.payload, robot)
 
-    def borne(self, robot: LoadedRobot) -> Loads:
+    def borne(self, robot: OpenedRobot) -> Loads:
         """Return the external loads on a robot."""
         given: list[Load | str] = [*constant_loads(self.load, robot), *self.loads]
         return Loads.of(given, None if self.contact_loads and not self.loads else self.loads_cutoff)
 
-    def contacts(self, robot: LoadedRobot) -> Contacts:
+    def contacts(self, robot: OpenedRobot) -> Contacts:
         """Return the contacts on which the robot stands."""
         measured = [Path(path) for path in self.contact_loads]
         above = self.contact_threshold, self.loads_cutoff
         return chosen_contacts(self.contact, self.contact_while, measured, *above, self.unactuated, robot)
 
 
-def carried(given: Sequence[str], robot: LoadedRobot) -> tuple[Payload, ...]:
+def carried(given: Sequence[str], robot: OpenedRobot) -> tuple[Payload, ...]:
     """Return the payloads of [NAME:]BODY=MASS[,x,y,z].
 
     Raises LinkwiseError for text of another form.
@@ -111,7 +111,7 @@ def carried(given: Sequence[str], robot: LoadedRobot) -> tuple[Payload, ...]:
     return tuple(found)
 
 
-def constant_loads(given: Sequence[str], robot: LoadedRobot) -> tuple[Load, ...]:
+def constant_loads(given: Sequence[str], robot: OpenedRobot) -> tuple[Load, ...]:
     """Return the loads of [NAME:]BODY=FX,FY,FZ[,MX,MY,MZ][@X,Y,Z].
 
     Raises LinkwiseError for text of another form.
@@ -147,7 +147,7 @@ def chosen_contacts(
     threshold: float | None,
     cutoff: float | None,
     unactuated: Sequence[str],
-    robot: LoadedRobot,
+    robot: OpenedRobot,
 ) -> Contacts:
     """Return the contacts that the flags describe; raise LinkwiseError for text of any other form.
 
@@ -164,7 +164,7 @@ def chosen_contacts(
     return Contacts(given, columns, tuple(loads), threshold, low, tuple(unactuated))
 
 
-def _contact(text: str, robot: LoadedRobot) -> Contact:
+def _contact(text: str, robot: OpenedRobot) -> Contact:
     """Return the contact of a text [NAME:]FRAME=KIND[,NUMBERS][@X,Y,Z]."""
     where, sign, rest = text.rpartition("=")
     what, at, place = rest.partition("@")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.loaded_robot import LoadedRobot, body_frame
+from linkwise.analysis.opened_robot import OpenedRobot, body_frame
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 
@@ -30,7 +30,7 @@ class InducedPoint:
     place: tuple[float, ...] = (0.0, 0.0, 0.0)
     """Position in the frame, in m."""
 
-    def maps(self, robot: LoadedRobot, q: Array, qd: Array) -> tuple[Array, Array]:
+    def maps(self, robot: OpenedRobot, q: Array, qd: Array) -> tuple[Array, Array]:
         """Return J and J̇ at q and qd (S, n): (S, rows, n) each."""
         kinematics: Any = robot.model.kinematics if self.name != JOINTS or self.frame is not None else None
         if kinematics is None:
@@ -42,7 +42,7 @@ class InducedPoint:
         return _centre(robot, kinematics, q, qd)
 
 
-def induced_points(texts: Sequence[str], robot: LoadedRobot) -> tuple[InducedPoint, ...]:
+def induced_points(texts: Sequence[str], robot: OpenedRobot) -> tuple[InducedPoint, ...]:
     """Return the points that are written as FRAME, FRAME,X,Y,Z, joints or centre-of-mass.
 
     Raises LinkwiseError for a frame that does not exist, a point that is not three numbers, and a point that
@@ -54,7 +54,7 @@ def induced_points(texts: Sequence[str], robot: LoadedRobot) -> tuple[InducedPoi
     return tuple(_point(text, robot) for text in texts)
 
 
-def _point(text: str, robot: LoadedRobot) -> InducedPoint:
+def _point(text: str, robot: OpenedRobot) -> InducedPoint:
     tree = robot.package.manifest.tree
     frames = () if tree is None else tuple(frame.name for frame in tree.frames)
     if text == JOINTS and text not in frames:
@@ -85,7 +85,7 @@ def _place(text: str, numbers: Sequence[str]) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _centre(robot: LoadedRobot, kinematics: Any, q: Array, qd: Array) -> tuple[Array, Array]:
+def _centre(robot: OpenedRobot, kinematics: Any, q: Array, qd: Array) -> tuple[Array, Array]:
     """Return J and J̇ of the centre of mass of links and payloads, each by its mass, (S, 3, n)."""
     manifest = robot.package.manifest
     links = {link.name for link in manifest.links}

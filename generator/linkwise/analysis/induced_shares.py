@@ -29,7 +29,7 @@ from linkwise_runtime.motion.induced_accelerations import Response, response_of
 
 from linkwise.analysis.contacts.ground import Standing
 from linkwise.analysis.induced_points import InducedPoint
-from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_quantities import LOSSES, PASSIVE
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.term_rows import NAMES, TermArrays, mirrored
@@ -47,13 +47,13 @@ Source = tuple[str, tuple[int, ...]]
 class InducedSources:
     """The sources of a robot, and their forces."""
 
-    robot: LoadedRobot
+    robot: OpenedRobot
     every: dict[Source, list[tuple[int, int]]]
     """Pairs of a coordinate and the place of its torque, by source: a row of the result, a packed value, a
     joint."""
 
     @classmethod
-    def of(cls, robot: LoadedRobot, rows: ResultRows) -> "InducedSources":
+    def of(cls, robot: OpenedRobot, rows: ResultRows) -> "InducedSources":
         """Collect the sources of a robot; rows: those of torques."""
         found: dict[Source, list[tuple[int, int]]] = {}
         for quantity, at, i, place in _parts(robot, rows):
@@ -92,13 +92,13 @@ class InducedSources:
         return mass
 
 
-def opened(robot: LoadedRobot) -> Any:
+def opened(robot: OpenedRobot) -> Any:
     """Return the model of links and payloads without ties."""
     model: Any = robot.model
     return model if robot.constrained is None else model.open
 
 
-def _parts(robot: LoadedRobot, rows: ResultRows) -> Iterator[tuple[str, tuple[int, ...], int, int]]:
+def _parts(robot: OpenedRobot, rows: ResultRows) -> Iterator[tuple[str, tuple[int, ...], int, int]]:
     """Yield the quantity and the indices of a source, with a coordinate and the place of its torque."""
     layout = opened(robot).layout
     for row, (i,) in rows["tau"].listed():
@@ -172,14 +172,14 @@ class StandingResponse:
 class InducedShares:
     """Plans and fills the rows of induced accelerations, which follow all others."""
 
-    robot: LoadedRobot
+    robot: OpenedRobot
     points: tuple[InducedPoint, ...]
     sources: InducedSources
     first: int
     """Row of the result at which these begin."""
 
     @classmethod
-    def of(cls, robot: LoadedRobot, points: Sequence[InducedPoint], others: ResultRows) -> "InducedShares":
+    def of(cls, robot: OpenedRobot, points: Sequence[InducedPoint], others: ResultRows) -> "InducedShares":
         """Plan the rows of the points; others: all rows of torques and motion."""
         sources = InducedSources.of(robot, others) if points else InducedSources(robot, {})
         return cls(robot, tuple(points), sources, len(others))

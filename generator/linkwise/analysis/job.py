@@ -11,10 +11,10 @@ from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.times import contact_times, switch_columns
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.induced_points import induced_points
-from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads import Loads
 from linkwise.analysis.loads.read import placed_loads
 from linkwise.analysis.logs import Log, open_log
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.outputs import Format, named_result, record, result_table
 from linkwise.analysis.phases import Phase, PlacedPhase, phase_columns, placed_phases
 from linkwise.analysis.result import AnalysisResult, WholeMovement
@@ -73,7 +73,7 @@ class Analysis(AnalysisResult):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class Outputs:
     """Files to write, and their contents: the table's format, figures by name, whether to write the page."""
 
     table: Format = option("parquet", "Format of the table", "--format", is_key=False)
@@ -109,7 +109,7 @@ class Request:
 
     reading: Reading = field(default_factory=Reading)
     processing: Processing = field(default_factory=Processing)
-    wanted: Wanted = field(default_factory=Wanted)
+    outputs: Outputs = field(default_factory=Outputs)
     loads: Loads = field(default_factory=Loads)
     contacts: Contacts = field(default_factory=Contacts)
 
@@ -198,7 +198,7 @@ class Job:
         held = () if robot.contacts is None else zip(robot.ground.names, robot.ground.contacts, strict=True)
         for name, contact in held:
             for load in self.decomposer.loads:
-                if load.seat.frame.joint == robot.body_of(contact.frame):
+                if load.acts_on.frame.joint == robot.body_of(contact.frame):
                     yield (
                         f"load {load.name!r} and contact {name!r} act on one body; what was measured at the"
                         " contact is given with --contact-loads"
@@ -207,7 +207,7 @@ class Job:
 
 def prepared(
     log: Path,
-    robot: LoadedRobot,
+    robot: OpenedRobot,
     asked: Request,
     progress: Progress,
     buffer: Path | None = None,
@@ -216,10 +216,10 @@ def prepared(
 
     buffer: a directory that keeps the samples in a disk buffer, not in memory
     """
-    reading, processing, wanted = asked.reading, asked.processing, asked.wanted
-    points = induced_points(wanted.induced, robot)
+    reading, processing, outputs = asked.reading, asked.processing, asked.outputs
+    points = induced_points(outputs.induced, robot)
     opened = open_log(log, reading, robot.joints, robot.file_joints, robot.qpos)
-    switches = (*switch_columns(asked.contacts, opened), *phase_columns(wanted.phases, opened))
+    switches = (*switch_columns(asked.contacts, opened), *phase_columns(outputs.phases, opened))
     samples, closed = _samples(opened, robot, reading, switches, progress, buffer)
     with within(str(log)):
         span_of(samples, processing)
@@ -227,15 +227,15 @@ def prepared(
             lowpass(samples.q, samples.rate, processing.lowpass)
     borne = placed_loads(asked.loads, robot, samples.time, reading.ignore_extra, progress, buffer)
     times = contact_times(asked.contacts, opened, robot, reading, samples.time, progress, buffer)
-    decomposer = Decomposer.of(robot, processing.convention, wanted.power_terms, borne, points, times)
+    decomposer = Decomposer.of(robot, processing.convention, outputs.power_terms, borne, points, times)
     every = (*borne, *(() if times is None else times.loads))
-    phases = placed_phases(wanted.phases, opened, robot, every, reading, progress)
+    phases = placed_phases(outputs.phases, opened, robot, every, reading, progress)
     return Job(log.name, asked, samples, decomposer, closed, phases)
 
 
 def _samples(
     log: Log,
-    robot: LoadedRobot,
+    robot: OpenedRobot,
     reading: Reading,
     switches: Sequence[str],
     progress: Progress,

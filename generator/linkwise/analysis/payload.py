@@ -9,7 +9,7 @@ from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.rule.joint_tree import TreeFrame
 
 from linkwise.analysis.constrained_model import ConstrainedModel
-from linkwise.analysis.loaded_robot import LoadedRobot, body_frame, told_apart
+from linkwise.analysis.opened_robot import OpenedRobot, body_frame, told_apart
 from linkwise.analysis.settings import Payload
 from linkwise.analysis.term_rows import NAMES, TermArrays
 from linkwise.errors import LinkwiseError
@@ -31,7 +31,7 @@ class _Placed:
     place: tuple[float, float, float]
 
 
-def carrying(robot: LoadedRobot, payloads: Sequence[Payload]) -> LoadedRobot:
+def with_payloads(robot: OpenedRobot, payloads: Sequence[Payload]) -> OpenedRobot:
     """Return the robot with payloads, each behind its links as a link of its own.
 
     Raises LinkwiseError for a body that does not exist, stands on the ground or has no mass of its own, for
@@ -58,7 +58,7 @@ def carrying(robot: LoadedRobot, payloads: Sequence[Payload]) -> LoadedRobot:
     )
 
 
-def _placed(robot: LoadedRobot, tree: RigidTree, payload: Payload) -> _Placed:
+def _placed(robot: OpenedRobot, tree: RigidTree, payload: Payload) -> _Placed:
     frame: TreeFrame = body_frame("payload on", payload.body, robot)
     body = frame.joint
     if body is None:

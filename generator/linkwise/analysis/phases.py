@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from linkwise.analysis.contacts import THRESHOLD, WhileColumn
 from linkwise.analysis.contacts.times import Switch, read_switch
-from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed import PlacedLoad, model_pose
 from linkwise.analysis.logs import Log
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, printable
@@ -93,7 +93,7 @@ class PlacedPhase:
             said.append(f"force of {self.load.name} above {self.above:g} N")
         return printable(f"{self.name}: {' or '.join(said)}")
 
-    def on(self, robot: LoadedRobot, time: Array, q: Array, contacts: Array) -> NDArray[np.bool_]:
+    def on(self, robot: OpenedRobot, time: Array, q: Array, contacts: Array) -> NDArray[np.bool_]:
         """Return whether the phase is on at instants (S,).
 
         q: positions of the robot (S, n); contacts: shares of its contacts, (contacts, S)
@@ -119,7 +119,7 @@ def phase_columns(phases: Sequence[Phase], log: Log) -> tuple[str, ...]:
 def placed_phases(
     phases: Sequence[Phase],
     log: Log,
-    robot: LoadedRobot,
+    robot: OpenedRobot,
     loads: Sequence[PlacedLoad],
     reading: Reading,
     progress: Progress,

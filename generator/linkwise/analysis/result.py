@@ -10,8 +10,8 @@ from linkwise_runtime.chosen_names import nearest_first
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.disk_rows import let_go
-from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result_rows import Column, ResultRows
 from linkwise.analysis.settings import Processing, Reading
@@ -72,7 +72,7 @@ class AnalysisResult(WholeMovement):
     memory or in a file behind it; terms that are identically 0 have no row. n joints, N links.
     """
 
-    robot: LoadedRobot
+    robot: OpenedRobot
     reading: Reading
     processing: Processing
     source: str

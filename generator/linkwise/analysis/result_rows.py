@@ -14,8 +14,8 @@ from linkwise_runtime.robot_axes import NamedAxis, axes_of
 from numpy.typing import NDArray
 
 from linkwise.analysis.induced_points import InducedPoint
-from linkwise.analysis.loaded_robot import LoadedRobot, load_unit
 from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.opened_robot import OpenedRobot, load_unit
 from linkwise.analysis.result_quantities import (
     FORCE_OF,
     PASSIVE,
@@ -83,7 +83,7 @@ class ResultRows:
     @classmethod
     def of(
         cls,
-        robot: LoadedRobot,
+        robot: OpenedRobot,
         places: Iterable[Place],
         loads: Sequence[PlacedLoad] = (),
         points: Sequence[InducedPoint] = (),
@@ -182,7 +182,7 @@ class ResultRows:
 
 
 def torque_places(
-    robot: LoadedRobot,
+    robot: OpenedRobot,
     terms: TermArrays,
     loads: Sequence[PlacedLoad] = (),
     power_terms: bool = False,
@@ -200,15 +200,19 @@ def torque_places(
     out += [("tau_qd", (i, j, k)) for i, j, k, _ in terms.velocity]
     out += [("tau_gravity", (i, j)) for i, j, _ in terms.gravity]
     own = {name: robot.with_own(field) for name, field in PASSIVE.items()}
-    out += [(name, (i,)) for name, joints in own.items() for i in robot.borne_by(joints)]
-    out += [("tau_load", (i, e)) for e, borne in enumerate(loads) for i in robot.borne_by(borne.seat.joints)]
+    out += [(name, (i,)) for name, joints in own.items() for i in robot.joints_supporting(joints)]
+    out += [
+        ("tau_load", (i, e))
+        for e, borne in enumerate(loads)
+        for i in robot.joints_supporting(borne.acts_on.joints)
+    ]
     powers = (*POWER, *POWER_TERMS) if power_terms else POWER
     power = [(name, at) for name in powers for torque, at in out if torque == TORQUE_OF[name]]
     forces = [FORCE_OF[name] for name, joints in own.items() if joints]
     return [*out, *_forces(robot, forces, len(loads)), *_ground(robot, measured), *power]
 
 
-def _forces(robot: LoadedRobot, own: Sequence[str], loads: int) -> Iterator[Place]:
+def _forces(robot: OpenedRobot, own: Sequence[str], loads: int) -> Iterator[Place]:
     """Yield the places of constraint forces, row by row: whole, by link, by passive torque, by load."""
     for row in range(len(robot.constraint_rows)):
         yield "force", (row,)
@@ -217,7 +221,7 @@ def _forces(robot: LoadedRobot, own: Sequence[str], loads: int) -> Iterator[Plac
         yield from (("force_load", (row, e)) for e in range(loads))
 
 
-def _ground(robot: LoadedRobot, measured: Sequence[int]) -> Iterator[Place]:
+def _ground(robot: OpenedRobot, measured: Sequence[int]) -> Iterator[Place]:
     """Yield the places of contacts: shares, power into links, slip, and what was measured there."""
     ground = robot.contacts
     if ground is None:

@@ -8,13 +8,13 @@ from pathlib import Path
 from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.contacts import Contacts
-from linkwise.analysis.contacts.standing import standing_on
+from linkwise.analysis.contacts.standing import with_contacts
 from linkwise.analysis.disk_rows import EverySample
-from linkwise.analysis.job import Analysis, Request, Wanted, prepared
-from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
+from linkwise.analysis.job import Analysis, Outputs, Request, prepared
 from linkwise.analysis.loads import Load, Loads
+from linkwise.analysis.opened_robot import OpenedRobot, load_robot
 from linkwise.analysis.outputs import open_table
-from linkwise.analysis.payload import carrying
+from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.phases import Phase
 from linkwise.analysis.settings import Payload, Processing, Reading
 from linkwise.analysis.show import check_figure, figure_png
@@ -33,7 +33,7 @@ RECORD = "analysis.json"
 
 def analyze(
     log: str | Path,
-    robot: str | PathLike[str] | LoadedRobot,
+    robot: str | PathLike[str] | OpenedRobot,
     reading: Reading | None = None,
     processing: Processing | None = None,
     progress: Progress = silent,
@@ -57,27 +57,27 @@ def analyze(
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
     held = Contacts.of(contacts)
-    loaded = carrying(robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot)), payloads)
-    loaded, borne = standing_on(loaded, held), Loads.of(loads, loads_cutoff)
-    wanted = Wanted(induced=tuple(induced), phases=tuple(map(Phase.of, phases)))
-    asked = Request(reading or Reading(), processing or Processing(), wanted, borne, held)
+    loaded = with_payloads(robot if isinstance(robot, OpenedRobot) else load_robot(Path(robot)), payloads)
+    loaded, borne = with_contacts(loaded, held), Loads.of(loads, loads_cutoff)
+    outputs = Outputs(induced=tuple(induced), phases=tuple(map(Phase.of, phases)))
+    asked = Request(reading or Reading(), processing or Processing(), outputs, borne, held)
     job = prepared(Path(log), loaded, asked, progress)
     with EverySample(len(job.columns), job.count) as kept:
         return job.analysis(job.run(kept, progress), kept.values)
 
 
 def analyze_to(
-    out: Path, log: Path, robot: LoadedRobot, asked: Request, progress: Progress
+    out: Path, log: Path, robot: OpenedRobot, asked: Request, progress: Progress
 ) -> tuple[Analysis, Sequence[Path]]:
     """Analyse a log of any length with flat memory; `out` appears when everything is done.
 
     Returns the analysis and the paths of the files written. Samples of the analysis are in a file without a
-    name where figures or a page are wanted; otherwise it has none. Raises LinkwiseError, as `analyze` does,
-    and where `out` holds something else than a former result or cannot be written.
+    name where figures or a page are asked for; otherwise it has none. Raises LinkwiseError, as `analyze`
+    does, and where `out` holds something else than a former result or cannot be written.
     """
-    robot, wanted = standing_on(robot, asked.contacts), asked.wanted
-    for name in wanted.figures:
-        check_figure(name, robot, wanted.induced)
+    robot, outputs = with_contacts(robot, asked.contacts), asked.outputs
+    for name in outputs.figures:
+        check_figure(name, robot, outputs.induced)
     refuse_inside_package(out)
     for file in (log, *asked.loads.paths, *asked.contacts.measured.paths):
         if is_inside(file, out):
@@ -85,9 +85,9 @@ def analyze_to(
     with whole_directory(out, _refuse_unless_result) as draft:
         job = prepared(log, robot, asked, progress, draft)
         note = json_text(job.note())
-        keep = (job.count, draft) if wanted.page or wanted.figures else (0, None)
+        keep = (job.count, draft) if outputs.page or outputs.figures else (0, None)
         with (
-            open_table(draft / f"analysis.{wanted.table}", job.columns, note) as table,
+            open_table(draft / f"analysis.{outputs.table}", job.columns, note) as table,
             EverySample(len(job.columns), *keep) as kept,
         ):
 
@@ -97,17 +97,17 @@ def analyze_to(
                     kept(block)
 
             analysis = job.analysis(job.run(sink, progress), kept.values)
-        _write_beside_table(draft, analysis, wanted)
+        _write_beside_table(draft, analysis, outputs)
         names = sorted(file.name for file in draft.iterdir())
     return analysis, [out / name for name in names]
 
 
-def _write_beside_table(draft: Path, analysis: Analysis, wanted: Wanted) -> None:
+def _write_beside_table(draft: Path, analysis: Analysis, outputs: Outputs) -> None:
     """Write the record, the figures and the page."""
-    files = file_names("-".join(map(file_name, name.split(":", 1))) for name in wanted.figures)
-    for file, name in zip(files, wanted.figures, strict=True):
+    files = file_names("-".join(map(file_name, name.split(":", 1))) for name in outputs.figures)
+    for file, name in zip(files, outputs.figures, strict=True):
         (draft / f"{file}.png").write_bytes(figure_png(analysis, name))
-    if wanted.page:
+    if outputs.page:
         (draft / "report.html").write_bytes(report(analysis).encode())
     files = sorted([RECORD, *(file.name for file in draft.iterdir())])
     record = {**analysis.record(), "files": files}

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.borne_forces import BorneForces
 from linkwise.analysis.closed_motion import reason_of
 from linkwise.analysis.contacts.ground import ContactTerms, Standing
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.induced_shares import InducedShares
-from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.reaction_forces import ReactionForces
 from linkwise.analysis.result_quantities import PASSIVE, QUANTITIES, TERMS, TORQUE_OF
 from linkwise.analysis.result_rows import QuantityRows, ResultRows, torque_places
 from linkwise.analysis.settings import Convention
@@ -39,7 +39,7 @@ class Decomposer:
     Where the robot stands on contacts, all of these torques are those that the contacts leave to the joints.
     """
 
-    robot: LoadedRobot
+    robot: OpenedRobot
     loads: tuple[PlacedLoad, ...]
     convention: Convention
     rows: ResultRows
@@ -50,7 +50,7 @@ class Decomposer:
     wholes: tuple[Sum, ...]
     """Parts of each τ_i: τ_ij, passive torques of the joint, τ_ie."""
     induced: InducedShares
-    forces: BorneForces
+    forces: ReactionForces
     times: ContactTimes | None
     terms: ContactTerms | None
     """Terms of the robot on its contacts; None without contacts."""
@@ -58,7 +58,7 @@ class Decomposer:
     @classmethod
     def of(
         cls,
-        robot: LoadedRobot,
+        robot: OpenedRobot,
         convention: Convention,
         power_terms: bool = False,
         loads: Sequence[PlacedLoad] = (),
@@ -77,7 +77,7 @@ class Decomposer:
         sources = TermArrays(*([row[-1] for row in some] for some in of_robot))
         parts = _sums(rows, "tau_link", *TERMS)
         wholes = _sums(rows, "tau", "tau_link", *PASSIVE, "tau_load")
-        forces = BorneForces(robot, tuple(loads), times)
+        forces = ReactionForces(robot, tuple(loads), times)
         return cls(
             robot, tuple(loads), convention, rows, sources, parts, wholes, induced, forces, times, terms
         )

@@ -9,8 +9,8 @@ import numpy as np
 from linkwise_runtime.rule.joint_tree import TreeFrame
 
 from linkwise.analysis.contacts.ground import GroundContacts
-from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.errors import LinkwiseError
 from linkwise.oracle.contacts import contact_rows
@@ -111,7 +111,7 @@ def worst_of(pairs: list[tuple[float, float]]) -> tuple[float, float]:
 
 
 def against_recursion(
-    robot: LoadedRobot, loads: Sequence[PlacedLoad], rows: ResultRows, block: Array
+    robot: OpenedRobot, loads: Sequence[PlacedLoad], rows: ResultRows, block: Array
 ) -> Closure:
     """Return the errors of τ_ij, P_ij, τ_ie of some samples of a block (rows, S) against Newton–Euler.
 
@@ -150,7 +150,7 @@ def against_recursion(
 
 
 def _borne(
-    robot: LoadedRobot, recursion: NewtonEuler, torque: Array, q: Array, shares: Array
+    robot: OpenedRobot, recursion: NewtonEuler, torque: Array, q: Array, shares: Array
 ) -> tuple[Array, Array]:
     """Return what joints carry of torques (S, n, X) of the open tree: without contacts, and with them.
 
@@ -182,11 +182,11 @@ def load_torque(recursion: NewtonEuler, borne: PlacedLoad, time: Array, q: Array
         return recursion.poses([frame], q)[:, 0]
 
     force, moment, place = borne.wrench(time, q, pose)
-    seat = [(borne.seat.frame.joint, np.zeros(3))]
-    arm = place - recursion.places(seat, q)[:, 0]
+    frame = [(borne.acts_on.frame.joint, np.zeros(3))]
+    arm = place - recursion.places(frame, q)[:, 0]
     out = np.zeros_like(q)
     for i in range(recursion.n):
-        velocity, _ = recursion.points(seat, q, np.eye(recursion.n)[i] + 0.0 * q, 0.0 * q)
+        velocity, _ = recursion.points(frame, q, np.eye(recursion.n)[i] + 0.0 * q, 0.0 * q)
         omega, v = velocity[:, 0, :3], velocity[:, 0, 3:]
         out[:, i] = -(moment * omega).sum(-1) - (force * (v + np.cross(omega, arm))).sum(-1)
     return out

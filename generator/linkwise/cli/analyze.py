@@ -8,7 +8,7 @@ import typer
 
 from linkwise.analysis import Analysis
 from linkwise.analysis.choices import AnalysisChoices
-from linkwise.analysis.payload import carrying
+from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.run import analyze_to
 from linkwise.cli import Json, tell
 from linkwise.cli.flags import takes
@@ -36,7 +36,7 @@ def analyze(
     """Decompose a recorded movement: every torque term, as a table, figures and a page."""
     with shown_progress() as progress:
         package = opened_robot(robot, backend, options, progress)
-    package = carrying(package, chosen.payloads(package))
+    package = with_payloads(package, chosen.payloads(package))
     asked = chosen.request(package)
     with shown_progress(UNITS) as progress:
         analysis, files = analyze_to(out, log, package, asked, progress)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
+from linkwise.analysis.opened_robot import OpenedRobot, load_robot
 from linkwise.cli import tell
 from linkwise.cli.flags import tell_run
 from linkwise.package_cache import kept_package
@@ -34,7 +34,7 @@ RobotOption = Annotated[
 Backend = Annotated[str | None, typer.Option(help="Back end of the package; its fastest if not given")]
 
 
-def opened_robot(robot: Path, backend: str | None, options: Options, progress: Progress) -> LoadedRobot:
+def opened_robot(robot: Path, backend: str | None, options: Options, progress: Progress) -> OpenedRobot:
     """Load the robot; report that it was run, if it is a program, and what of its file affects the torques.
 
     Raises LinkwiseError.

@@ -12,7 +12,7 @@ import numpy as np
 from linkwise_runtime.constraints.independent_joints import loose_base
 from numpy.typing import NDArray
 
-from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.identification.random_motions import SPEED, Motion
 from linkwise.package.load import Array
 
@@ -24,7 +24,7 @@ RANK = 1e-6
 class Bearings:
     """Joints whose friction counts: first those with measured torques, then those that follow."""
 
-    robot: LoadedRobot
+    robot: OpenedRobot
     measured: tuple[int, ...]
     joints: tuple[int, ...]
     """Numbers of the joints, (B,)."""
@@ -34,7 +34,7 @@ class Bearings:
     """Root mean square of the joints' columns over random motions, (B, 2)."""
 
     @classmethod
-    def of(cls, robot: LoadedRobot, measured: tuple[int, ...], motion: Motion, friction: bool) -> "Bearings":
+    def of(cls, robot: OpenedRobot, measured: tuple[int, ...], motion: Motion, friction: bool) -> "Bearings":
         """Return the bearings of a robot; `friction` is whether the friction of any joint is fitted."""
         followers = [i for i in range(len(robot.joints)) if i not in robot.driven]
         joints = (*measured, *followers)
@@ -60,7 +60,7 @@ class Bearings:
         return carried
 
 
-def floating_coordinates(robot: LoadedRobot) -> frozenset[int]:
+def floating_coordinates(robot: OpenedRobot) -> frozenset[int]:
     """Return the coordinates of a floating base, in space or in a plane; an empty set for any other base."""
     tree = robot.model.backend.tree
     return frozenset() if tree is None else frozenset(loose_base(tree))

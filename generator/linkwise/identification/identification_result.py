@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.identification.base_parameters import BaseParameters
 from linkwise.identification.bearings import Bearings, floating_coordinates
 from linkwise.identification.fit import Fit
@@ -18,7 +18,7 @@ from linkwise.package.load import Array
 class Identification:
     """Result of an identification: a robot's parameters by a log."""
 
-    robot: LoadedRobot
+    robot: OpenedRobot
     log: TorqueLog
     base: BaseParameters
     bearings: Bearings

@@ -9,7 +9,7 @@ import numpy as np
 from linkwise_runtime.rule.joint_tree import Bodies
 from linkwise_runtime.rule.regressors import inertial_parameters
 
-from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
+from linkwise.analysis.opened_robot import OpenedRobot, load_robot
 from linkwise.analysis.settings import Processing, Reading, pairs
 from linkwise.errors import LinkwiseError, within
 from linkwise.identification.base_parameters import BaseParameters, base_parameters, samples_needed
@@ -61,7 +61,7 @@ class Fitting:
 
 def identify(
     log: str | Path,
-    robot: str | PathLike[str] | LoadedRobot,
+    robot: str | PathLike[str] | OpenedRobot,
     reading: Reading | None = None,
     processing: Processing | None = None,
     fitting: Fitting | None = None,
@@ -74,7 +74,7 @@ def identify(
     Velocities and accelerations come from positions, as in `analyze`; torques are used as they are.
     Raises LinkwiseError, in one line that names the fix, for what cannot be identified.
     """
-    loaded = robot if isinstance(robot, LoadedRobot) else load_robot(Path(robot))
+    loaded = robot if isinstance(robot, OpenedRobot) else load_robot(Path(robot))
     own = _own_parameters(loaded)
     reading, processing, fitting = reading or Reading(), processing or Processing(), fitting or Fitting()
     torques = fitting.torques, fitting.unmeasured, fitting.factor
@@ -97,14 +97,14 @@ def identify(
     return replace(found, warnings=(*read.warnings, *doubts(found, noisy)))
 
 
-def _random_motion(robot: LoadedRobot, read: TorqueLog) -> Motion:
+def _random_motion(robot: OpenedRobot, read: TorqueLog) -> Motion:
     samples = samples_needed(robot.model, len(robot.driven))
     if robot.constrained is None:
         return random_motion(robot.model, samples)
     return random_closed_motion(robot.constrained, read.q[read.start : read.stop], samples)
 
 
-def _own_parameters(robot: LoadedRobot) -> Array:
+def _own_parameters(robot: OpenedRobot) -> Array:
     if robot.bodies is None:
         raise LinkwiseError(f"{robot.name} is made of energies; only rigid links have parameters to identify")
     if curved := [robot.joints[body.coordinate] for body in robot.bodies if body.curve]:

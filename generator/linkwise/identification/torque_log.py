@@ -11,8 +11,8 @@ from linkwise_runtime.chosen_names import nearest_first
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples
 from linkwise.analysis.column_matching import TIMES, with_columns, with_nearest
 from linkwise.analysis.filtering import lowpass
-from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.logs import open_log
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.samples import read_samples
 from linkwise.analysis.settings import Lowpass, Processing, Reading
 from linkwise.analysis.stream import span_of
@@ -56,7 +56,7 @@ class TorqueLog:
 
 def read_torque_log(
     path: Path,
-    robot: LoadedRobot,
+    robot: OpenedRobot,
     reading: Reading,
     processing: Processing,
     torques: Sequence[tuple[str, str]],
@@ -105,7 +105,7 @@ def read_torque_log(
 
 
 def _measured(
-    robot: LoadedRobot, torques: Sequence[tuple[str, str]], unmeasured: Sequence[str]
+    robot: OpenedRobot, torques: Sequence[tuple[str, str]], unmeasured: Sequence[str]
 ) -> tuple[int, ...]:
     """Return the joints that must have a torque, from 0; raise LinkwiseError for impossible choices."""
     joints = robot.driven_joints
@@ -182,7 +182,7 @@ def _torque_columns(
 
 
 def _refuse_more_torques(
-    columns: Sequence[str], robot: LoadedRobot, used: Sequence[str], measured: Sequence[int]
+    columns: Sequence[str], robot: OpenedRobot, used: Sequence[str], measured: Sequence[int]
 ) -> None:
     """Raise LinkwiseError for an unused torque column: its joint has another, is unmeasured or follows."""
     for i, joint in enumerate(robot.joints):
@@ -216,7 +216,7 @@ def _refuse_endless(values: Array, joints: Sequence[str], what: str) -> None:
         )
 
 
-def _refuse_still(q: Array, robot: LoadedRobot, measured: Sequence[int]) -> None:
+def _refuse_still(q: Array, robot: OpenedRobot, measured: Sequence[int]) -> None:
     ranges = np.ptp(q, axis=0)
     still = [at for at in measured if ranges[at] < STILL]
     if still:

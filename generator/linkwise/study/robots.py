@@ -7,7 +7,7 @@ from pathlib import Path
 
 from linkwise_runtime.version import VERSION
 
-from linkwise.analysis.loaded_robot import LoadedRobot, load_robot
+from linkwise.analysis.opened_robot import OpenedRobot, load_robot
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.package.manifest import FILE, Manifest
@@ -91,14 +91,14 @@ def _refuse_unread(robot: str, package: Path) -> None:
         )
 
 
-def loaded_robot(robot: str, plan: StudyPlan) -> LoadedRobot:
+def opened_robot(robot: str, plan: StudyPlan) -> OpenedRobot:
     """Return a trial's robot, loaded; those of the last trials are kept in memory."""
     directory = package_of(robot, plan).directory
     return _loaded(directory, version_of(str(directory / FILE)))
 
 
 @lru_cache(ROBOTS)
-def _loaded(directory: Path, version: str) -> LoadedRobot:
+def _loaded(directory: Path, version: str) -> OpenedRobot:
     """Return the robot of a package whose manifest is of that version."""
     return load_robot(directory)
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from linkwise.analysis.contacts.standing import standing_on
+from linkwise.analysis.contacts.standing import with_contacts
 from linkwise.analysis.disk_rows import EverySample
 from linkwise.analysis.job import Job, prepared
-from linkwise.analysis.payload import carrying
+from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.phases import Phase
 from linkwise.analysis.show.page import report
 from linkwise.errors import LinkwiseError
@@ -31,7 +31,7 @@ from linkwise.study.ledger import (
     require_seen,
 )
 from linkwise.study.plan import StudyPlan, Trial
-from linkwise.study.robots import loaded_robot
+from linkwise.study.robots import opened_robot
 from linkwise.study.summary import RunningMoments
 from linkwise.study.tables import TrialTable, kept_columns
 
@@ -133,11 +133,11 @@ def prepared_trial(plan: StudyPlan, trial: Trial, buffer: Path) -> Job:
 
     buffer: a directory that keeps the samples
     """
-    loaded = loaded_robot(trial.robot, plan)
-    robot = carrying(loaded, trial.choices.payloads(loaded))
+    loaded = opened_robot(trial.robot, plan)
+    robot = with_payloads(loaded, trial.choices.payloads(loaded))
     asked = trial.choices.request(robot)
-    robot = standing_on(robot, asked.contacts)
-    wanted = replace(asked.wanted, page=plan.pages)
+    robot = with_contacts(robot, asked.contacts)
+    outputs = replace(asked.outputs, page=plan.pages)
     if plan.cycles is not None and plan.cycles.what:
-        wanted = replace(wanted, phases=(*wanted.phases, Phase.of(f"cycle={plan.cycles.what}")))
-    return prepared(Path(trial.log), robot, replace(asked, wanted=wanted), silent, buffer)
+        outputs = replace(outputs, phases=(*outputs.phases, Phase.of(f"cycle={plan.cycles.what}")))
+    return prepared(Path(trial.log), robot, replace(asked, outputs=outputs), silent, buffer)

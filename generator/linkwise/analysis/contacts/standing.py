@@ -11,13 +11,13 @@ from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.ground import GroundContacts
-from linkwise.analysis.loaded_robot import LoadedRobot, body_frame
 from linkwise.analysis.loads.placed import moving_joints
+from linkwise.analysis.opened_robot import OpenedRobot, body_frame
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 
 
-def standing_on(robot: LoadedRobot, contacts: Contacts) -> LoadedRobot:
+def with_contacts(robot: OpenedRobot, contacts: Contacts) -> OpenedRobot:
     """Return the robot with contacts.
 
     Raises LinkwiseError for frames that do not exist or stand on the ground, contacts that leave nothing to
@@ -38,7 +38,7 @@ def standing_on(robot: LoadedRobot, contacts: Contacts) -> LoadedRobot:
     unactuated = _unactuated(robot, contacts.unactuated)
     given = tuple(_named(robot, contact) for contact in contacts.given)
     made = tuple(_constraints(robot, contact) for contact in given)
-    loaded = robot.borne_by({i for frame in frames for i in moving_joints(tree, frame.joint)})
+    loaded = robot.joints_supporting({i for frame in frames for i in moving_joints(tree, frame.joint)})
     ground = GroundContacts(
         tuple(names),
         given,
@@ -50,7 +50,7 @@ def standing_on(robot: LoadedRobot, contacts: Contacts) -> LoadedRobot:
     return replace(robot, contacts=ground)
 
 
-def _unactuated(robot: LoadedRobot, given: Sequence[str]) -> tuple[int, ...]:
+def _unactuated(robot: OpenedRobot, given: Sequence[str]) -> tuple[int, ...]:
     """Return the joints that nothing drives: those given, or those of the floating base."""
     for name in given:
         if name not in robot.driven_joints:
@@ -70,7 +70,7 @@ def _unactuated(robot: LoadedRobot, given: Sequence[str]) -> tuple[int, ...]:
     return found
 
 
-def _named(robot: LoadedRobot, contact: Contact) -> Contact:
+def _named(robot: OpenedRobot, contact: Contact) -> Contact:
     """Return the contact with its name, and if it rolls, the ground's normal: given, or against gravity."""
     tree = robot.package.manifest.tree
     gravity = (0.0, 0.0, 0.0) if tree is None else tree.gravity
@@ -83,7 +83,7 @@ def _named(robot: LoadedRobot, contact: Contact) -> Contact:
         raise LinkwiseError(str(error)) from None
 
 
-def _constraints(robot: LoadedRobot, contact: Contact) -> Any:
+def _constraints(robot: OpenedRobot, contact: Contact) -> Any:
     model: Any = robot.model
     try:
         return model.constrained(contacts=[contact])

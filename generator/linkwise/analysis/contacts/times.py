@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from linkwise.analysis.column_matching import time_column
 from linkwise.analysis.contacts import Contacts, WhileColumn
 from linkwise.analysis.disk_rows import collected
-from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads import FORCE
 from linkwise.analysis.loads.placed import PlacedLoad, Wrench, model_pose
 from linkwise.analysis.loads.read import placed_loads
 from linkwise.analysis.logs import Log
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.samples import finite_blocks
 from linkwise.analysis.settings import Reading
 from linkwise.errors import LinkwiseError, within
@@ -128,7 +128,7 @@ def _wrenches(loads: Sequence[PlacedLoad], model: Dynamics, time: Array, q: Arra
 def contact_times(
     contacts: Contacts,
     log: Log,
-    robot: LoadedRobot,
+    robot: OpenedRobot,
     reading: Reading,
     motion: Array,
     progress: Progress,
@@ -155,7 +155,7 @@ def contact_times(
 
 
 def _told(loads: Sequence[PlacedLoad]) -> str:
-    return listed([f"{load.name} is on {load.seat.frame.name}" for load in loads])
+    return listed([f"{load.name} is on {load.acts_on.frame.name}" for load in loads])
 
 
 def switch_columns(contacts: Contacts, log: Log) -> tuple[str, ...]:
@@ -180,7 +180,7 @@ def read_switch(given: WhileColumn, log: Log, reading: Reading, progress: Progre
     return Switch(given, collected(finite_blocks(log, columns, progress), 2, None))
 
 
-def _by_contact(robot: LoadedRobot, loads: Sequence[PlacedLoad]) -> tuple[tuple[PlacedLoad, ...], ...]:
+def _by_contact(robot: OpenedRobot, loads: Sequence[PlacedLoad]) -> tuple[tuple[PlacedLoad, ...], ...]:
     """Return the loads on the body of each contact.
 
     Raises LinkwiseError for a load on another body, or on a body with two contacts.
@@ -188,7 +188,7 @@ def _by_contact(robot: LoadedRobot, loads: Sequence[PlacedLoad]) -> tuple[tuple[
     bodies = [robot.body_of(contact.frame) for contact in robot.ground.contacts]
     found: list[list[PlacedLoad]] = [[] for _ in bodies]
     for load in loads:
-        there = [number for number, body in enumerate(bodies) if body == load.seat.frame.joint]
+        there = [number for number, body in enumerate(bodies) if body == load.acts_on.frame.joint]
         if len(there) != 1:
             mend = "where no contact is; give it with --loads, or leave it out"
             if there:
@@ -197,7 +197,7 @@ def _by_contact(robot: LoadedRobot, loads: Sequence[PlacedLoad]) -> tuple[tuple[
                     " they stand with --contact-while"
                 )
             raise LinkwiseError(
-                f"--contact-loads: load {load.name!r} acts on {load.seat.frame.name!r}, {mend}"
+                f"--contact-loads: load {load.name!r} acts on {load.acts_on.frame.name!r}, {mend}"
             )
         found[there[0]].append(load)
     return tuple(map(tuple, found))

@@ -13,8 +13,8 @@ import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.rule.joint_tree import TreeFrame
 
-from linkwise.analysis.loaded_robot import LoadedRobot, body_frame
 from linkwise.analysis.loads import FORCE, MOMENT, POINT, WORLD
+from linkwise.analysis.opened_robot import OpenedRobot, body_frame
 from linkwise.errors import LinkwiseError
 from linkwise.package.load import Array
 from linkwise.package.manifest import RigidTree
@@ -32,7 +32,7 @@ class Wrench(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Seat:
+class LoadFrame:
     """Frame on which a load acts, and the frames in which its numbers are given, None for the world."""
 
     frame: TreeFrame
@@ -52,7 +52,7 @@ class PlacedLoad:
     """A load that a robot carries."""
 
     name: str
-    seat: Seat
+    acts_on: LoadFrame
     table: Array
     """Rows of time, force, moment, point (S, 10); moments are about the origin if all is in the world."""
     source: str
@@ -64,27 +64,27 @@ class PlacedLoad:
 
     def wrench(self, time: Array, q: Array, pose: Pose) -> Wrench:
         """Return the wrench that acts at instants (S,) with the robot at q (S, n)."""
-        rows, seat = self._at(time), self.seat
+        rows, load_frame = self._at(time), self.acts_on
         force, moment, point = rows[:, FORCE], rows[:, MOMENT], rows[:, POINT]
-        if seat.in_world:
+        if load_frame.in_world:
             return Wrench(force, moment - np.cross(point, force), point)
-        if seat.axes is not None:
-            turn = pose(seat.axes, q)[:, :3, :3]
+        if load_frame.axes is not None:
+            turn = pose(load_frame.axes, q)[:, :3, :3]
             force, moment = (np.einsum("sab,sb->sa", turn, a) for a in (force, moment))
-        if seat.point_in is not None:
-            at = pose(seat.point_in, q)
+        if load_frame.point_in is not None:
+            at = pose(load_frame.point_in, q)
             point = np.einsum("sab,sb->sa", at[:, :3, :3], point) + at[:, :3, 3]
         return Wrench(force, moment, point)
 
     def torque(self, model: Dynamics, time: Array, q: Array) -> Array:
         """Return the joint torques τ_ie (S, n) that the load requires, in N·m or N."""
         force, moment, place = self.wrench(time, q, model_pose(model))
-        found: Any = model.kinematics.load_torque(q, self.seat.frame.name, force, moment, at=place)
+        found: Any = model.kinematics.load_torque(q, self.acts_on.frame.name, force, moment, at=place)
         return np.asarray(found)
 
     def record(self) -> dict[str, Any]:
         """Return the load as plain data, to record in the outputs."""
-        body = self.seat.frame.name
+        body = self.acts_on.frame.name
         return {"name": self.name, "body": body, "file": self.source, "cutoff": self.cutoff}
 
     def _at(self, time: Array) -> Array:
@@ -102,8 +102,8 @@ def model_pose(model: Dynamics) -> Pose:
     return lambda frame, q: np.asarray(model.kinematics.pose(q, frame.name))
 
 
-def seat_of(load: str, body: str, axes: str, point_in: str | None, robot: LoadedRobot) -> Seat:
-    """Return the seat of a load: its frame, and the frames of its numbers.
+def load_frame_of(load: str, body: str, axes: str, point_in: str | None, robot: OpenedRobot) -> LoadFrame:
+    """Return where a load acts: its frame, and the frames of its numbers.
 
     Raises LinkwiseError for bodies that do not exist, for one on the ground, and for links that are energies.
     """
@@ -118,10 +118,10 @@ def seat_of(load: str, body: str, axes: str, point_in: str | None, robot: Loaded
     if frame.joint is None:
         raise LinkwiseError(f"{what} on {body!r}: that stands on the ground, so that no joint bears it")
     seen = frame if point_in is None else _seen_in(what, point_in, robot, tree)
-    return Seat(frame, _seen_in(what, axes, robot, tree), seen, moving_joints(tree, frame.joint))
+    return LoadFrame(frame, _seen_in(what, axes, robot, tree), seen, moving_joints(tree, frame.joint))
 
 
-def _seen_in(what: str, name: str, robot: LoadedRobot, tree: RigidTree) -> TreeFrame | None:
+def _seen_in(what: str, name: str, robot: OpenedRobot, tree: RigidTree) -> TreeFrame | None:
     """Return the frame of a name, None for the world, which OpenSim calls ground."""
     own = next((frame for frame in tree.frames if frame.name == name), None)
     if name in (WORLD, "ground") and (own is None or own.joint is None):

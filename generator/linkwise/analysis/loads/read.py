@@ -12,10 +12,10 @@ from linkwise.analysis.column_matching import FAR, time_column, with_nearest
 from linkwise.analysis.disk_rows import collected
 from linkwise.analysis.even_time import even_rate, usual_step
 from linkwise.analysis.filtering import lowpass
-from linkwise.analysis.loaded_robot import LoadedRobot, named_body, told_apart
 from linkwise.analysis.loads import FORCE, MOMENT, PARTS, POINT, WIDTH, WORLD, Load, LoadColumns, Loads
-from linkwise.analysis.loads.placed import PlacedLoad, Seat, seat_of
+from linkwise.analysis.loads.placed import LoadFrame, PlacedLoad, load_frame_of
 from linkwise.analysis.logs import open_log
+from linkwise.analysis.opened_robot import OpenedRobot, named_body, told_apart
 from linkwise.analysis.samples import finite_blocks, slowness
 from linkwise.analysis.settings import Lowpass, Reading
 from linkwise.errors import LinkwiseError, within
@@ -28,7 +28,7 @@ NAMED = re.compile(r"(?P<load>.+)/(?P<part>force|moment|point)_(?P<axis>[xyz])")
 
 def placed_loads(
     wanted: Loads,
-    robot: LoadedRobot,
+    robot: OpenedRobot,
     motion: Array,
     ignore_extra: bool,
     progress: Progress,
@@ -49,7 +49,7 @@ def placed_loads(
     return tuple(loads)
 
 
-def _listed(path: Path, robot: LoadedRobot, ignore_extra: bool) -> tuple[LoadColumns, ...]:
+def _listed(path: Path, robot: OpenedRobot, ignore_extra: bool) -> tuple[LoadColumns, ...]:
     if path.suffix.lower() == ".xml":
         # Imported here, as the readers need SymPy, which other loads can do without.
         from linkwise.analysis.loads.external import external_loads
@@ -61,7 +61,7 @@ def _listed(path: Path, robot: LoadedRobot, ignore_extra: bool) -> tuple[LoadCol
 
 
 def load_columns(
-    log: Path, columns: Sequence[str], robot: LoadedRobot, ignore_extra: bool
+    log: Path, columns: Sequence[str], robot: OpenedRobot, ignore_extra: bool
 ) -> tuple[LoadColumns, ...]:
     """Return the loads of a log, all in the world's axes; raise LinkwiseError for columns that form none."""
     time = time_column(columns, Reading())
@@ -91,7 +91,7 @@ def _load(
     time: int,
     load: str,
     parts: dict[str, dict[str, int]],
-    robot: LoadedRobot,
+    robot: OpenedRobot,
     there: Sequence[str],
 ) -> LoadColumns:
     name, body = named_body(load, robot)
@@ -120,27 +120,27 @@ def _with_doubles_told(loads: Sequence[tuple[LoadColumns, Path]]) -> Iterator[tu
         yield replace(load, warnings=(*load.warnings, *told)), path
 
 
-def _given(load: Load, robot: LoadedRobot, motion: Array) -> PlacedLoad:
-    seat = seat_of(load.name, load.body, load.axes, load.point_in, robot)
+def _given(load: Load, robot: OpenedRobot, motion: Array) -> PlacedLoad:
+    load_frame = load_frame_of(load.name, load.body, load.axes, load.point_in, robot)
     table = load.table()
-    _about_origin(seat, table)
+    _about_origin(load_frame, table)
     if load.time is not None:
         with within(f"load {load.name!r}"):
             _check_time(table[:, 0], motion, 1)
-    return PlacedLoad(load.name, seat, table, "")
+    return PlacedLoad(load.name, load_frame, table, "")
 
 
 def _read(
     load: LoadColumns,
     path: Path,
     cutoff: float | None,
-    robot: LoadedRobot,
+    robot: OpenedRobot,
     motion: Array,
     progress: Progress,
     buffer: Path | None,
 ) -> PlacedLoad:
     with within(str(path)):
-        seat = seat_of(load.name, load.body, load.axes, load.point_in, robot)
+        load_frame = load_frame_of(load.name, load.body, load.axes, load.point_in, robot)
     log = open_log(load.log)
 
     def blocks() -> Iterator[Array]:
@@ -150,7 +150,7 @@ def _read(
             rows[:, 0] = block[:, 0]
             for number, part in enumerate(load.columns):
                 rows[:, PARTS[part]] = block[:, 1 + 3 * number : 4 + 3 * number]
-            _about_origin(seat, rows)
+            _about_origin(load_frame, rows)
             yield rows
 
     table = collected(blocks(), WIDTH, buffer)
@@ -163,7 +163,7 @@ def _read(
     noticed = (*log.warnings, *slowness(1 / usual_step(table[:, 0], log.first_row)))
     noticed += _far(load, table)
     warnings = (*load.warnings, *(f"{load.log.name}: {warning}" for warning in noticed))
-    return PlacedLoad(load.name, seat, table, load.log.name, cutoff, warnings)
+    return PlacedLoad(load.name, load_frame, table, load.log.name, cutoff, warnings)
 
 
 def _far(load: LoadColumns, table: Array) -> tuple[str, ...]:
@@ -174,9 +174,9 @@ def _far(load: LoadColumns, table: Array) -> tuple[str, ...]:
     return (f"load {load.name!r}: its point reaches {largest:.4g} m: if that is mm, divide it by 1000",)
 
 
-def _about_origin(seat: Seat, rows: Array) -> None:
+def _about_origin(load_frame: LoadFrame, rows: Array) -> None:
     """Refer moments to the world's origin where force and point are given in the world, in place."""
-    if seat.in_world:
+    if load_frame.in_world:
         rows[:, MOMENT] += np.cross(rows[:, POINT], rows[:, FORCE])
 
 

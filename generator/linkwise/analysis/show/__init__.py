@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from linkwise_runtime.chosen_names import nearest_first
 
-from linkwise.analysis.loaded_robot import LoadedRobot
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.causes_figure import causes
 from linkwise.analysis.show.contacts_figure import contacts
@@ -51,7 +51,7 @@ def figure_png(result: AnalysisResult, name: str) -> bytes:
         return saved(draw(result, name), "png", dpi=160)
 
 
-def check_figure(name: str, robot: LoadedRobot, points: Sequence[str]) -> None:
+def check_figure(name: str, robot: OpenedRobot, points: Sequence[str]) -> None:
     """Raise LinkwiseError unless `draw` knows the figure; `points` are those of induced accelerations."""
     kind, _, joint = name.partition(":")
     if kind == "induced":

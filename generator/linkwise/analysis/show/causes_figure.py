@@ -84,7 +84,7 @@ def asked_phases(result: AnalysisResult, i: int) -> tuple[PlacedPhase, ...]:
     if result.phases:
         return result.phases
     robot, tree = result.robot, result.robot.package.manifest.tree
-    loads = [one for one in result.loads if i in one.seat.joints]
+    loads = [one for one in result.loads if i in one.acts_on.joints]
     held: list[int] = []
     if robot.contacts is not None and tree is not None:
         moved = [moving_joints(tree, robot.body_of(one.frame)) for one in robot.contacts.contacts]

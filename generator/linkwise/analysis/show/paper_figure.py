@@ -97,7 +97,7 @@ def own_joints(result: AnalysisResult) -> tuple[int, ...]:
     If that joint follows others, the last of these counts.
     """
     robot = result.robot
-    known = {body.link: robot.borne_by([body.coordinate])[-1:] for body in robot.bodies or ()}
+    known = {body.link: robot.joints_supporting([body.coordinate])[-1:] for body in robot.bodies or ()}
     last = [(0,)] * len(robot.links)
     for i, j in result.rows["tau_link"].at.tolist():
         last[j] = max(last[j], (i,))

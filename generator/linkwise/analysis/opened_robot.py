@@ -35,7 +35,7 @@ def load_unit(unit: str) -> str:
 
 
 @dataclass(frozen=True)
-class LoadedRobot:
+class OpenedRobot:
     """A loaded robot: names in the order of every array, and the back end that computes."""
 
     name: str
@@ -148,7 +148,7 @@ class LoadedRobot:
         still = () if self.contacts is None else self.contacts.unactuated
         return tuple(i for i in self.driven if i not in still) or self.driven
 
-    def borne_by(self, joints: Iterable[int]) -> tuple[int, ...]:
+    def joints_supporting(self, joints: Iterable[int]) -> tuple[int, ...]:
         """Return the numbers of the joints with torques that carry what these joints are loaded with."""
         found = set(joints)
         if self.constrained is not None:
@@ -186,7 +186,7 @@ class LoadedRobot:
         return tuple(sorted({own.coordinate for own in self.passive if getattr(own, field)}))
 
 
-def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
+def load_robot(directory: Path, backend: str | None = None) -> OpenedRobot:
     """Import the package in `directory`, with `backend` or the fastest that works here.
 
     Raises LinkwiseError for a directory without a package, a damaged one, or no back end that loads.
@@ -196,7 +196,7 @@ def load_robot(directory: Path, backend: str | None = None) -> LoadedRobot:
     chosen, model = _load(package, package.fastest_first if backend is None else (backend,))
     tree = manifest.tree
     tied = ConstrainedModel.of(model, tree) if tree is not None and tree.tied else None
-    return LoadedRobot(
+    return OpenedRobot(
         manifest.name,
         tuple(model.joint_names),
         tuple(model.joint_units),
@@ -233,7 +233,7 @@ def _load(package: Package, backends: Sequence[str]) -> tuple[str, Dynamics]:
     )
 
 
-def body_frame(what: str, body: str, robot: LoadedRobot) -> TreeFrame:
+def body_frame(what: str, body: str, robot: OpenedRobot) -> TreeFrame:
     """Return the frame of a body of the robot's file.
 
     what: how the message begins
@@ -249,7 +249,7 @@ def body_frame(what: str, body: str, robot: LoadedRobot) -> TreeFrame:
     return frames[name]
 
 
-def named_body(text: str, robot: LoadedRobot) -> tuple[str, str]:
+def named_body(text: str, robot: OpenedRobot) -> tuple[str, str]:
     """Return the name and the body of NAME:BODY; the name is empty for BODY alone.
 
     A body whose own name contains a colon is found too.

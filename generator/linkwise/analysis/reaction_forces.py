@@ -11,8 +11,8 @@ import numpy as np
 
 from linkwise.analysis.contacts.ground import Standing
 from linkwise.analysis.contacts.times import ContactTimes
-from linkwise.analysis.loaded_robot import LoadedRobot
 from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_quantities import FORCE_OF, PASSIVE
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.package.load import Array
@@ -22,10 +22,10 @@ Motion = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True)
-class BorneForces:
+class ReactionForces:
     """Fills the columns of forces, and those of contacts."""
 
-    robot: LoadedRobot
+    robot: OpenedRobot
     loads: tuple[PlacedLoad, ...]
     times: ContactTimes | None
 
