@@ -31,9 +31,9 @@ from linkwise import (
     read_system,
     write_package,
 )
-from linkwise.check import back_end_checks, compiled_c, subject
+from linkwise.check import compiled_c, subject, table
 from linkwise.check.as_generated import check_made
-from linkwise.check.compare import Entries, Result, compare
+from linkwise.check.compare import Entries, compare
 from linkwise.package.load import load_package, open_package
 from linkwise.package.manifest import LARGEST, Manifest, is_too_large
 from linkwise.package.write import check_target
@@ -229,8 +229,7 @@ def test_a_result_given_twice_is_computed_once(tmp_path: Path) -> None:
 @pytest.fixture
 def unread(monkeypatch: pytest.MonkeyPatch) -> None:
     """No text is read before it runs, as if what is wrong were written within the grammar."""
-    held = Result("texts", True, None, "")
-    monkeypatch.setattr("linkwise.check.checks.check_texts", lambda directory, manifest: held)
+    monkeypatch.setattr("linkwise.check.as_generated.foreign", lambda directory, manifest: [])
     monkeypatch.setattr("linkwise.package.importer.foreign_text", lambda *text: None)
     monkeypatch.setattr("linkwise.package.load.foreign", lambda *listed: [])
 
@@ -476,7 +475,7 @@ def test_want_of_memory_speaks_neither_for_a_package_nor_against_it(
         raise OSError("checked.so: failed to map segment from shared object")
 
     write_package(generate(read_system("planar1"), ["numpy", "c"]), tmp_path / "arm")
-    monkeypatch.setattr(back_end_checks, "frame_calls", full)
+    monkeypatch.setattr(table, "frame_calls", full)
     monkeypatch.setattr(compiled_c.ctypes, "CDLL", unmapped)
     found = {result.name: result.mark for result in check_package(tmp_path / "arm", 3)}
     assert (found["numpy: frames"], found["c: not checked"]) == ("skip", "skip")
@@ -501,7 +500,7 @@ def test_an_error_that_quotes_such_words_from_a_package_is_its_fault(
         raise ValueError("joint 'allocate memory' does not close")
 
     write_package(generate(read_system("planar1"), ["numpy"]), tmp_path / "arm")
-    monkeypatch.setattr(back_end_checks, "frame_calls", refused)
+    monkeypatch.setattr(table, "frame_calls", refused)
     found = {result.name: result.mark for result in check_package(tmp_path / "arm", 3)}
     assert found["numpy: frames"] == "FAIL"
 
@@ -543,7 +542,7 @@ def test_a_c_function_is_called_whether_or_not_its_header_declares_it(copy_for: 
 def test_only_what_is_missing_here_is_left_out(
     error: str, mark: str, package: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("linkwise.check.checks.find_spec", lambda name: None)
+    monkeypatch.setattr("linkwise.check.loading.find_spec", lambda name: None)
     change_file(package, "forms/__init__.py", "from .", f"raise {error}\nfrom .", 1)
     found = marks(package)
     assert {found.pop(name) for name in ("hashes", "texts", "manifest", "made")} == {"ok"}
@@ -648,8 +647,7 @@ def test_graphs_of_parts_are_run_against_the_recursion(
 def test_without_torch_a_users_energies_are_held_against_their_own_torques_which_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for module in ("checks", "subject"):
-        monkeypatch.setattr(f"linkwise.check.{module}.find_spec", lambda name: None)
+    monkeypatch.setattr("linkwise.check.subject.find_spec", lambda name: None)
     package = tmp_path / "turntable"
     write_package(generate(read_system(str(DATA / "turntable.py")), ["numpy"]), package)
     found = marks(package)

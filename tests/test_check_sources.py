@@ -13,7 +13,7 @@ from conftest import DATA, needs_compiler
 from linkwise import Options, read_system
 from linkwise.check.compare import ROUNDINGS, Entries, IndexRows, compare
 from linkwise.check.frame_checks import frame_calls, frame_reference
-from linkwise.check.parametric_tree import check_bodies, tree_with
+from linkwise.check.parametric_tree import check_numbers, tree_with
 from linkwise.expression.expression_graph import FUNCTIONS
 from linkwise.oracle.energies import TextLagrangian, energy_reference, states_of_energies
 from linkwise.oracle.formula_text import NAMES, NUMPY, LatexReader, TextFormula, Unreadable, torch_functions
@@ -283,8 +283,8 @@ def test_formulas_of_bodies_give_their_numbers_and_others_for_other_parameters()
     assert tree_with(tree, values) == tree
     assert tree_with(tree, values | {"l_1": 0.4}).bodies[1].translation == (0.4, 0.0, 0.0)
     wrong = replace(tree, formulas=tree.formulas | {"bodies[1].com[0]": "1.001*r_2"})
-    told = [r.detail for r in check_bodies(wrong, [], values, True, "") if r.failed]
-    assert told == ["com of link 'link2'"]
+    told = check_numbers("parameters", wrong, values)
+    assert (told.failed, told.detail) == (True, "com of link 'link2'")
 
 
 def test_text_is_read_as_the_formula_it_shows() -> None:

@@ -2,11 +2,13 @@
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from linkwise_runtime.version import VERSION
 
-from linkwise.check.compare import Result, skipped
+from linkwise.check.compare import Result, line_of, skipped
 from linkwise.emit.backend import backends_of
 from linkwise.emit.c.shared_headers import INNER, with_headers
 from linkwise.emit.shared_texts import BodyText, init_text, names_text
@@ -16,7 +18,7 @@ from linkwise.package.agreement import disagreements, wrong_counts
 from linkwise.package.bytecode import caches, is_compiled_from_source
 from linkwise.package.contents import changed_files, unlisted_files
 from linkwise.package.emitted_text import foreign
-from linkwise.package.load import Package
+from linkwise.package.load import Package, load_package, refuse_exit
 from linkwise.package.manifest import Manifest, altered_entries
 from linkwise.package.own_files import own_folder
 from linkwise.package.runtime_imports import of_copy, of_library
@@ -31,11 +33,30 @@ BODY = re.compile(
 """Pattern of a body in names.py: its link, parameters and values."""
 
 
-def check_files(directory: Path, manifest: Manifest) -> list[Result]:
+@dataclass(frozen=True)
+class GeneratedFiles:
+    """The files of a package, and the manifest that lists them."""
+
+    directory: Path
+    manifest: Manifest
+
+    @cached_property
+    def package(self) -> Package:
+        """The package, imported; passes on whatever it raises."""
+        return load_package(self.directory, self.manifest)
+
+    @cached_property
+    def compared(self) -> tuple[Result, Result]:
+        """Results on the manifest, and on the files that follow from it."""
+        return check_manifest(self.package), check_made(self.package)
+
+
+def check_files(name: str, files: GeneratedFiles) -> list[Result]:
     """Check every file against its hash, and each compiled module against its source.
 
     Symbolic links are faults.
     """
+    directory, manifest = files.directory, files.manifest
     wrong = [] if manifest.files else ["the manifest lists no files"]
     wrong += changed_files(directory, manifest.files)
     try:
@@ -48,21 +69,31 @@ def check_files(directory: Path, manifest: Manifest) -> list[Result]:
         if cache.readable and not is_compiled_from_source(cache):
             place = cache.file.relative_to(directory) if cache.file.is_relative_to(directory) else cache.file
             wrong.append(f"{place} is not {cache.source.name} compiled, delete it")
-    results = [_result("hashes", wrong, f"{len(manifest.files)} files as generated")]
+    results = [_result(name, wrong, f"{len(manifest.files)} files as generated")]
     others = sorted({cache.python for cache in compiled if cache.finished and not cache.readable})
     if others:
         results.append(skipped("__pycache__", f"compiled by {', '.join(others)}: not checked by this Python"))
     return results
 
 
-def check_texts(directory: Path, manifest: Manifest) -> Result:
+def check_texts(name: str, files: GeneratedFiles) -> list[Result]:
     """Read as text every file that could run: nothing is imported or compiled that linkwise doesn't write."""
-    wrong = foreign(directory, manifest)
-    version = manifest.generator.get("linkwise")
+    manifest = files.manifest
+    wrong, version = foreign(files.directory, manifest), manifest.generator.get("linkwise")
     if not wrong and manifest.runtime.vendored and version != VERSION:
         unread = f"the runtime that it carries is of linkwise {version}, which is not at hand to compare with"
-        return skipped("texts", f"{unread}: its code runs as it is")
-    return _result("texts", wrong, "hold arithmetic and calls of the runtime alone, read before they run")
+        return [skipped(name, f"{unread}: its code runs as it is")]
+    told = "hold arithmetic and calls of the runtime alone, read before they run"
+    return [_result(name, wrong, told)]
+
+
+def check_import(name: str, files: GeneratedFiles) -> Iterator[Result]:
+    """Yield a failed result where a package cannot be imported, or not compared with its manifest."""
+    try:
+        with refuse_exit():
+            _ = files.compared
+    except Exception as error:
+        yield Result(name, False, None, line_of(error))
 
 
 def check_manifest(package: Package) -> Result:

@@ -60,6 +60,11 @@ def is_short_of_memory(error: Exception) -> bool:
     return isinstance(error, MemoryError)
 
 
+def line_of(error: Exception) -> str:
+    """Return an error's kind and message on one line."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+
+
 @dataclass(frozen=True)
 class Entries:
     """Values beside the expected ones, samples first; scale: size of the numbers that each is the sum of.

@@ -24,7 +24,7 @@ NAMES = {
 
 
 def derivations(
-    loaded: Mapping[str, Dynamics], rows: IndexRows, reference: Reference, how: str, label: str
+    name: str, loaded: Mapping[str, Dynamics], rows: IndexRows, reference: Reference, how: str
 ) -> Iterator[Result]:
     """Yield a comparison of every two derivations that are there.
 
@@ -47,7 +47,7 @@ def derivations(
             Entries(what, value, answers[other][what][0], scale, None if what == "c0" else rows.of(what))
             for what, (value, scale) in answers[one].items()
         ]
-        yield compare(f"derivations{label}: {one} against {other}", entries, reference.tolerance)
+        yield compare(f"{name}: {one} against {other}", entries, reference.tolerance)
 
 
 def _answers(model: Dynamics, rows: IndexRows, reference: Reference) -> dict[str, tuple[Array, Array]]:

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.version import VERSION
 
-from linkwise.check.compare import Entries, IndexRows, Result, compare, skipped
+from linkwise.check.compare import Entries, Result, compare, skipped
+from linkwise.check.subject import Subject
 from linkwise.emit.formula_page import Row, formula_page
 from linkwise.oracle.formula_text import NUMPY, LatexReader, TextFormula, Unreadable, parameter_values
 from linkwise.oracle.reference import Reference
 from linkwise.package.formula_symbols import MOTION, motion_symbol, parameter_symbols
-from linkwise.package.load import Array, Package
+from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 Formula = Callable[[Mapping[str, Any]], Any]
@@ -28,38 +29,26 @@ DIGITS = 1e-12
 """Rounding of numbers in these texts, to twelve digits; what cancelling leaves below it is left out."""
 
 
-def check_formulas(
-    package: Package,
-    rows: IndexRows,
-    parameters: Mapping[str, float],
-    label: str,
-    reference: Reference | None,
-) -> Iterator[Result]:
-    """Yield the results of each text; every line of it counts, also those between the formulas."""
-    manifest = package.manifest
-    readers = {"txt": _text_row, "tex": _latex_row(manifest)}
-    for ending, pattern in PATTERNS.items():
-        file = f"formulas.{ending}"
-        if file not in manifest.files:
-            continue
-        text = (package.directory / file).read_bytes().decode()
-        found = [(int(i) - 1, int(j) - 1, formula) for i, j, formula in pattern.findall(text)]
-        if [(i, j) for i, j, _ in found] != [(i, j) for i, j in rows.tau.tolist()]:
-            told = "it lists other torques than the paths say"
-            yield Result(f"{file}{label}: every tau_ij", False, None, told)
-            continue
-        if not label:
-            yield _lines(manifest, ending, text, found)
-        if reference is None:
-            yield skipped(f"{file}{label}: not checked", "there is nothing to hold it against")
-            continue
-        formulas = [readers[ending](formula) for *_, formula in found]
-        yield _numbers(f"{file}{label}", formulas, rows, parameters, reference)
+def check_formulas(name: str, ending: str, subject: Subject) -> Iterator[Result]:
+    """Yield the results of formulas.txt or formulas.tex; lines between the formulas count too."""
+    manifest, rows = subject.manifest, subject.rows
+    text = (subject.package.directory / f"formulas.{ending}").read_bytes().decode()
+    found = [(int(i) - 1, int(j) - 1, formula) for i, j, formula in PATTERNS[ending].findall(text)]
+    if [(i, j) for i, j, _ in found] != [(i, j) for i, j in rows.tau.tolist()]:
+        yield Result(f"{name}: every tau_ij", False, None, "it lists other torques than the paths say")
+        return
+    if subject.as_generated:
+        yield _lines(f"{name}: lines", manifest, ending, text, found)
+    if not subject.has_numbers:
+        yield skipped(f"{name}: not checked", "there is nothing to hold it against")
+        return
+    read = {"txt": _text_row, "tex": _latex_row(manifest)}[ending]
+    yield _numbers(name, [read(formula) for *_, formula in found], subject)
 
 
-def _lines(manifest: Manifest, ending: str, text: str, found: Sequence[Row]) -> Result:
+def _lines(name: str, manifest: Manifest, ending: str, text: str, found: Sequence[Row]) -> Result:
     """Compare the text with the page that linkwise makes of the same formulas."""
-    name, version = f"formulas.{ending}: lines", manifest.generator.get("linkwise")
+    version = manifest.generator.get("linkwise")
     if version != VERSION:
         return skipped(name, f"those of linkwise {version}, which is not at hand to compare with")
     joints, links = ([part.name for part in parts] for parts in (manifest.joints, manifest.links))
@@ -72,20 +61,15 @@ def _lines(manifest: Manifest, ending: str, text: str, found: Sequence[Row]) -> 
     return Result(name, not wrong, None, told)
 
 
-def _numbers(
-    name: str,
-    formulas: Sequence[Formula],
-    rows: IndexRows,
-    parameters: Mapping[str, float],
-    reference: Reference,
-) -> Result:
+def _numbers(name: str, formulas: Sequence[Formula], subject: Subject) -> Result:
     """Compare the formulas' values with the reference; one that cannot be read as a formula fails."""
-    names = _names(parameters, reference)
+    reference = subject.reference
+    names = _names(subject.parameters, reference)
     try:
         tau = np.stack([_filled(formula(names), reference) for formula in formulas], -1)
     except Unreadable as unread:
         return Result(f"{name}: can be read", False, None, f"it holds {unread}")
-    at = (slice(None), *rows.tau.T)
+    at = (slice(None), *subject.rows.tau.T)
     entries = [Entries("entry ", tau, reference.values["tau"][at], reference.scales["tau"][at])]
     # The rounding is that of numbers with DIGITS, not that of float64.
     told = f"{name}: tau_ij against {reference.name}"

@@ -1,7 +1,7 @@
 """A manifest's rigid bodies for any values of the run-time parameters, by the formulas that it gives."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -73,45 +73,48 @@ def _neighbours(values: Mapping[str, float], tree: RigidTree) -> dict[str, float
     return sizes
 
 
+def check_numbers(name: str, tree: RigidTree, values: Mapping[str, float]) -> Result:
+    """Check the tree's numbers against its formulas, for the values that it was generated with."""
+    varied = tree_with(tree, values)
+    wrong = [
+        f"{field} of link {number.link!r}"
+        for number, formula in zip(tree.bodies, varied.bodies, strict=True)
+        for field in VARIED
+        if not _alike(getattr(number, field), getattr(formula, field))
+    ]
+    wrong += [
+        f"translation of frame {number.name!r}"
+        for number, formula in zip(tree.frames, varied.frames, strict=True)
+        if not _alike(number.translation, formula.translation)
+    ]
+    wrong += [] if _alike(tree.gravity, varied.gravity) else ["gravity"]
+    return _result(name, wrong)
+
+
 def check_bodies(
+    name: str,
     tree: RigidTree,
     bodies: Sequence[ParametricBody],
     values: Mapping[str, float],
     unphysical: bool,
-    label: str,
-) -> Iterator[Result]:
-    """Yield checks of the tree's numbers, and the bodies that `load` looks at, against its formulas."""
-    varied = tree_with(tree, values)
-    if not label:
-        wrong = [
-            f"{name} of link {number.link!r}"
-            for number, formula in zip(tree.bodies, varied.bodies, strict=True)
-            for name in ("translation", "mass", "com", "inertia")
-            if not _alike(getattr(number, name), getattr(formula, name))
-        ]
-        wrong += [
-            f"translation of frame {number.name!r}"
-            for number, formula in zip(tree.frames, varied.frames, strict=True)
-            if not _alike(number.translation, formula.translation)
-        ]
-        wrong += [] if _alike(tree.gravity, varied.gravity) else ["gravity"]
-        yield _result("parameters: formulas of the bodies give their numbers", wrong)
+) -> Result:
+    """Check the bodies that `load` looks at against the tree's formulas, for any values."""
     known = {body.link: body for body in bodies}
     wrong = []
-    for b, (own, body) in enumerate(zip(tree.bodies, varied.bodies, strict=True)):
+    for b, (own, body) in enumerate(zip(tree.bodies, tree_with(tree, values).bodies, strict=True)):
         names = _names(tree, b, list(values))
         looked_at = bool(names) and not unphysical and not faults(_listed(own)).any()
         rule = known.pop(body.link, None)
         if looked_at != (rule is not None):
             wrong.append(f"link {body.link!r} is {'not ' if looked_at else ''}among them")
         elif rule is not None:
-            numbers = {name: np.float64(value) for name, value in values.items()}
+            numbers = {parameter: np.float64(value) for parameter, value in values.items()}
             found = np.array(rule.mass_and_inertia(numbers), dtype=float)
             same = _alike(body.mass, found[0]) and _alike(_listed(body)[1:], found[1:])
             if set(rule.parameters) != names or not same:
                 wrong.append(f"link {body.link!r} hangs otherwise on the parameters")
     wrong += [f"link {link!r} is not in the tree" for link in known]
-    yield _result(f"parameters{label}: bodies that load looks at", wrong)
+    return _result(name, wrong)
 
 
 def _names(tree: RigidTree, b: int, parameters: Sequence[str]) -> set[str]:
