@@ -542,7 +542,7 @@ def test_a_c_function_is_called_whether_or_not_its_header_declares_it(copy_for: 
 def test_only_what_is_missing_here_is_left_out(
     error: str, mark: str, package: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("linkwise.check.loading.find_spec", lambda name: None)
+    monkeypatch.setattr("linkwise.check.answers.find_spec", lambda name: None)
     change_file(package, "forms/__init__.py", "from .", f"raise {error}\nfrom .", 1)
     found = marks(package)
     assert {found.pop(name) for name in ("hashes", "texts", "manifest", "made")} == {"ok"}

@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
@@ -69,15 +68,6 @@ MANY = 192
 """Bytes per result of a sample up to which results count as few: 24 samples in double, 48 in float."""
 
 
-@dataclass(frozen=True)
-class References:
-    """References that functions are compared with; links of energies have no regressors and no frames."""
-
-    reference: Reference
-    regressors: Reference | None
-    frames: FrameReference | None
-
-
 class CFunctions:
     """A package's compiled C for given parameters, and the indices of its results."""
 
@@ -99,9 +89,13 @@ class CFunctions:
             dense[(slice(None), *self.rows.tau.T)] = found["tau"].reshape(len(q), -1)
         return dense
 
-    def check(self, label: str, references: References) -> Iterator[Result]:
-        """Yield one result per function; `label` stands before its name."""
-        reference = references.reference
+    def check(
+        self, label: str, reference: Reference, regressors: Reference | None, frames: FrameReference | None
+    ) -> Iterator[Result]:
+        """Yield one result per function; `label` stands before its name.
+
+        Links of energies have no regressors and no frames.
+        """
         for function in self.functions:
             symbol = f"{self.manifest.name}_{function.name}"
             name = f"{label}: {symbol}"
@@ -113,11 +107,11 @@ class CFunctions:
             single = FLOAT32 if function.real == "float" else {"tolerance": reference.tolerance}
             try:
                 if function.short in REGRESSORS:
-                    calls = self._regressors(function, references.regressors)
+                    calls = self._regressors(function, regressors)
                 elif function.short.endswith("partial_impedance"):
                     calls = impedance_calls(self._call, function, self.manifest, reference)
                 elif function.short in CONTROL:
-                    calls = control_calls(self._call, function, self.manifest, reference, references.frames)
+                    calls = control_calls(self._call, function, self.manifest, reference, frames)
                 else:
                     calls = self._calls(function, reference)
                 yield compare(name, calls, **single)

@@ -5,20 +5,18 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import groupby
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
+from linkwise.check.answers import BackendAnswers, compiled_beside, in_turn, subjects
 from linkwise.check.as_generated import GeneratedFiles
 from linkwise.check.compare import Result, is_short_of_memory, line_of, skipped
-from linkwise.check.loading import LoadedPackage, compiled_beside
-from linkwise.check.subject import BackendAnswers, Subject, subjects
+from linkwise.check.subject import Subject
 from linkwise.check.table import CHECKS, Check
 from linkwise.own_process import Ended
-from linkwise.package.load import refuse_exit
+from linkwise.package.load import Package, refuse_exit
 from linkwise.package.manifest import Manifest
 
-T = TypeVar("T")
 SAMPLES = 100
 """Number of random states, unless another is asked for."""
 
@@ -37,33 +35,26 @@ def results_of(directory: Path, samples: int = SAMPLES) -> Iterator[Result]:
     Raises LinkwiseError when `directory` holds no package that can be read.
     """
     files = GeneratedFiles(directory, Manifest.read(directory))
-    for check in _held_for(GeneratedFiles):
+    for check in (check for check in CHECKS if check.of is GeneratedFiles):
         results = [*check.run(check.title, files)]
         yield from results
         if check.needed and any(result.failed for result in results):
             return
     compiled = compiled_beside(files.package)
-    yield from _guarded("answers", _of_package(LoadedPackage(files.package, samples)))
+    yield from _guarded("answers", _of_package(files.package, samples))
     with suppress(Ended):
         compiled()
 
 
-def _held_for(kind: type[T]) -> list[Check[T]]:
-    return [check for check in CHECKS if check.of is kind]
-
-
-def _of_package(loaded: LoadedPackage) -> Iterator[Result]:
-    """Yield the results on a package that is imported, then on its answers for values of its parameters."""
-    for check in _held_for(LoadedPackage):
-        if check.applies(loaded):
-            yield from check.run(check.title, loaded)
-    for subject in subjects(loaded):
+def _of_package(package: Package, samples: int) -> Iterator[Result]:
+    """Yield the results on an imported package, for each set of values of its parameters."""
+    for subject in subjects(package, samples):
         for of_each, neighbours in groupby(CHECKS, lambda check: check.of):
             checks = [*neighbours]
             if of_each is Subject:
                 yield from _of_values(checks, subject)
             if of_each is BackendAnswers:
-                for answers in subject.in_turn():
+                for answers in in_turn(subject):
                     yield from _of_one(checks, answers)
 
 
@@ -76,13 +67,8 @@ def _of_values(checks: Iterable[Check[Subject]], subject: Subject) -> Iterator[R
 def _of_one(checks: Iterable[Check[BackendAnswers]], answers: BackendAnswers) -> Iterator[Result]:
     """Yield the results on one back end: a check that breaks off leaves the others as they are."""
     for check in checks:
-        if not check.applies(answers):
-            continue
-        title = f"{answers.name}: {check.title}"
-        if reason := check.left_out(answers):
-            yield skipped(title, reason)
-        else:
-            yield from _guarded(title, iter(check.run(answers.name, answers)))
+        if check.applies(answers):
+            yield from _guarded(f"{answers.name}: {check.title}", iter(check.run(answers.name, answers)))
 
 
 def _guarded(title: str, results: Iterator[Result]) -> Iterator[Result]:

@@ -6,16 +6,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from linkwise_runtime.dynamics import Dynamics
 
-from linkwise.check.c_functions import CFunctions, References
+from linkwise.check.c_functions import CFunctions
 from linkwise.check.compare import IndexRows, Result, skipped
+from linkwise.check.compiled_c import CompiledPackage
 from linkwise.check.constraint_checks import HeldContacts
 from linkwise.check.frame_checks import FrameReference, frame_reference
-from linkwise.check.loading import BackendVariant, LoadedPackage
-from linkwise.check.parametric_tree import changed_values, tree_with
+from linkwise.check.parametric_tree import tree_with
 from linkwise.check.regressor_checks import regressor_reference
 from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion
 from linkwise.oracle.energies import TextLagrangian, energy_reference, states_of_energies
@@ -23,8 +23,8 @@ from linkwise.oracle.loop_reference import LoopReference, loop_reference
 from linkwise.oracle.magnitudes import Magnitudes
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import Reference, body_reference, states_of_torques, torque_reference
-from linkwise.oracle.states import States, random_states
-from linkwise.own_process import Ended, ProcessLimits, begun, in_own_process
+from linkwise.oracle.states import States, affordable, random_states
+from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.package.entries import PassiveEntry, RigidTree
 from linkwise.package.load import Array, Package
 from linkwise.package.manifest import Manifest
@@ -37,6 +37,18 @@ UNBOUNDED = 1 << 50
 """Bytes that stand for unbounded memory."""
 LEAST = 10
 """Number of states below which nothing is proved of energies that are not defined everywhere."""
+
+
+class BackendVariant(NamedTuple):
+    """A back end, and the kernel that it computes by."""
+
+    backend: str
+    kernel: str = "auto"
+
+    @property
+    def label(self) -> str:
+        """Name that results are reported under: of two kernels, closed forms have the back end's alone."""
+        return f"{self.backend} by rule" if self.kernel == "rule" else self.backend
 
 
 def long_enough() -> ProcessLimits:
@@ -55,23 +67,25 @@ class Subject:
     """A package for given values of its parameters, and the references for its numbers.
 
     label: distinguishes its results from those for other values; empty for those as generated
-    loaded: its back ends with these values
+    loaded: its back ends with these values; missing: results on those that could not be loaded
+    compiled: its C, None if there is none; headers: results on its headers
+    samples: number of random states that are asked for
     """
 
-    of: LoadedPackage
+    package: Package
     label: str
     parameters: Mapping[str, float]
     loaded: Mapping[BackendVariant, Dynamics]
+    rows: IndexRows
+    compiled: CompiledPackage | None
+    samples: int
+    missing: Sequence[Result] = ()
+    headers: Sequence[Result] = ()
 
-    @property
-    def package(self) -> Package:
-        """The imported package."""
-        return self.of.package
-
-    @property
-    def rows(self) -> IndexRows:
-        """Indices of packed values."""
-        return self.of.rows
+    @cached_property
+    def count(self) -> tuple[int, int]:
+        """Number of random states that memory allows, and of those at rest."""
+        return affordable(self.samples, len(self.manifest.joints), len(self.manifest.links))
 
     @property
     def as_generated(self) -> bool:
@@ -118,9 +132,9 @@ class Subject:
     @cached_property
     def functions(self) -> CFunctions | None:
         """Compiled C; None if it did not compile."""
-        if self.of.compiled is None:
+        if self.compiled is None:
             return None
-        return CFunctions(self.manifest, self.of.compiled, self.rows, self.parameters)
+        return CFunctions(self.manifest, self.compiled, self.rows, self.parameters)
 
     @property
     def reference(self) -> Reference:
@@ -168,7 +182,7 @@ class Subject:
         """Reference for numbers, None if nothing can compute or at no state; and how many were tried."""
         manifest = self.manifest
         if self.tree is not None:
-            samples, rest = self.of.count
+            samples, rest = self.count
             states = random_states(manifest.joints, samples, rest=rest)
             recursion, magnitudes = NewtonEuler(manifest, self.tree), Magnitudes(manifest, self.tree)
             return body_reference(recursion, magnitudes, states), len(states.q)
@@ -178,7 +192,7 @@ class Subject:
                 [TextLagrangian(energy, self.parameters, noise) for energy in manifest.energies]
                 for noise in noises
             )
-            found = states_of_energies(exact, manifest.joints, self.of.count[0])
+            found = states_of_energies(exact, manifest.joints, self.count[0])
             defined = len(found.states.q) > 0
             return energy_reference(exact, noisy, found.states) if defined else None, found.tried
         return self._own_reference()
@@ -187,7 +201,7 @@ class Subject:
         """Return the reference from torques of a back end, else of the C, and how many states were tried."""
 
         def of(name: str, torque: Callable[[Array, Array, Array], Array]) -> tuple[Reference | None, int]:
-            found = states_of_torques(torque, self.manifest.joints, self.of.count[0])
+            found = states_of_torques(torque, self.manifest.joints, self.count[0])
             reference = torque_reference(name, torque, found.states) if len(found.states.q) else None
             return reference, found.tried
 
@@ -199,71 +213,6 @@ class Subject:
             return None, 0
         return in_own_process(lambda: of("c", functions.torque), long_enough())
 
-    def in_turn(self) -> "Iterator[BackendAnswers]":
-        """Yield what is asked for answers, one after the other; nothing where none can be compared.
-
-        A wrong function of C may write anywhere: it runs in its own process, beside all back ends but native,
-        which would crash the interpreter by it.
-        """
-        if not self.has_numbers:
-            return
-        functions, of_c = self.functions, list[Result]()
-        calls = begun(self._calls_of(functions), long_enough()) if functions else None
-        native = [way for way in self.loaded if way.backend == "native"]
-        yield from (BackendAnswers(self, way) for way in self.loaded if way not in native)
-        if calls:
-            of_c = _told(calls, f"c{self.label}")
-            yield BackendAnswers(self, BackendVariant("c"), of_c)
-        yield from (BackendAnswers(self, way, of_c) for way in native)
-
-    def _calls_of(self, functions: CFunctions) -> Callable[[], list[Result]]:
-        """Return a call that gives the results of each function of the C."""
-        references = References(self.reference, self.regressors, self.frames)
-        return lambda: list(functions.check(f"c{self.label}", references))
-
-
-@dataclass(frozen=True)
-class BackendAnswers:
-    """The answers of a back end for given values of the parameters, or the functions of the C.
-
-    of_c: results on the functions of the C, where these have run
-    """
-
-    subject: Subject
-    way: BackendVariant
-    of_c: Sequence[Result] = ()
-
-    @property
-    def name(self) -> str:
-        """Name that results are reported under."""
-        return f"{self.way.label}{self.subject.label}"
-
-    @property
-    def is_c(self) -> bool:
-        """True for the functions of the C, which no model calls."""
-        return self.way.backend == "c"
-
-    @property
-    def is_refused(self) -> bool:
-        """True for a back end that is not called, as its C is wrong."""
-        return self.way.backend == "native" and any(result.failed for result in self.of_c)
-
-    @property
-    def model(self) -> Dynamics:
-        """The model that is asked."""
-        return self.subject.loaded[self.way]
-
-
-def subjects(package: LoadedPackage) -> Iterator[Subject]:
-    """Yield a package for the parameters as generated and, if there are any, for other values too."""
-    manifest, loaded = package.manifest, package.backends
-    yield Subject(package, "", dict(manifest.parameters), loaded)
-    if manifest.parameters:
-        # Every parameter changed a little, so that no two are equal and none is zero.
-        values = changed_values(manifest.parameters, manifest.tree)
-        loaded = {way: package.package.load(way.backend, values, way.kernel) for way in loaded}
-        yield Subject(package, ", other parameters", values, loaded)
-
 
 def check_energies(name: str, subject: Subject) -> Iterator[Result]:
     """Yield remarks on energies that a user wrote: what they are compared with, and at how many states."""
@@ -273,15 +222,7 @@ def check_energies(name: str, subject: Subject) -> Iterator[Result]:
     reference, tried = subject.tried_reference
     kept = len(reference.states.q) if reference else 0
     detail = f"numbers at {kept} of {tried} random states"
-    if tried and kept < min(LEAST, subject.of.count[0] / 2):
+    if tried and kept < min(LEAST, subject.count[0] / 2):
         yield Result(f"{name}: are defined", False, None, f"{detail}: too few to prove anything")
     elif kept < tried:
         yield Result(f"{name}: are defined", True, None, detail)
-
-
-def _told(calls: Callable[[], list[Result]], name: str) -> list[Result]:
-    """Return the results of the C functions, or a failed one where their process ended."""
-    try:
-        return calls()
-    except Ended as ended:
-        return [Result(f"{name}: runs to its end", False, None, str(ended))]

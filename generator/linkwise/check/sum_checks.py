@@ -27,7 +27,7 @@ LARGEST = 1 << 27
 Samples = NDArray[np.intp]
 
 
-def sums_against_reference(name: str, model: Dynamics, reference: Reference) -> Iterator[Result]:
+def sum_calls(name: str, model: Dynamics, reference: Reference) -> Iterator[Result]:
     """Yield checks of every call, at all states, none and one, and in single precision."""
     every = np.arange(len(reference.states.q))
     few = [every[:0], *([every[0], every[:1, None]] if len(every) else [])]

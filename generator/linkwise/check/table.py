@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from linkwise.check.answers import BackendAnswers
 from linkwise.check.as_generated import GeneratedFiles, check_files, check_import, check_texts
 from linkwise.check.compare import Result, skipped
 from linkwise.check.constraint_checks import loop_calls
@@ -12,14 +13,13 @@ from linkwise.check.formula_texts import check_formulas
 from linkwise.check.frame_checks import frame_calls
 from linkwise.check.impedance_checks import impedance_calls
 from linkwise.check.induced_checks import induced_calls
-from linkwise.check.loading import LoadedPackage
 from linkwise.check.model_calls import Named, against_reference
 from linkwise.check.parametric_tree import check_bodies, check_numbers
 from linkwise.check.passive_checks import passive_calls
 from linkwise.check.regressor_checks import regressor_calls
 from linkwise.check.simulation_checks import simulation_calls
-from linkwise.check.subject import BackendAnswers, Subject, check_energies, there
-from linkwise.check.sum_checks import sums_against_reference
+from linkwise.check.subject import Subject, check_energies, there
+from linkwise.check.sum_checks import sum_calls
 
 T = TypeVar("T")
 
@@ -28,20 +28,15 @@ def _always(_: object) -> bool:
     return True
 
 
-def _nothing(_: object) -> str:
-    return ""
-
-
 @dataclass(frozen=True)
 class Check(Generic[T]):
     """A check: of what, when it applies, and how it runs.
 
-    title: what it is called where it breaks off or is left out, and where its results bear no back end's name
+    title: names its results or, for a back end, whose name these bear, one that says that it broke off
     of: what it is held for, each time anew: the files as they lie there, the package once it is imported, it
     with values of its parameters, or what one back end, or the C, answers for such values
     applies: whether it concerns such a thing
     run: yields the results, given the name that they bear and the thing
-    left_out: why it is not run here although it applies; empty if it is run
     needed: whether nothing else is asked where it fails
     """
 
@@ -49,41 +44,79 @@ class Check(Generic[T]):
     of: type[T]
     applies: Callable[[T], bool]
     run: Callable[[str, T], Iterable[Result]]
-    left_out: Callable[[T], str] = _nothing
     needed: bool = False
 
 
-def _is_called(answers: BackendAnswers) -> bool:
-    return not answers.is_c and not answers.is_refused
+COMPOSED = "of a robot as large as this, held of torch, which composes it of the same answers"
+NONE_COMPUTES = "nothing here computes with the energies"
+NEAR_NONE = "loops close near none of the states, or only next to singular positions"
+LARGE = (
+    "of a robot as large as this: batches of other shapes, modules of links beyond the first, and recorded "
+    "graphs of links that many joints carry; what cuts batches and records graphs is alike for all robots"
+)
 
 
-def _by_forms(answers: BackendAnswers) -> bool:
+def _left_out(title: str, applies: Callable[[Subject], bool], told: str) -> Check[Subject]:
+    """Return a check that says what else is not checked, and why."""
+    return Check(title, Subject, applies, lambda name, _: [skipped(name, told)])
+
+
+def _formulas(ending: str) -> Check[Subject]:
+    return Check(
+        f"formulas.{ending}",
+        Subject,
+        lambda s: s.is_defined and f"formulas.{ending}" in s.manifest.files,
+        lambda name, s: check_formulas(name, ending, s),
+    )
+
+
+def _called(
+    title: str,
+    applies: Callable[[BackendAnswers], bool],
+    run: Callable[[str, BackendAnswers], Iterable[Result]],
+) -> Check[BackendAnswers]:
+    """Return a check of calls that each back end composes of coefficients and torques in the same way."""
+
+    def of_one(name: str, a: BackendAnswers) -> Iterable[Result]:
+        elsewhere = a.way.backend == "autograd" and a.subject.composed_elsewhere
+        return [skipped(f"{name}: {title}", COMPOSED)] if elsewhere else run(name, a)
+
+    return Check(title, BackendAnswers, applies, of_one)
+
+
+def _by_any(a: BackendAnswers) -> bool:
+    return not a.is_c and not a.is_refused
+
+
+def _by_forms(a: BackendAnswers) -> bool:
     """Return whether calls composed of answers, which are checked for both kernels, are those of this one."""
-    return _is_called(answers) and answers.way.kernel != "rule"
+    return _by_any(a) and a.way.kernel != "rule"
 
 
-def _moves_on(answers: BackendAnswers) -> bool:
-    return _by_forms(answers) and answers.subject.closed_states is not None
+def _of_frames(a: BackendAnswers) -> bool:
+    return _by_forms(a) and a.subject.tree is not None
 
 
-def _with_torch(answers: BackendAnswers) -> str:
-    """Return why calls composed of coefficients and torques are left out where torch's compose them alike."""
-    composed = "of a robot as large as this, held of torch, which composes it of the same answers"
-    return composed if answers.way.backend == "autograd" and answers.subject.composed_elsewhere else ""
+def _in_loops(a: BackendAnswers) -> bool:
+    return _by_forms(a) and a.subject.loops is not None
 
 
-def _named(answers: BackendAnswers) -> Named:
-    return Named(answers.name, answers.model, answers.subject.rows, answers.subject.reference)
+def _moving_on(a: BackendAnswers) -> bool:
+    return _by_forms(a) and a.subject.closed_states is not None
 
 
-def _states(name: str, package: LoadedPackage) -> Iterable[Result]:
-    few, rest = package.count
-    told = f"{few} random ones instead of {package.samples}, and {rest} at rest"
-    return [Result(name, True, None, f"{told}: for more it would take gigabytes")]
+def _of_bodies(a: BackendAnswers) -> bool:
+    return _by_any(a) and a.subject.tree is not None and a.model.backend.rule is not None
 
 
-def _has_parametric_bodies(s: Subject) -> bool:
+def _parametric(s: Subject) -> bool:
     return s.tree is not None and bool(s.parameters)
+
+
+def _states(name: str, s: Subject) -> Iterable[Result]:
+    few, rest = s.count
+    told = f"{few} random ones instead of {s.samples}, and {rest} at rest"
+    return [Result(name, True, None, f"{told}: for more it would take gigabytes")]
 
 
 def _bodies(name: str, s: Subject) -> Iterable[Result]:
@@ -93,14 +126,29 @@ def _bodies(name: str, s: Subject) -> Iterable[Result]:
     return [check_bodies(told, there(s.manifest.tree), bodies, s.parameters, unphysical)]
 
 
-def _formulas(ending: str) -> Check[Subject]:
-    file = f"formulas.{ending}"
-    return Check(
-        file,
-        Subject,
-        lambda s: s.is_defined and file in s.manifest.files,
-        lambda name, s: check_formulas(name, ending, s),
-    )
+def _numbers_of_bodies(name: str, s: Subject) -> Iterable[Result]:
+    told = f"{name}: formulas of the bodies give their numbers"
+    return [check_numbers(told, there(s.manifest.tree), s.parameters)]
+
+
+def _refused(name: str, _: BackendAnswers) -> Iterable[Result]:
+    return [skipped(f"{name}: not called", "its C is wrong, see above")]
+
+
+def _coefficients(name: str, a: BackendAnswers) -> Iterable[Result]:
+    return against_reference(Named(name, a.model, a.subject.rows, a.subject.reference), a.subject.manifest)
+
+
+def _graphs(name: str, a: BackendAnswers) -> Iterable[Result]:
+    return [recorded_parts(Named(name, a.model, a.subject.rows, a.subject.reference))]
+
+
+def _contacts(name: str, a: BackendAnswers) -> Iterable[Result]:
+    return a.subject.contacts.calls(name, a.model, a.subject.package.module.Contact)
+
+
+def _passive(name: str, a: BackendAnswers) -> Iterable[Result]:
+    return passive_calls(name, a.model, a.subject.passive, a.subject.reference)
 
 
 def _induced(name: str, a: BackendAnswers) -> Iterable[Result]:
@@ -119,119 +167,42 @@ def _derivations(name: str, s: Subject) -> Iterable[Result]:
     return derivations(name, {way.label: m for way, m in s.loaded.items()}, s.rows, s.reference, how)
 
 
-NEAR_NONE = "loops close near none of the states, or only next to singular positions"
-LARGE = (
-    "of a robot as large as this: batches of other shapes, modules of links beyond the first, and recorded "
-    "graphs of links that many joints carry; what cuts batches and records graphs is alike for all robots"
-)
-
 CHECKS: tuple[Check[Any], ...] = (
     Check("hashes", GeneratedFiles, _always, check_files, needed=True),
     Check("texts", GeneratedFiles, _always, check_texts, needed=True),
     Check("import", GeneratedFiles, _always, check_import, needed=True),
     Check("manifest", GeneratedFiles, _always, lambda _, files: files.compared[:1], needed=True),
     Check("made", GeneratedFiles, _always, lambda _, files: files.compared[1:]),
-    Check("back ends", LoadedPackage, _always, lambda _, package: package.missing),
-    Check("c", LoadedPackage, lambda package: package.has_c, lambda _, package: [package.compiling[1]]),
-    Check("states", LoadedPackage, lambda package: package.count[0] < package.samples, _states),
-    Check(
-        "parameters: formulas of the bodies give their numbers",
-        Subject,
-        lambda s: _has_parametric_bodies(s) and s.as_generated,
-        lambda name, s: [check_numbers(name, there(s.manifest.tree), s.parameters)],
-    ),
-    Check("parameters", Subject, _has_parametric_bodies, _bodies),
+    Check("back ends", Subject, _always, lambda _, s: s.missing),
+    Check("c", Subject, _always, lambda _, s: s.headers),
+    Check("states", Subject, lambda s: s.as_generated and s.count[0] < s.samples, _states),
+    Check("parameters", Subject, lambda s: _parametric(s) and s.as_generated, _numbers_of_bodies),
+    Check("parameters", Subject, _parametric, _bodies),
     Check("energies", Subject, lambda s: s.manifest.energies is not None, check_energies),
     _formulas("txt"),
     _formulas("tex"),
-    Check(
-        "numbers",
-        Subject,
-        lambda s: s.is_defined and not s.has_numbers,
-        lambda name, _: [skipped(name, "nothing here computes with the energies")],
-    ),
-    Check(
-        "constraints",
-        Subject,
-        lambda s: s.has_numbers and s.tied and s.loops is None,
-        lambda name, _: [skipped(name, NEAR_NONE)],
-    ),
-    Check(
-        "parts of the checks",
-        Subject,
-        lambda s: s.has_numbers and s.reference.is_large,
-        lambda name, _: [skipped(name, LARGE)],
-    ),
+    _left_out("numbers", lambda s: s.is_defined and not s.has_numbers, NONE_COMPUTES),
+    _left_out("constraints", lambda s: s.has_numbers and s.tied and s.loops is None, NEAR_NONE),
+    _left_out("parts of the checks", lambda s: s.has_numbers and s.reference.is_large, LARGE),
     Check("functions", BackendAnswers, lambda a: a.is_c, lambda _, a: a.of_c),
-    Check(
-        "not called",
-        BackendAnswers,
-        lambda a: a.is_refused,
-        lambda name, _: [skipped(f"{name}: not called", "its C is wrong, see above")],
+    Check("not called", BackendAnswers, lambda a: a.is_refused, _refused),
+    Check("coefficients and torques", BackendAnswers, _by_any, _coefficients),
+    Check("recorded graphs", BackendAnswers, lambda a: a.way.backend == "autograd", _graphs),
+    _called("sums over the links", _by_any, lambda name, a: sum_calls(name, a.model, a.subject.reference)),
+    _called(
+        "regressors", _of_bodies, lambda name, a: regressor_calls(name, a.model, there(a.subject.regressors))
     ),
-    Check(
-        "coefficients and torques",
-        BackendAnswers,
-        _is_called,
-        lambda _, a: against_reference(_named(a), a.subject.manifest),
-    ),
-    Check(
-        "recorded graphs",
-        BackendAnswers,
-        lambda a: a.way.backend == "autograd",
-        lambda _, a: [recorded_parts(_named(a))],
-    ),
-    Check(
-        "sums over the links",
-        BackendAnswers,
-        _is_called,
-        lambda name, a: sums_against_reference(name, a.model, a.subject.reference),
-        _with_torch,
-    ),
-    Check(
-        "regressors",
-        BackendAnswers,
-        lambda a: _is_called(a) and a.subject.tree is not None and a.model.backend.rule is not None,
-        lambda name, a: regressor_calls(name, a.model, there(a.subject.regressors)),
-        _with_torch,
-    ),
-    Check(
-        "frames",
-        BackendAnswers,
-        lambda a: _by_forms(a) and a.subject.tree is not None,
-        lambda name, a: frame_calls(name, a.model, there(a.subject.frames)),
-        _with_torch,
-    ),
-    Check(
-        "constraints",
-        BackendAnswers,
-        lambda a: _by_forms(a) and a.subject.loops is not None,
-        lambda name, a: loop_calls(name, a.model, there(a.subject.loops)),
-        _with_torch,
-    ),
-    Check(
-        "contacts",
-        BackendAnswers,
-        _moves_on,
-        lambda name, a: a.subject.contacts.calls(name, a.model, a.subject.package.module.Contact),
-        _with_torch,
-    ),
-    Check(
+    _called("frames", _of_frames, lambda name, a: frame_calls(name, a.model, there(a.subject.frames))),
+    _called("constraints", _in_loops, lambda name, a: loop_calls(name, a.model, there(a.subject.loops))),
+    _called("contacts", _moving_on, _contacts),
+    _called(
         "a simulated motion",
-        BackendAnswers,
-        _moves_on,
+        _moving_on,
         lambda name, a: simulation_calls(name, a.model, a.subject.simulation),
-        _with_torch,
     ),
-    Check(
-        "passive torques",
-        BackendAnswers,
-        _is_called,
-        lambda name, a: passive_calls(name, a.model, a.subject.passive, a.subject.reference),
-        _with_torch,
-    ),
-    Check("induced accelerations", BackendAnswers, _by_forms, _induced, _with_torch),
-    Check("controllers", BackendAnswers, _by_forms, _controllers, _with_torch),
+    _called("passive torques", _by_any, _passive),
+    _called("induced accelerations", _by_forms, _induced),
+    _called("controllers", _by_forms, _controllers),
     Check("derivations", Subject, lambda s: s.has_numbers and s.tree is not None, _derivations),
 )
 """Neighbours that are held for things of one kind are asked of each such thing in turn."""
