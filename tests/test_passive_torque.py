@@ -16,7 +16,7 @@ from compiled import compile_library, name_of
 from conftest import PANDA, needs_compiler
 from linkwise import generate, read_system, write_package
 from linkwise.check.checks import check_package
-from linkwise.check.passive_checks import passive_reference
+from linkwise.check.sum_checks import passive_reference
 from linkwise.oracle.states import States
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest

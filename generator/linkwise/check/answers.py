@@ -5,21 +5,28 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stderr, suppress
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
-from itertools import product
+from itertools import combinations, product
 
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.native.build import PARTS, Sources, library
 from linkwise_runtime.native.system import system_here
 
 from linkwise.check.c_functions import CFunctions, compile_c
-from linkwise.check.compare import IndexRows, Result, is_short_of_memory, line_of, skipped
+from linkwise.check.compare import Entries, IndexRows, Result, compare, is_short_of_memory, line_of, skipped
 from linkwise.check.parametric_tree import changed_values
 from linkwise.check.subject import BackendVariant, Subject, long_enough
+from linkwise.oracle.reference import Reference
 from linkwise.own_process import Ended, begun
-from linkwise.package.load import Package
+from linkwise.package.load import Array, Package
 
 OPTIONAL = ("torch",)
 """Libraries that a package's back ends may need beside NumPy."""
+DERIVATIONS = {
+    "closed forms": ("numpy", "torch"),
+    "rule": ("numpy by rule", "torch by rule"),
+    "Lagrangians": ("autograd",),
+}
+"""Derivations, and names of the back ends that compute by them: the first that is there represents it."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +109,39 @@ def _told(calls: Callable[[], list[Result]], name: str) -> list[Result]:
         return calls()
     except Ended as ended:
         return [Result(f"{name}: runs to its end", False, None, str(ended))]
+
+
+def derivations(name: str, subject: Subject) -> Iterator[Result]:
+    """Yield a comparison of every two derivations that are there.
+
+    Each is also compared with the recursion by itself.
+    """
+    how = "from energies" if subject.manifest.request.get("derivation") == "energy" else "by the rigid rule"
+    loaded = {way.label: model for way, model in subject.loaded.items()}
+    answers = {}
+    for derivation, names in DERIVATIONS.items():
+        shown = f"{derivation} ({how})" if derivation == "closed forms" else derivation
+        for label in [label for label in names if label in loaded][:1]:
+            answers[shown] = _answers(loaded[label], subject.rows, subject.reference)
+    for one, other in combinations(answers, 2):
+        entries = [
+            Entries(
+                what, value, answers[other][what][0], scale, None if what == "c0" else subject.rows.of(what)
+            )
+            for what, (value, scale) in answers[one].items()
+        ]
+        yield compare(f"{name}: {one} against {other}", entries, subject.reference.tolerance)
+
+
+def _answers(model: Dynamics, rows: IndexRows, reference: Reference) -> dict[str, tuple[Array, Array]]:
+    """Return packed values and slopes by position, each beside its scale."""
+    few = slice(-2, None) if reference.is_large else slice(None)
+    motion = reference.states.at(few).motion
+    found = {
+        what: (value, reference.scales[what][few][(slice(None), *rows.of(what).T)])
+        for what, value in rows.fields(model.packed(*motion)).items()
+    }
+    return found | {"c0": (model.position_gradient(*motion), reference.scales["c0"][few])}
 
 
 def _load(package: Package) -> tuple[dict[BackendVariant, Dynamics], list[Result]]:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from linkwise.check.c_headers import wrong_header
 from linkwise.check.compare import (
     Entries,
     IndexRows,
@@ -19,7 +18,7 @@ from linkwise.check.compare import (
     packed,
     skipped,
 )
-from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype
+from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype, wrong_header
 from linkwise.check.control_functions import (
     CONTROL,
     NOT_CALLED,

@@ -8,8 +8,7 @@ import numpy as np
 from linkwise.check.compare import Entries
 from linkwise.check.compiled_c import Numbers, Prototype
 from linkwise.check.frame_checks import FrameReference
-from linkwise.check.passive_checks import SHARES, passive_reference
-from linkwise.check.sum_checks import REGULAR, SINGLE, acceleration_scales, regular
+from linkwise.check.sum_checks import REGULAR, SHARES, SINGLE, acceleration_scales, passive_reference, regular
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import States
 from linkwise.package.entries import PassiveEntry

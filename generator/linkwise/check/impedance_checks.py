@@ -7,8 +7,7 @@ import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.check.compare import Entries, Result, compare, skipped
-from linkwise.check.passive_checks import passive_reference
-from linkwise.check.sum_checks import is_tied, regular
+from linkwise.check.sum_checks import is_tied, passive_reference, regular
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import States
 from linkwise.package.entries import PassiveEntry, RigidTree

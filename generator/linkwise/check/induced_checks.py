@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.frame_checks import FrameReference, chosen_rows
 from linkwise.check.model_calls import FLOAT32
-from linkwise.check.passive_checks import passive_reference
-from linkwise.check.sum_checks import SINGLE, regular
+from linkwise.check.sum_checks import SINGLE, passive_reference, regular
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import States
 from linkwise.package.entries import PassiveEntry

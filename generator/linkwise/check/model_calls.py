@@ -1,4 +1,4 @@
-"""Checks of every public call of a back end against the reference."""
+"""Checks of every public call of a back end, and of its recorded graphs, against the reference."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple, cast
@@ -213,3 +213,62 @@ def _over(motion: Array) -> Array:
 def _column(motion: Array) -> Array:
     """Return motion (samples, n) as columns to multiply with coefficients (samples, n, N, n)."""
     return motion[:, None, :, None]
+
+
+RECORDED_STATES = 10
+"""Most states that recorded graphs are run at."""
+PAIRS = 6
+"""Most torques tau_ij: each is recorded anew."""
+CARRIERS = 16
+"""Most joints that carry the link of a recorded torque, in a large robot."""
+OPERATIONS = 2500
+"""Most operations run in all: where there are more, every tau_ij has its share, by parts picked at random."""
+
+
+def recorded_parts(checked: Named) -> Result:
+    """Compare c2_ijk qdd_k, c1_ijk qd_k and g_ij with the reference, each from its graph, zero without."""
+    reference = checked.reference
+    return compare(
+        f"{checked.name}: graphs of parts of tau_ij against {reference.name}",
+        _parts(checked),
+        reference.tolerance,
+    )
+
+
+def _parts(checked: Named) -> Iterator[Entries]:
+    reference, joints = checked.reference, list(checked.model.joint_names)
+    few = reference.states.at(slice(RECORDED_STATES))
+    generator, run = np.random.default_rng(0), 0
+    asked = [(None, 0), *((k, m) for k in range(len(joints)) for m in (1, 2))]
+    # Recording a torque takes longer, the more joints carry the link.
+    carriers = np.bincount(checked.rows.tau[:, 1])
+    most = max(CARRIERS, carriers.min()) if reference.is_large else carriers.max()
+    near = checked.rows.tau[carriers[checked.rows.tau[:, 1]] <= most]
+    pairs = generator.permutation(near)[:PAIRS].tolist()
+    backend: Any = checked.model.backend
+    for i, j in pairs:
+        graphs = {(part.coordinate, part.order): part for part in backend.graph_parts(i, j)}
+        own = 0
+        for k, m in (asked[at] for at in generator.permutation(len(asked))):
+            found, graph = np.zeros(len(few.q)), graphs.get((None if k is None else joints[k], m))
+            if graph is not None:
+                if max(own * len(pairs), run) > OPERATIONS:
+                    continue
+                found = graph.evaluate(*few.motion).detach().numpy()
+                own, run = own + len(graph.operations), run + len(graph.operations)
+            yield _part(reference, (i, j, k), m, found)
+
+
+def _part(reference: Reference, at: tuple[int, int, int | None], m: int, found: Array) -> Entries:
+    """Return a part of order m beside its value in the reference."""
+    i, j, k = at
+    place = (i, j) if k is None else (i, j, k)
+    row = (slice(len(found)), *place)
+    motion = np.ones(len(found)) if k is None else reference.states.motion[m][: len(found), k]
+    what = ("g", "c1", "c2")[m]
+    return Entries(
+        f"{what}({', '.join(str(index + 1) for index in place)})",
+        found,
+        reference.values[what][row] * motion,
+        reference.scales[what][row] * np.abs(motion),
+    )

@@ -1,6 +1,6 @@
-"""Checks of sums over the links, forward dynamics, energies and power of a back end against the reference."""
+"""Checks of sums over the links, accelerations, energies, power and passive torques of a back end."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.model_calls import FLOAT32, TOO_LARGE
 from linkwise.oracle.reference import Reference
-from linkwise.oracle.states import NUMBERS
+from linkwise.oracle.states import NUMBERS, States
+from linkwise.package.entries import PassiveEntry
 from linkwise.package.load import Array
 
 REGULAR = 1e-8
@@ -23,8 +24,6 @@ MOST = 12
 FLOAT = " in single precision"
 LARGEST = 1 << 27
 """Most bytes of Christoffel symbols by link that are asked for."""
-
-Samples = NDArray[np.intp]
 
 
 def sum_calls(name: str, model: Dynamics, reference: Reference) -> Iterator[Result]:
@@ -176,3 +175,81 @@ def _flat(what: str, value: Array, expected: Array, scale: Array, axes: int) -> 
         return Entries(what, value, expected, scale)
     value, expected, scale = (a.reshape(-1, *a.shape[axes:]) for a in (value, expected, scale))
     return Entries(what, value, expected, scale)
+
+
+SHARES = ("spring", "damping", "friction", "armature")
+
+
+def passive_calls(
+    name: str, model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference
+) -> Iterator[Result]:
+    """Yield checks of the call for many states, for one, and in single precision.
+
+    All values are zero where no joint has passive torques.
+    """
+    states = reference.states
+    values, scales = passive_reference(joints, states)
+
+    def entries(dtype: Any, rows: Any) -> Iterator[Entries]:
+        motion: list[Any] = [x[rows].astype(dtype) for x in states.motion]
+        found = model.passive_torque(*motion)
+        for what, value, expected, scale in zip(SHARES, found, values, scales, strict=True):
+            # A single state becomes a batch of one, as errors are reported by sample.
+            shape = (-1, expected.shape[1])
+            yield Entries(
+                what,
+                np.asarray(value).reshape(shape),
+                expected[rows].reshape(shape),
+                scale[rows].reshape(shape),
+            )
+
+    every = [*entries(float, slice(None)), *(entries(float, 0) if len(states.q) else ())]
+    yield compare(f"{name}: passive torques of the joints", every)
+    single = entries(np.float32, slice(None))
+    yield compare(f"{name}: passive torques in single precision", single, **FLOAT32)
+    if joints and len(states.q) and not is_tied(model):
+        check, invertible = f"{name}: accelerations that passive torques leave", regular(reference)
+        if invertible.any():
+            yield compare(check, [_torques_of_accelerations(model, joints, reference, invertible)])
+        else:
+            yield skipped(check, "no mass matrix can be inverted here")
+
+
+def _torques_of_accelerations(
+    model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference, at: NDArray[np.bool_]
+) -> Entries:
+    """Return torques given to forward dynamics beside those that its accelerations need.
+
+    Both are summed from the torques of the links, also at rest: gravity alone has rounding.
+    """
+    states = reference.states.at(at)
+    q, qd, qdd = states.motion
+    values, scales = passive_reference(joints, states)
+    tau = model.inverse_dynamics(q, qd, qdd) + values.sum(0)
+    found = model.forward_dynamics(q, qd, tau)
+    taken, sizes = passive_reference(joints, States(q, qd, found))
+    mass = reference.scales["c2"][at].sum(2) @ (np.abs(found) + np.abs(qdd))[..., None]
+    scale = reference.scales["tau"][at].sum(-1) + mass[..., 0] + scales.sum(0) + sizes.sum(0)
+    return Entries("tau", model.inverse_dynamics(q, qd, found) + taken.sum(0), tau, scale)
+
+
+def passive_reference(joints: Sequence[PassiveEntry], states: States) -> tuple[Array, Array]:
+    """Return shares (4, samples, n), and the sizes of what they are summed from.
+
+    For a joint at p = r q a torque f does the work f dp = r f dq: it counts r times on the coordinate.
+    """
+    q, qd, qdd = states.motion
+    values, scales = np.zeros((2, len(SHARES), *q.shape))
+    for joint in joints:
+        k, r = joint.coordinate, joint.ratio
+        p, pd, pdd = (r * x[:, k] for x in (q, qd, qdd))
+        own = (
+            joint.stiffness * (p - joint.rest),
+            joint.damping * pd,
+            joint.friction * np.sign(pd),
+            joint.armature * pdd,
+        )
+        values[..., k] += r * np.stack(own)
+        scales[..., k] += abs(r) * np.abs(own)
+        scales[0, :, k] += abs(r * joint.stiffness) * (np.abs(p) + abs(joint.rest))
+    return values, scales

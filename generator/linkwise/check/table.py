@@ -4,22 +4,20 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from linkwise.check.answers import BackendAnswers
+from linkwise.check.answers import BackendAnswers, derivations
 from linkwise.check.as_generated import GeneratedFiles, check_files, check_import, check_texts
 from linkwise.check.compare import Result, skipped
 from linkwise.check.constraint_checks import loop_calls
-from linkwise.check.derivations import derivations, recorded_parts
 from linkwise.check.formula_texts import check_formulas
 from linkwise.check.frame_checks import frame_calls
 from linkwise.check.impedance_checks import impedance_calls
 from linkwise.check.induced_checks import induced_calls
-from linkwise.check.model_calls import Named, against_reference
+from linkwise.check.model_calls import Named, against_reference, recorded_parts
 from linkwise.check.parametric_tree import check_bodies, check_numbers
-from linkwise.check.passive_checks import passive_calls
 from linkwise.check.regressor_checks import regressor_calls
 from linkwise.check.simulation_checks import simulation_calls
 from linkwise.check.subject import Subject, check_energies, there
-from linkwise.check.sum_checks import sum_calls
+from linkwise.check.sum_checks import passive_calls, sum_calls
 
 T = TypeVar("T")
 
@@ -162,11 +160,6 @@ def _controllers(name: str, a: BackendAnswers) -> Iterable[Result]:
     return impedance_calls(name, a.model, s.tree, s.reference, s.package.module.Natural)
 
 
-def _derivations(name: str, s: Subject) -> Iterable[Result]:
-    how = "from energies" if s.manifest.request.get("derivation") == "energy" else "by the rigid rule"
-    return derivations(name, {way.label: m for way, m in s.loaded.items()}, s.rows, s.reference, how)
-
-
 CHECKS: tuple[Check[Any], ...] = (
     Check("hashes", GeneratedFiles, _always, check_files, needed=True),
     Check("texts", GeneratedFiles, _always, check_texts, needed=True),
@@ -203,6 +196,6 @@ CHECKS: tuple[Check[Any], ...] = (
     _called("passive torques", _by_any, _passive),
     _called("induced accelerations", _by_forms, _induced),
     _called("controllers", _by_forms, _controllers),
-    Check("derivations", Subject, lambda s: s.has_numbers and s.tree is not None, _derivations),
+    Check("derivations", Subject, lambda s: s.has_numbers and s.tree is not None, derivations),
 )
 """Neighbours that are held for things of one kind are asked of each such thing in turn."""
