@@ -51,17 +51,13 @@ def _of_package(package: Package, samples: int) -> Iterator[Result]:
     for subject in subjects(package, samples):
         for of_each, neighbours in groupby(CHECKS, lambda check: check.of):
             checks = [*neighbours]
-            if of_each is Subject:
-                yield from _of_values(checks, subject)
             if of_each is BackendAnswers:
                 for answers in in_turn(subject):
                     yield from _of_one(checks, answers)
-
-
-def _of_values(checks: Iterable[Check[Subject]], subject: Subject) -> Iterator[Result]:
-    for check in checks:
-        if check.applies(subject):
-            yield from check.run(f"{check.title}{subject.label}", subject)
+            if of_each is Subject:
+                for check in checks:
+                    if check.applies(subject):
+                        yield from check.run(f"{check.title}{subject.label}", subject)
 
 
 def _of_one(checks: Iterable[Check[BackendAnswers]], answers: BackendAnswers) -> Iterator[Result]:

@@ -88,7 +88,7 @@ def check_numbers(name: str, tree: RigidTree, values: Mapping[str, float]) -> Re
         if not _alike(number.translation, formula.translation)
     ]
     wrong += [] if _alike(tree.gravity, varied.gravity) else ["gravity"]
-    return _result(name, wrong)
+    return _result(f"{name}: formulas of the bodies give their numbers", wrong)
 
 
 def check_bodies(
@@ -114,7 +114,7 @@ def check_bodies(
             if set(rule.parameters) != names or not same:
                 wrong.append(f"link {body.link!r} hangs otherwise on the parameters")
     wrong += [f"link {link!r} is not in the tree" for link in known]
-    return _result(name, wrong)
+    return _result(f"{name}: bodies that load looks at", wrong)
 
 
 def _names(tree: RigidTree, b: int, parameters: Sequence[str]) -> set[str]:

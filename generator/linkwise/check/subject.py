@@ -104,11 +104,6 @@ class Subject:
         return self.tried_reference[0] is not None
 
     @property
-    def composed_elsewhere(self) -> bool:
-        """True if slow calls of autograd, for a large robot, are checked with torch, composed alike."""
-        return self.reference.is_large and any(way.backend == "torch" for way in self.loaded)
-
-    @property
     def manifest(self) -> Manifest:
         """Manifest of the package."""
         return self.package.manifest

@@ -31,8 +31,8 @@ class Check(Generic[T]):
     """A check: of what, when it applies, and how it runs.
 
     title: names its results or, for a back end, whose name these bear, one that says that it broke off
-    of: what it is held for, each time anew: the files as they lie there, the package once it is imported, it
-    with values of its parameters, or what one back end, or the C, answers for such values
+    of: what it is held for, each time anew: the files as they lie there, the imported package with values of
+    its parameters, or what one back end, or the C, answers for such values
     applies: whether it concerns such a thing
     run: yields the results, given the name that they bear and the thing
     needed: whether nothing else is asked where it fails
@@ -76,7 +76,8 @@ def _called(
     """Return a check of calls that each back end composes of coefficients and torques in the same way."""
 
     def of_one(name: str, a: BackendAnswers) -> Iterable[Result]:
-        elsewhere = a.way.backend == "autograd" and a.subject.composed_elsewhere
+        is_slow = a.way.backend == "autograd" and a.subject.reference.is_large
+        elsewhere = is_slow and any(way.backend == "torch" for way in a.subject.loaded)
         return [skipped(f"{name}: {title}", COMPOSED)] if elsewhere else run(name, a)
 
     return Check(title, BackendAnswers, applies, of_one)
@@ -120,13 +121,11 @@ def _states(name: str, s: Subject) -> Iterable[Result]:
 def _bodies(name: str, s: Subject) -> Iterable[Result]:
     unphysical = bool(s.manifest.request.get("allow_unphysical"))
     bodies = s.package.module.ROBOT.bodies
-    told = f"{name}: bodies that load looks at"
-    return [check_bodies(told, there(s.manifest.tree), bodies, s.parameters, unphysical)]
+    return [check_bodies(name, there(s.manifest.tree), bodies, s.parameters, unphysical)]
 
 
 def _numbers_of_bodies(name: str, s: Subject) -> Iterable[Result]:
-    told = f"{name}: formulas of the bodies give their numbers"
-    return [check_numbers(told, there(s.manifest.tree), s.parameters)]
+    return [check_numbers(name, there(s.manifest.tree), s.parameters)]
 
 
 def _refused(name: str, _: BackendAnswers) -> Iterable[Result]:
