@@ -1,7 +1,7 @@
 """Checks of formulas.txt and formulas.tex, read back as formulas, against the reference."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
@@ -16,9 +16,6 @@ from linkwise.oracle.reference import Reference
 from linkwise.package.formula_symbols import MOTION, motion_symbol, parameter_symbols
 from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
-
-Formula = Callable[[Mapping[str, Any]], Any]
-"""Function that returns a formula's value for given values of the symbols; raises Unreadable."""
 
 # Coordinates have one digit, since robots of many coordinates have no formulas.
 PATTERNS = {
@@ -42,8 +39,7 @@ def check_formulas(name: str, ending: str, subject: Subject) -> Iterator[Result]
     if not subject.has_numbers:
         yield skipped(f"{name}: not checked", "there is nothing to hold it against")
         return
-    read = {"txt": _text_row, "tex": _latex_row(manifest)}[ending]
-    yield _numbers(name, [read(formula) for *_, formula in found], subject)
+    yield _numbers(name, ending, [formula for *_, formula in found], subject)
 
 
 def _lines(name: str, manifest: Manifest, ending: str, text: str, found: Sequence[Row]) -> Result:
@@ -61,12 +57,14 @@ def _lines(name: str, manifest: Manifest, ending: str, text: str, found: Sequenc
     return Result(name, not wrong, None, told)
 
 
-def _numbers(name: str, formulas: Sequence[Formula], subject: Subject) -> Result:
+def _numbers(name: str, ending: str, formulas: Sequence[str], subject: Subject) -> Result:
     """Compare the formulas' values with the reference; one that cannot be read as a formula fails."""
     reference = subject.reference
     names = _names(subject.parameters, reference)
     try:
-        tau = np.stack([_filled(formula(names), reference) for formula in formulas], -1)
+        tau = np.stack(
+            [_filled(_value(ending, formula, names, subject.manifest), reference) for formula in formulas], -1
+        )
     except Unreadable as unread:
         return Result(f"{name}: can be read", False, None, f"it holds {unread}")
     at = (slice(None), *subject.rows.tau.T)
@@ -90,15 +88,11 @@ def _filled(value: Any, reference: Reference) -> Array:
     return np.broadcast_to(np.asarray(value, dtype=float), len(reference.states.q))
 
 
-def _text_row(formula: str) -> Formula:
-    return lambda names: TextFormula(formula).value(names)
-
-
-def _latex_row(manifest: Manifest) -> Callable[[str], Formula]:
-    def read(formula: str) -> Formula:
-        return lambda names: LatexReader(formula, _latex_symbols(manifest, names), NUMPY).value()
-
-    return read
+def _value(ending: str, formula: str, names: Mapping[str, Any], manifest: Manifest) -> Any:
+    """Return a formula's value for given values of the symbols; raises Unreadable."""
+    if ending == "txt":
+        return TextFormula(formula).value(names)
+    return LatexReader(formula, _latex_symbols(manifest, names), NUMPY).value()
 
 
 def _latex_symbols(manifest: Manifest, names: Mapping[str, Any]) -> dict[str, Any]:
