@@ -100,11 +100,8 @@ def compare(
             continue
         scale = np.broadcast_to(entries.scale, expected.shape)
         for block in _blocks(expected.shape):
-            own = np.maximum(scale[block] * (ROUNDINGS * epsilon / tolerance), 1e-300)
-            own = np.maximum(own, np.abs(expected[block]))
-            errors = np.abs(np.subtract(value[block], expected[block], dtype=float)) / own
-            if np.isnan(errors.max()):
-                errors[np.isnan(errors)] = np.inf
+            least = scale[block] * (ROUNDINGS * epsilon / tolerance)
+            errors = _errors(value[block], expected[block], least)
             if errors.max() <= worst:
                 continue
             worst, (_, *at) = (
@@ -120,6 +117,15 @@ def compare(
         return skipped(name, "there was nothing to compare")
     detail = f"largest relative error {worst:.1e}"
     return Result(name, worst <= tolerance, worst, detail if worst <= tolerance else f"{detail} at {place}")
+
+
+def _errors(value: Array, expected: Array, least: Array) -> Array:
+    """Return errors relative to the value, or to the least that it is counted as; infinite for NaN."""
+    own = np.maximum(np.maximum(least, 1e-300), np.abs(expected))
+    errors: Array = np.abs(np.subtract(value, expected, dtype=float)) / own
+    if np.isnan(errors.max()):
+        errors[np.isnan(errors)] = np.inf
+    return errors
 
 
 def _blocks(shape: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:

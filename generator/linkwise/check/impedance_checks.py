@@ -69,38 +69,38 @@ def _shaped(
     """
     n = len(model.joint_names)
     q, qd, _ = reference.states.at(rows).motion
-    mass, scale = (source["c2"][rows] for source in (reference.values, reference.scales))
-    coriolis, size = (source["c1"][rows] for source in (reference.values, reference.scales))
+    sources = reference.values, reference.scales
+    mass, scale = (source["c2"][rows] for source in sources)
+    coriolis, size = (source["c1"][rows] for source in sources)
     own = float(np.abs(mass.sum(2)).max())
     more, stiffness, at = own * np.linspace(0.1, 0.3, n), own * np.linspace(1.0, 3.0, n), 0.9 * q
     force = reference.values["tau"][rows].sum(-1)
     shares = np.broadcast_to(kept, (n, len(kept)))
+    damping = natural(shares, plus=more)
     controller = model.partial_impedance(
-        inertia=natural(shares),
-        damping=natural(shares, plus=more),
-        stiffness=stiffness,
-        friction_width=WIDTH,
+        inertia=natural(shares), damping=damping, stiffness=stiffness, friction_width=WIDTH
     )
     qdd, tau = (np.asarray(call(q, qd, at, force)) for call in (controller.acceleration, controller))
     parts, sizes = passive_reference(joints, States(q, qd, qdd))
     rest, rest_size = parts[:2].sum(0) + parts[2] * np.tanh(np.abs(qd) / WIDTH), sizes[:3].sum(0)
     armature, armature_size = parts[3], sizes[3]
-
-    def along(matrix: Array, vector: Array) -> Array:
-        product: Array = np.einsum("sik,sk->si", matrix, vector)
-        return product
-
     weight = kept[:, None]
     inertia = (weight * mass).sum(2)
-    wanted = along(inertia, qdd) + armature
-    pull = force - along((weight * coriolis).sum(2), qd) - more * qd - stiffness * (q - at)
-    wanted_size = along((weight * scale).sum(2) + _eliminated(inertia), np.abs(qdd)) + armature_size
-    pull_size = np.abs(force) + along((weight * size).sum(2), np.abs(qd)) + more * np.abs(qd)
+    wanted = _along(inertia, qdd) + armature
+    pull = force - _along((weight * coriolis).sum(2), qd) - more * qd - stiffness * (q - at)
+    wanted_size = _along((weight * scale).sum(2) + _eliminated(inertia), np.abs(qdd)) + armature_size
+    pull_size = np.abs(force) + _along((weight * size).sum(2), np.abs(qd)) + more * np.abs(qd)
     yield Entries("M* qdd", wanted, pull, wanted_size + pull_size + stiffness * np.abs(q - at))
-    gravity, gravity_size = (source["g"][rows].sum(-1) for source in (reference.values, reference.scales))
-    taken = along(mass.sum(2), qdd) + armature + along(coriolis.sum(2), qd) + gravity + rest
-    taken_size = along(scale.sum(2), np.abs(qdd)) + armature_size + along(size.sum(2), np.abs(qd))
+    gravity, gravity_size = (source["g"][rows].sum(-1) for source in sources)
+    taken = _along(mass.sum(2), qdd) + armature + _along(coriolis.sum(2), qd) + gravity + rest
+    taken_size = _along(scale.sum(2), np.abs(qdd)) + armature_size + _along(size.sum(2), np.abs(qd))
     yield Entries("torque", tau + force, taken, taken_size + gravity_size + rest_size + np.abs(force))
+
+
+def _along(matrix: Array, vector: Array) -> Array:
+    """Return products (samples, n) of matrices (samples, n, n) and vectors (samples, n)."""
+    product: Array = np.einsum("sik,sk->si", matrix, vector)
+    return product
 
 
 def _eliminated(inertia: Array) -> Array:
