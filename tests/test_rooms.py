@@ -41,6 +41,7 @@ ROOMS = (
     "generator_fingerprint",
     "own_runtime",
     "option",
+    "arrays",
     "errors",
     "escape",
     "linkwise_runtime",

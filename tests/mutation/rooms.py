@@ -71,7 +71,7 @@ ROOMS: dict[str, Room] = {
             f"{HOUSE}{name}.py"
             for name in (
                 *("__init__", "__main__", "package_cache", "pipeline", "kernel_choice", "plotstyle"),
-                *("render", "extras", "option"),
+                *("render", "extras", "option", "arrays"),
                 *("progress", "input_file", "generator_fingerprint"),
                 *("errors", "escape", "own_process", "own_runtime"),
             )

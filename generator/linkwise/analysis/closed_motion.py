@@ -15,8 +15,8 @@ import numpy as np
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.disk_rows import collected
 from linkwise.analysis.samples import Samples
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 BLOCK = 4096

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 
-from linkwise.analysis.term_rows import Rows, TermArrays, mirrored
+from linkwise.analysis.term_rows import TermArrays, mirrored
+from linkwise.arrays import Array, Index
 from linkwise.package.entries import RigidTree
-from linkwise.package.load import Array
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class ConstrainedModel:
         place = np.zeros(len(self.open.joint_names), dtype=np.intp)
         place[list(self.following.independent)] = np.arange(len(self.following.independent))
 
-        def taken(cube: Array, rows: Rows) -> Array:
+        def taken(cube: Array, rows: Index) -> Array:
             i, j, *k = rows.T
             found: Array = cube[(..., place[i], j, *(place[other] for other in k))]
             return found
@@ -186,7 +186,7 @@ def _layout(own: Any, following: Following) -> TermArrays:
     """
     movers, independent = following.movers, set(following.independent)
 
-    def moved(rows: Rows) -> set[tuple[int, ...]]:
+    def moved(rows: Index) -> set[tuple[int, ...]]:
         return {
             (mover, j, *more)
             for i, j, *k in rows.tolist()
@@ -200,7 +200,7 @@ def _layout(own: Any, following: Following) -> TermArrays:
     return TermArrays(acceleration, velocity, _rows(moved(own.gravity), 2), _rows(moved(own.torque), 2))
 
 
-def _rows(found: set[tuple[int, ...]], width: int) -> Rows:
+def _rows(found: set[tuple[int, ...]], width: int) -> Index:
     return np.array(sorted(found), dtype=np.intp).reshape(-1, width)
 
 

@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 from linkwise_runtime.native.system import system_here
 
-from linkwise.package.load import Array
+from linkwise.arrays import Array
 
 AT_ONCE = 1 << 18
 

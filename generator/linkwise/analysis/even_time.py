@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
-from linkwise.package.load import Array
 from linkwise.progress import Progress, silent
 
 TOLERANCE = 1e-3

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.settings import Lowpass, Processing
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
-from linkwise.package.load import Array
 
 FORGOTTEN = 1e-6
 """Fraction of a filter's initial transient that is left behind the padding."""

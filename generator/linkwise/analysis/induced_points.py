@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from linkwise.analysis.opened_robot import OpenedRobot, body_frame
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.package.load import Array
 
 JOINTS, CENTRE = "joints", "centre-of-mass"
 """Names of the points that are no frames; a frame of such a name takes precedence."""

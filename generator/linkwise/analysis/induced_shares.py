@@ -34,8 +34,8 @@ from linkwise.analysis.result_quantities import LOSSES, PASSIVE
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.term_rows import NAMES, TermArrays, mirrored
 from linkwise.analysis.verify import Closure, worst_of
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.package.load import Array
 
 AT_ONCE = 1 << 21
 """Force values of the sources that are computed at once."""

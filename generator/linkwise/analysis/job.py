@@ -24,10 +24,10 @@ from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import draw
 from linkwise.analysis.stream import Sink, span_of, stream
 from linkwise.analysis.torques import Decomposer
+from linkwise.arrays import Array
 from linkwise.errors import within
 from linkwise.extras import extra
 from linkwise.option import option
-from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ class Outputs:
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a log: how it is read and derived, what the robot bears in it, and what is written."""
+    """Request of a log: how it is read and derived, what the robot bears in it, and what is written."""
 
     reading: Reading = field(default_factory=Reading)
     processing: Processing = field(default_factory=Processing)

@@ -8,8 +8,7 @@ import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import MOTION, PASSIVE
-from linkwise.analysis.result_rows import Indices
-from linkwise.package.load import Array
+from linkwise.arrays import Array, Index
 
 MOTIONS: dict[str, tuple[str, ...]] = {
     "acceleration": MOTION[:1],
@@ -35,7 +34,7 @@ class Cause:
         """True if the cause is a joint's motion, or a part of that."""
         return self.kind in MOTIONS
 
-    def rows(self, result: AnalysisResult, i: int) -> Indices:
+    def rows(self, result: AnalysisResult, i: int) -> Index:
         """Return the numbers of the rows of the cause's torques on joint i."""
         where = {} if self.number is None else {"load" if self.kind == "load" else "cause": self.number}
         return result.rows.numbers(*self.quantities, joint=i, **where)

@@ -18,8 +18,8 @@ from linkwise.analysis.result import AnalysisResult, Work
 from linkwise.analysis.result_quantities import POWER_OF, QUANTITIES, WORKS, ResultQuantity
 from linkwise.analysis.result_rows import Column
 from linkwise.analysis.settings import choices
+from linkwise.arrays import Array
 from linkwise.extras import extra
-from linkwise.package.load import Array
 
 Format = Literal["parquet", "csv"]
 

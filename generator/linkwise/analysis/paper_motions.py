@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.output import write_files
-from linkwise.package.load import Array
 from linkwise.package.write import refuse_inside_package
 
 RATE = 100.0

@@ -12,9 +12,10 @@ from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.opened_robot import OpenedRobot, body_frame, told_apart
 from linkwise.analysis.settings import Payload
 from linkwise.analysis.term_rows import NAMES, TermArrays
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.oracle.newton_euler import NewtonEuler
-from linkwise.package.load import Array, Package
+from linkwise.package.load import Package
 from linkwise.package.manifest import BodyEntry, LinkEntry, RigidTree
 
 UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

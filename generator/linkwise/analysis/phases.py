@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from linkwise.analysis.contacts import THRESHOLD, WhileColumn
 from linkwise.analysis.contacts.times import Switch, read_switch
@@ -13,9 +12,9 @@ from linkwise.analysis.loads.placed import PlacedLoad, model_pose
 from linkwise.analysis.logs import Log
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.settings import Reading
+from linkwise.arrays import Array, Mask
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, printable
-from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 FORM = "write it as NAME=LOAD, NAME=COLUMN>VALUE or NAME=FROM..TO in s, and NAME/REST=… to name what is left"
@@ -93,7 +92,7 @@ class PlacedPhase:
             said.append(f"force of {self.load.name} above {self.above:g} N")
         return printable(f"{self.name}: {' or '.join(said)}")
 
-    def on(self, robot: OpenedRobot, time: Array, q: Array, contacts: Array) -> NDArray[np.bool_]:
+    def on(self, robot: OpenedRobot, time: Array, q: Array, contacts: Array) -> Mask:
         """Return whether the phase is on at instants (S,).
 
         q: positions of the robot (S, n); contacts: shares of its contacts, (contacts, S)

@@ -15,7 +15,7 @@ from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_quantities import FORCE_OF, PASSIVE
 from linkwise.analysis.result_rows import ResultRows
-from linkwise.package.load import Array
+from linkwise.arrays import Array
 
 Motion = tuple[Array, Array, Array]
 """q, q̇ and q̈, each (S, n)."""

@@ -16,9 +16,9 @@ from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result_rows import Column, ResultRows
 from linkwise.analysis.settings import Processing, Reading
 from linkwise.analysis.verify import Closure
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, printable
-from linkwise.package.load import Array
 
 PART_BYTES, LEAST = 4 << 20, 256
 """Approximate size in bytes of a part of a result, and its fewest samples."""

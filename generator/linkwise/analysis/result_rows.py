@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from linkwise_runtime.robot_axes import NamedAxis, axes_of
-from numpy.typing import NDArray
 
 from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.loads.placed import PlacedLoad
@@ -26,10 +25,9 @@ from linkwise.analysis.result_quantities import (
     ResultQuantity,
 )
 from linkwise.analysis.term_rows import TermArrays
+from linkwise.arrays import Array, Index
 from linkwise.escape import column_part
-from linkwise.package.load import Array
 
-Indices = NDArray[np.intp]
 Place = tuple[str, tuple[int, ...]]
 """A quantity, and the index along each of its axes."""
 OVER_TIME = {"velocity": "/s", "acceleration": "/s²"}
@@ -40,11 +38,11 @@ FIELD_OF = {"load": "cause", "contact": "cause", "constraint": "cause", "compone
 class QuantityRows(NamedTuple):
     """Rows of a quantity, ascending."""
 
-    rows: slice | Indices
+    rows: slice | Index
     """Rows, as a slice where they follow each other."""
-    numbers: Indices
+    numbers: Index
     """Numbers of the rows."""
-    at: Indices
+    at: Index
     """Index along each axis of the quantity, (entries, axes)."""
 
     def listed(self) -> Iterator[tuple[int, list[int]]]:
@@ -127,7 +125,7 @@ class ResultRows:
         first, end = (rows[0], rows[-1] + 1) if rows else (0, 0)
         return QuantityRows(slice(first, end) if end - first == len(rows) else numbers, numbers, at)
 
-    def numbers(self, *names: str, **where: int | Sequence[int]) -> Indices:
+    def numbers(self, *names: str, **where: int | Sequence[int]) -> Index:
         """Return the numbers of the rows of quantities, at the given indices along axes only: joint=2."""
         found = [np.zeros(0, np.intp)]
         for name in names:

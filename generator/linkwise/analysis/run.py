@@ -19,11 +19,11 @@ from linkwise.analysis.phases import Phase
 from linkwise.analysis.settings import Payload, Processing, Reading
 from linkwise.analysis.show import check_figure, figure_png
 from linkwise.analysis.show.page import report
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names, json_text
 from linkwise.input_file import is_inside
 from linkwise.output import whole_directory
-from linkwise.package.load import Array
 from linkwise.package.write import refuse_inside_package
 from linkwise.progress import Progress, silent
 

@@ -26,8 +26,8 @@ from linkwise.analysis.even_time import TOLERANCE, even_rate, resampled
 from linkwise.analysis.logs import Log
 from linkwise.analysis.logs.checks import require_finite
 from linkwise.analysis.settings import Reading
+from linkwise.arrays import Array
 from linkwise.errors import within
-from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, Manifest
 from linkwise.progress import Progress
 

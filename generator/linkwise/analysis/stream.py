@@ -14,8 +14,8 @@ from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import Processing
 from linkwise.analysis.torques import Decomposer
 from linkwise.analysis.verify import Closure, against_recursion
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 Sink = Callable[[Array], None]

@@ -2,11 +2,7 @@
 
 from typing import Any, NamedTuple
 
-import numpy as np
 from linkwise_runtime.structure import Layout
-from numpy.typing import NDArray
-
-Rows = NDArray[np.intp]
 
 
 class TermArrays(NamedTuple):

@@ -19,9 +19,9 @@ from linkwise.analysis.result_rows import QuantityRows, ResultRows, torque_place
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.term_rows import TermArrays, term_rows
 from linkwise.analysis.verify import Closure, residual, worst_of
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
-from linkwise.package.load import Array
 
 Sum = tuple[int, int, list[int]]
 """Joint and row of a torque, and the rows of what it is the sum of."""

@@ -12,11 +12,11 @@ from linkwise.analysis.contacts.ground import GroundContacts
 from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_rows import ResultRows
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.oracle.contacts import contact_rows
 from linkwise.oracle.loop_equations import LoopEquations
 from linkwise.oracle.newton_euler import NewtonEuler
-from linkwise.package.load import Array
 from linkwise.package.manifest import RigidTree
 
 LIMIT = 1e-9

@@ -1,4 +1,4 @@
-"""What can be asked of a package here, in turn: its back ends and its C, for values of its parameters."""
+"""Answers of a package that can be had here, in turn: its back ends and its C, for values of its parameters."""
 
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -11,13 +11,14 @@ from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.native.build import PARTS, Sources, library
 from linkwise_runtime.native.system import system_here
 
+from linkwise.arrays import Array
 from linkwise.check.c_functions import CFunctions, compile_c
 from linkwise.check.compare import Entries, IndexRows, Result, compare, is_short_of_memory, line_of, skipped
 from linkwise.check.parametric_tree import changed_values
 from linkwise.check.subject import BackendVariant, Subject, long_enough
 from linkwise.oracle.reference import Reference
 from linkwise.own_process import Ended, begun
-from linkwise.package.load import Array, Package
+from linkwise.package.load import Package
 
 OPTIONAL = ("torch",)
 """Libraries that a package's back ends may need beside NumPy."""

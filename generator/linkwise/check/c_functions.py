@@ -8,16 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from linkwise.check.compare import (
-    Entries,
-    IndexRows,
-    Result,
-    Rows,
-    compare,
-    is_short_of_memory,
-    packed,
-    skipped,
-)
+from linkwise.arrays import Array, Index
+from linkwise.check.compare import Entries, IndexRows, Result, compare, is_short_of_memory, packed, skipped
 from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype, wrong_header
 from linkwise.check.control_functions import (
     CONTROL,
@@ -32,7 +24,6 @@ from linkwise.check.model_calls import FLOAT32
 from linkwise.errors import LinkwiseError
 from linkwise.oracle.reference import Reference, dense_quantities
 from linkwise.oracle.states import NUMBERS
-from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 ROWS, BLOCKS = (0, 1, 7, 8, 9, 17, 139), (1, 2, 11)
@@ -139,7 +130,7 @@ class CFunctions:
                 yield from self._rows(function, reference, at, width, shift)
 
     def _rows(
-        self, function: Prototype, reference: Reference, at: Rows, width: int, shift: int
+        self, function: Prototype, reference: Reference, at: Index, width: int, shift: int
     ) -> Iterator[Entries]:
         sizes = {what: len(self.rows.of(what)) for what in function.outputs}
         motion = zip(("q", "qd", "qdd"), reference.states.at(at).motion, strict=True)

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Index
 from linkwise.oracle.reference import TOLERANCE, Reference
-from linkwise.package.load import Array
 
 ROUNDINGS = 10.0
 """Roundings that a value may gather, each as large as that of the numbers that it is summed from."""
@@ -76,7 +75,7 @@ class Entries:
     value: Array
     expected: Array
     scale: Array
-    rows: NDArray[np.intp] | None = None
+    rows: Index | None = None
 
 
 def compare(
@@ -143,17 +142,14 @@ def dense(what: str, value: Array, reference: Reference, rows: Any = slice(None)
     return Entries(what, value, reference.values[what][rows], reference.scales[what][rows])
 
 
-Rows = NDArray[np.intp]
-
-
 @dataclass(frozen=True)
 class IndexRows:
-    """Indices (i, j, k) of every packed c2, c1 and h1, and (i, j) of every tau and g, in order."""
+    """Index (i, j, k) of every packed c2, c1 and h1, and (i, j) of every tau and g, in order."""
 
-    c2: Rows
-    c1: Rows
-    tau: Rows
-    h1: Rows
+    c2: Index
+    c1: Index
+    tau: Index
+    h1: Index
 
     @classmethod
     def of_paths(cls, paths: Sequence[Sequence[int]], linear: Sequence[int]) -> "IndexRows":
@@ -169,7 +165,7 @@ class IndexRows:
             _table([row for row in c1 if row[1] in linear], 3),
         )
 
-    def of(self, what: str) -> Rows:
+    def of(self, what: str) -> Index:
         """Return the indices of a quantity."""
         return {"c2": self.c2, "c1": self.c1, "c0": self.c1, "tau": self.tau, "g": self.tau, "h1": self.h1}[
             what
@@ -183,7 +179,7 @@ class IndexRows:
         )
 
 
-def packed(what: str, value: Any, rows: Rows, reference: Reference, at: Rows) -> Entries:
+def packed(what: str, value: Any, rows: Index, reference: Reference, at: Index) -> Entries:
     """Return packed values (..., count) beside the reference's; `at` (...) gives the sample of each."""
     value = np.asarray(value)
     picked, scale = (
@@ -194,5 +190,5 @@ def packed(what: str, value: Any, rows: Rows, reference: Reference, at: Rows) ->
     return Entries(what, value.reshape(picked.shape), picked, scale, rows)
 
 
-def _table(rows: Sequence[Sequence[int]], width: int) -> Rows:
+def _table(rows: Sequence[Sequence[int]], width: int) -> Index:
     return np.array(rows, dtype=np.intp).reshape(-1, width)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 
+from linkwise.arrays import Array
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.oracle.contacts import KINDS, ContactEquations
 from linkwise.oracle.held_motion import condition_of, far_from_singular, held_motion, steady, with_noise
@@ -16,7 +17,6 @@ from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.rounding import measure_rounding
 from linkwise.oracle.states import States
 from linkwise.package.entries import RigidTree
-from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 TOLD = "in closed loops against least squares"

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.version import VERSION
 
+from linkwise.arrays import Array
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.subject import Subject
 from linkwise.emit.formula_page import Row, formula_page
 from linkwise.oracle.formula_text import NUMPY, LatexReader, TextFormula, Unreadable, parameter_values
 from linkwise.oracle.reference import Reference
 from linkwise.package.formula_symbols import MOTION, motion_symbol, parameter_symbols
-from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 # Coordinates have one digit, since robots of many coordinates have no formulas.

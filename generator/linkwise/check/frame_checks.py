@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Index
 from linkwise.check.compare import Entries, Result, compare
 from linkwise.oracle.magnitudes import Magnitudes
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import COMPLEX_STEP, TOLERANCE
 from linkwise.oracle.states import States
-from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest, RigidTree
 
 STATES = 12
@@ -72,7 +71,7 @@ def frame_reference(manifest: Manifest, tree: RigidTree, states: States) -> Fram
     )
 
 
-def chosen_rows(count: int) -> NDArray[np.intp]:
+def chosen_rows(count: int) -> Index:
     """Return the indices, among `count` states, of those that the reference is for."""
     return np.linspace(0, count - 1, min(STATES, max(2, count // 2))).astype(np.intp)
 

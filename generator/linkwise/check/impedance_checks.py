@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 
+from linkwise.arrays import Array
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.sum_checks import is_tied, passive_reference, regular
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import States
 from linkwise.package.entries import PassiveEntry, RigidTree
-from linkwise.package.load import Array
 
 WIDTH = 0.5
 """Width `friction_width` of the friction that is compensated."""

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Index
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.frame_checks import FrameReference, chosen_rows
 from linkwise.check.model_calls import FLOAT32
@@ -15,7 +15,6 @@ from linkwise.check.sum_checks import SINGLE, passive_reference, regular
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import States
 from linkwise.package.entries import PassiveEntry
-from linkwise.package.load import Array
 
 Quantity = tuple[Array, Array]
 """Values (samples, n, ...) and their scales."""
@@ -84,7 +83,7 @@ def _given(
     model: Dynamics,
     joints: Sequence[PassiveEntry],
     reference: Reference,
-    rows: NDArray[np.intp],
+    rows: Index,
     kind: type = np.float64,
 ) -> Iterator[Entries]:
     """Yield accelerations by given torques, with the passive torques of the joints."""
@@ -96,7 +95,7 @@ def _given(
         yield Entries(source, getattr(found, source), value, scale)
 
 
-def _asked(model: Dynamics, reference: Reference, rows: NDArray[np.intp]) -> Iterator[Entries]:
+def _asked(model: Dynamics, reference: Reference, rows: Index) -> Iterator[Entries]:
     """Yield accelerations by the actuators that produce a given motion."""
     states = reference.states.at(rows)
     torque, size = (a["tau"][rows].sum(-1) for a in (reference.values, reference.scales))
@@ -109,9 +108,9 @@ def _asked(model: Dynamics, reference: Reference, rows: NDArray[np.intp]) -> Ite
 def _of_a_point(
     model: Dynamics,
     reference: Reference,
-    rows: NDArray[np.intp],
+    rows: Index,
     frames: FrameReference,
-    at: NDArray[np.intp],
+    at: Index,
     load_of: Callable[..., Any],
 ) -> Iterator[Entries]:
     """Yield accelerations of the last frame at its point under a load; one source has that load twice."""
@@ -145,7 +144,7 @@ def _of_a_point(
     yield Entries(f"kinematic of {frame}", found.kinematic, rate * qd, change * np.abs(qd))
 
 
-def _sources(reference: Reference, rows: NDArray[np.intp], joints: Sequence[PassiveEntry]) -> _Sources:
+def _sources(reference: Reference, rows: Index, joints: Sequence[PassiveEntry]) -> _Sources:
     """Return all sources but loads; the states' qdd serve as the actuators' torques."""
     states = reference.states.at(rows)
     values, scales = ({k: a[rows] for k, a in kept.items()} for kept in (reference.values, reference.scales))

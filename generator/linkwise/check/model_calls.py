@@ -6,11 +6,11 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 
-from linkwise.check.compare import Entries, IndexRows, Result, Rows, compare, dense, packed, skipped
+from linkwise.arrays import Array, Index
+from linkwise.check.compare import Entries, IndexRows, Result, compare, dense, packed, skipped
 from linkwise.extras import extra
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import States
-from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 FLOAT32 = {"tolerance": 1e-5, "epsilon": 2.0**-23}
@@ -113,7 +113,7 @@ def _batches(checked: Named) -> Iterator[Entries]:
     yield from _few(checked, alike, same)
 
 
-def _few(checked: Named, states: States, at: Rows) -> Iterator[Entries]:
+def _few(checked: Named, states: States, at: Index) -> Iterator[Entries]:
     _, model, rows, reference = checked
     for what, value in rows.fields(model.packed(*states.motion)).items():
         yield packed(what, value, rows.of(what), reference, at)
@@ -122,7 +122,7 @@ def _few(checked: Named, states: States, at: Rows) -> Iterator[Entries]:
     yield _flat("tau", model.partial_torque(*states.motion), reference, at)
 
 
-def _flat(what: str, value: Array, reference: Reference, at: Rows) -> Entries:
+def _flat(what: str, value: Array, reference: Reference, at: Index) -> Entries:
     """Return entries whose batch of shape `at` is flattened to one axis."""
     inner = reference.values[what].shape[1:]
     if value.shape != (*at.shape, *inner):

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.parameter_values import ParametricBody, faults
 
+from linkwise.arrays import Array
 from linkwise.check.compare import Result
 from linkwise.oracle.formula_text import TextFormula, parameter_values
 from linkwise.package.entries import PLACE, BodyEntry, RigidTree
-from linkwise.package.load import Array
 
 MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 VARIED = ("translation", "mass", "com", "inertia")

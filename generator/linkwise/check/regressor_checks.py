@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 
-from linkwise.check.compare import Entries, Result, Rows, compare
+from linkwise.arrays import Array, Index
+from linkwise.check.compare import Entries, Result, compare
 from linkwise.check.model_calls import FLOAT32
 from linkwise.oracle.magnitudes import Magnitudes
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import TOLERANCE, Reference, by_unit
 from linkwise.oracle.states import NUMBERS, States
 from linkwise.package.entries import RigidTree
-from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 MOST = 12
 """Most states."""
 MOMENTS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-"""Indices of Ixx, Ixy, Iyy, Ixz, Iyz, Izz, in the order of the regressor."""
+"""Index of Ixx, Ixy, Iyy, Ixz, Iyz, Izz, in the order of the regressor."""
 
 
 def regressor_reference(manifest: Manifest, tree: RigidTree, states: States) -> Reference:
@@ -40,7 +40,7 @@ def regressor_calls(name: str, model: Dynamics, reference: Reference) -> Iterato
     """Yield checks of both calls of a back end, at all states, one and none, and in single precision."""
     states, every = reference.states, np.arange(len(reference.states.q))
 
-    def entries(kind: type, rows: Rows) -> Iterator[Entries]:
+    def entries(kind: type, rows: Index) -> Iterator[Entries]:
         motion: list[Any] = [a.astype(kind) for a in states.at(rows).motion]
         parts = zip(("Y c2", "Y c1", "Y g"), model.coefficient_regressors(*motion[:2]), strict=True)
         at = slice(None) if rows.size == len(states.q) else rows.reshape(-1)  # large: nothing is copied

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Mask
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.oracle.held_motion import held_motion, mass_matrix, steady
 from linkwise.oracle.loop_equations import LoopEquations, following
@@ -15,7 +15,6 @@ from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.rounding import measure_rounding
 from linkwise.oracle.states import States
 from linkwise.package.entries import RigidTree
-from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest
 
 TRIED = 8
@@ -170,8 +169,8 @@ def _tied(recursion: NewtonEuler, tree: RigidTree, tau: Array) -> Rates:
     return motion
 
 
-def _agree(rows: Array, mapped: Array) -> NDArray[np.bool_]:
+def _agree(rows: Array, mapped: Array) -> Mask:
     """Return at which samples A G is zero, up to the rounding of a file's numbers, as booleans (samples,)."""
     left, sizes = (np.abs(part).max((1, 2)) for part in (rows @ mapped, np.abs(rows) @ np.abs(mapped)))
-    agreed: NDArray[np.bool_] = left <= AGREED * sizes
+    agreed: Mask = left <= AGREED * sizes
     return agreed

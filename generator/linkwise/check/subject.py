@@ -10,6 +10,7 @@ from typing import NamedTuple, TypeVar
 
 from linkwise_runtime.dynamics import Dynamics
 
+from linkwise.arrays import Array
 from linkwise.check.c_functions import CFunctions
 from linkwise.check.compare import IndexRows, Result, skipped
 from linkwise.check.compiled_c import CompiledPackage
@@ -26,7 +27,7 @@ from linkwise.oracle.reference import Reference, body_reference, states_of_torqu
 from linkwise.oracle.states import States, affordable, random_states
 from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.package.entries import PassiveEntry, RigidTree
-from linkwise.package.load import Array, Package
+from linkwise.package.load import Package
 from linkwise.package.manifest import Manifest
 
 T = TypeVar("T")

@@ -5,14 +5,13 @@ from typing import Any
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Mask
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.model_calls import FLOAT32, TOO_LARGE
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import NUMBERS, States
 from linkwise.package.entries import PassiveEntry
-from linkwise.package.load import Array
 
 REGULAR = 1e-8
 """Least eigenvalue of a mass matrix, with ones on its diagonal, for which accelerations are checked."""
@@ -163,9 +162,9 @@ def acceleration_scales(
     return scale
 
 
-def regular(reference: Reference, least: float = REGULAR) -> NDArray[np.bool_]:
+def regular(reference: Reference, least: float = REGULAR) -> Mask:
     """Return which samples have a mass matrix far from singular, in whatever units joints are measured."""
-    far: NDArray[np.bool_] = reference.regularity > least
+    far: Mask = reference.regularity > least
     return far
 
 
@@ -216,7 +215,7 @@ def passive_calls(
 
 
 def _torques_of_accelerations(
-    model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference, at: NDArray[np.bool_]
+    model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference, at: Mask
 ) -> Entries:
     """Return torques given to forward dynamics beside those that its accelerations need.
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 from linkwise_runtime.constraints.independent_joints import chosen_independent, rank_of, redundant_names
 from linkwise_runtime.rule.joint_tree import TreeTie
 
-from linkwise.constraints.loop_closing import Array, closed_loops
+from linkwise.arrays import Array
+from linkwise.constraints.loop_closing import closed_loops
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.notes import BESIDE, LEAST, Note

@@ -18,12 +18,11 @@ from linkwise_runtime.rule.joint_tree import (
     TreeJoint,
     TreeLink,
 )
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.package.entries import RigidTree
 
-Array = NDArray[np.float64]
 FAR = 0.3
 """Positions whose least singular value of A_d is below this part of the best one's count as next to
 singular."""

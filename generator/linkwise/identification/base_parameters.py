@@ -17,10 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Index
 from linkwise.identification.random_motions import Motion, random_motion
-from linkwise.package.load import Array
 
 NAMES = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """Mass, first moment, and inertia about the origin of the link's frame, in the order of the regressor."""
@@ -103,7 +102,7 @@ def base_parameters(
     return BaseParameters(links, tuple(picked.tolist()), combinations, sizes, condition, hidden)
 
 
-def _combinations(rows: Array, names: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array]:
+def _combinations(rows: Array, names: Index) -> tuple[Index, Array]:
     """Return the independent columns, ascending, and the combinations of all columns that they stand for.
 
     The combinations have shape (independent, columns). names: positions in pi of the parameters that the
@@ -117,7 +116,7 @@ def _combinations(rows: Array, names: NDArray[np.intp]) -> tuple[NDArray[np.intp
     return picked[order], combinations[order]
 
 
-def _independent(rows: Array, weights: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+def _independent(rows: Array, weights: Array) -> tuple[Index, Index, Array]:
     """Return the independent columns, the others, and these as combinations of those, (picked, others)."""
     sizes = np.sqrt(np.mean(rows**2, axis=0))
     sizes[sizes <= NOTHING * sizes.max(initial=0.0)] = np.inf  # no motion shows these columns
@@ -130,7 +129,7 @@ def _independent(rows: Array, weights: Array) -> tuple[NDArray[np.intp], NDArray
     return picked, rest, scaled
 
 
-def _orthogonal(rows: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+def _orthogonal(rows: Array) -> tuple[Array, Array, Index]:
     """Return Q, a factor R of the columns, and a set of columns that span all, in the order picked.
 
     R has as few rows as there are columns.

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from linkwise_runtime.constraints.independent_joints import loose_base
-from numpy.typing import NDArray
 
 from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.arrays import Array, Mask
 from linkwise.identification.random_motions import SPEED, Motion
-from linkwise.package.load import Array
 
 RANK = 1e-6
 """Part of a column, below which its remainder, without its share along other columns, is rounding."""
@@ -28,7 +27,7 @@ class Bearings:
     measured: tuple[int, ...]
     joints: tuple[int, ...]
     """Numbers of the joints, (B,)."""
-    rubs: NDArray[np.bool_]
+    rubs: Mask
     """True for joints whose friction is fitted, (B,)."""
     sizes: Array
     """Root mean square of the joints' columns over random motions, (B, 2)."""
@@ -66,7 +65,7 @@ def floating_coordinates(robot: OpenedRobot) -> frozenset[int]:
     return frozenset() if tree is None else frozenset(loose_base(tree))
 
 
-def _independent(columns: Array) -> NDArray[np.bool_]:
+def _independent(columns: Array) -> Mask:
     """Return whether a joint's columns (rows, B, 2) are independent of those of joints before it, (B,)."""
     told = np.zeros(columns.shape[1], dtype=np.bool_)
     kept = [np.zeros((len(columns), 0))] * 2

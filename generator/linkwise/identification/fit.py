@@ -8,12 +8,11 @@ Engineering Practice 9(12), 2001).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Mask
 from linkwise.identification.base_parameters import BaseParameters
 from linkwise.identification.bearings import Bearings
 from linkwise.identification.normal_factors import JointEquations
-from linkwise.package.load import Array
 
 ROUNDS = 3
 """Rounds of reweighting: from equal weights to the joints' own, and twice again."""
@@ -87,7 +86,7 @@ def _noise(equations: JointEquations, beta: Array, friction: Array, free: float)
     return noise
 
 
-def stacked(equations: JointEquations, noise: Array, rubs: NDArray[np.bool_]) -> Array:
+def stacked(equations: JointEquations, noise: Array, rubs: Mask) -> Array:
     """Return the triangle of all joints' equations, each divided by its noise."""
     n, size = equations.triangles.shape[:2]
     base = size - 2 * len(rubs) - 1
@@ -97,7 +96,7 @@ def stacked(equations: JointEquations, noise: Array, rubs: NDArray[np.bool_]) ->
     return np.asarray(triangle)
 
 
-def _solved(triangle: Array, base: BaseParameters, rubs: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _solved(triangle: Array, base: BaseParameters, rubs: Mask) -> tuple[Array, Array]:
     """Return beta (base,) and friction (B, 2)."""
     x = np.linalg.solve(triangle[:-1, :-1], triangle[:-1, -1]).astype(float)
     friction = np.zeros((len(rubs), 2))

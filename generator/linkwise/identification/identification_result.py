@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.arrays import Array
 from linkwise.identification.base_parameters import BaseParameters
 from linkwise.identification.bearings import Bearings, floating_coordinates
 from linkwise.identification.fit import Fit
 from linkwise.identification.normal_factors import JointEquations
 from linkwise.identification.physical_fit import PhysicalFit
 from linkwise.identification.torque_log import TorqueLog
-from linkwise.package.load import Array
 
 
 @dataclass(frozen=True, eq=False)

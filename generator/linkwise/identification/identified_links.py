@@ -11,6 +11,7 @@ from linkwise_runtime.rule.regressors import inertial_parameters
 
 from linkwise.analysis.opened_robot import OpenedRobot, load_robot
 from linkwise.analysis.settings import Processing, Reading, pairs
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.identification.base_parameters import BaseParameters, base_parameters, samples_needed
 from linkwise.identification.bearings import Bearings
@@ -22,7 +23,6 @@ from linkwise.identification.physical_fit import physical_fit
 from linkwise.identification.random_motions import Motion, random_closed_motion, random_motion
 from linkwise.identification.torque_log import TorqueLog, read_torque_log
 from linkwise.option import option
-from linkwise.package.load import Array
 from linkwise.progress import Progress, silent
 
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from linkwise.analysis.filtering import derivatives
 from linkwise.analysis.settings import Processing
+from linkwise.arrays import Array
 from linkwise.escape import listed
 from linkwise.identification.fit import POOR
 from linkwise.identification.identification_result import Identification
 from linkwise.identification.normal_factors import JointEquations
 from linkwise.identification.position_noise import LONGEST, noise_gain
 from linkwise.identification.torque_log import TorqueLog
-from linkwise.package.load import Array
 
 LARGE = 100.0
 """Factor by which torques larger, or smaller, than the robot's own are perhaps in another unit."""

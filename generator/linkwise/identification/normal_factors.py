@@ -12,10 +12,10 @@ import numpy as np
 
 from linkwise.analysis.filtering import derivatives
 from linkwise.analysis.settings import Processing
+from linkwise.arrays import Array
 from linkwise.identification.base_parameters import BaseParameters
 from linkwise.identification.bearings import Bearings
 from linkwise.identification.torque_log import TorqueLog
-from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 NUMBERS = 1 << 23

@@ -10,10 +10,10 @@ from xml.parsers.expat import ExpatError
 import numpy as np
 from linkwise_runtime.rule.joint_tree import TreeFrame
 
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.identification.pseudo_inertia import central_of, pseudo_inertia, pseudo_inertia_of, shared_mass
 from linkwise.package.entries import RigidTree
-from linkwise.package.load import Array
 from linkwise.robot.description import Body, Description
 from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.parameters import numeric

@@ -5,11 +5,11 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
 from linkwise.identification.own_file import Friction, LinkMass, NotWrittenBack, OwnFile
 from linkwise.identification.placed_xml import Edit, PlacedXml, tag
-from linkwise.package.load import Array
 from linkwise.robot.description import Body
 from linkwise.robot.readers.mjcf.files import mjcf_files
 from linkwise.robot.readers.mjcf.reader import body_name, joint_name, read_mjcf

@@ -5,10 +5,10 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from linkwise.arrays import Array
 from linkwise.escape import listed
 from linkwise.extras import extra
 from linkwise.identification.own_file import Friction, LinkMass, NotWrittenBack, OwnFile
-from linkwise.package.load import Array
 from linkwise.robot.readers.toml.reader import INERTIA
 from linkwise.robot.readers.toml.table import toml_data
 

@@ -5,10 +5,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.identification.own_file import Friction, LinkMass, OwnFile
 from linkwise.identification.placed_xml import Edit, PlacedXml, tag
 from linkwise.identification.pseudo_inertia import MOMENTS
-from linkwise.package.load import Array
 from linkwise.robot.readers.xml_file import numbers
 from linkwise.robot.transforms import from_rpy
 

@@ -13,14 +13,13 @@ interior-point method.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Mask
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
 from linkwise.identification.base_parameters import NAMES, BaseParameters
 from linkwise.identification.fit import Fit
 from linkwise.identification.pseudo_inertia import pseudo_inertia
-from linkwise.package.load import Array
 
 SPECK = 1e-6
 """Part of a link's size by which a body stays inside the feasible set, so that rounding keeps it there."""
@@ -39,7 +38,7 @@ class PhysicalFit:
     friction: Array
 
 
-def physical_fit(fit: Fit, base: BaseParameters, own: Array, rubs: NDArray[np.bool_]) -> PhysicalFit:
+def physical_fit(fit: Fit, base: BaseParameters, own: Array, rubs: Mask) -> PhysicalFit:
     """Return bodies near the robot's `own` parameters (N, 10), and friction where a joint rubs, (B,).
 
     Raises LinkwiseError where the solver fails.
@@ -125,7 +124,7 @@ def _sizes(own: Array) -> Array:
     return sizes
 
 
-def _friction_sizes(fit: Fit, rubs: NDArray[np.bool_]) -> Array:
+def _friction_sizes(fit: Fit, rubs: Mask) -> Array:
     """Return a unit for each friction: the larger of its value and its standard error; 1 where both are 0."""
     found = np.maximum(np.abs(fit.friction), fit.friction_errors)[rubs].reshape(-1)
     sizes: Array = np.where(found > 0, found, 1.0)

@@ -12,7 +12,7 @@ import numpy as np
 
 from linkwise.analysis.filtering import derivatives, lowpass
 from linkwise.analysis.settings import Processing
-from linkwise.package.load import Array
+from linkwise.arrays import Array
 
 ORDER = 6
 LONGEST = 1 << 16

@@ -22,7 +22,7 @@ already stay as they are.
 
 import numpy as np
 
-from linkwise.package.load import Array
+from linkwise.arrays import Array
 
 MOMENTS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 """Places of the last six parameters in the inertia."""

@@ -6,10 +6,9 @@ which loops stay closed in the same way.
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
-from numpy.typing import NDArray
 
 from linkwise.analysis.constrained_model import ConstrainedModel
-from linkwise.package.load import Array
+from linkwise.arrays import Array, Mask
 
 SPEED = 3.0
 """Largest random velocity and acceleration in rad/s and rad/s^2, m/s and m/s^2."""
@@ -54,7 +53,7 @@ def random_closed_motion(model: ConstrainedModel, closed: Array, samples: int) -
         there = _closed(model, q + step)
         beside = np.abs(there - q - step).max(1) <= STRAIGHT * np.abs(step).max(1)
         closes = np.abs(_violation(model, there)).max(1) <= tolerance
-        good: NDArray[np.bool_] = beside & closes & (_levers(model, there) <= most)
+        good: Mask = beside & closes & (_levers(model, there) <= most)
         q = np.where(good[:, None], there, q)
     qd, qdd = np.zeros((2, *q.shape))
     qd[:, own], qdd[:, own] = generator.uniform(-SPEED, SPEED, (2, samples, len(own)))

@@ -16,10 +16,10 @@ from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.samples import read_samples
 from linkwise.analysis.settings import Lowpass, Processing, Reading
 from linkwise.analysis.stream import span_of
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.identification.position_noise import position_noise
-from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 SPELLINGS = ("tau/{}", "tau_{}", "{}_moment", "{}_force", "{}_torque", "{}/effort", "{}_effort")

@@ -12,10 +12,10 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from linkwise_runtime.rule.joint_tree import TreeFrame
 
+from linkwise.arrays import Array
 from linkwise.escape import printable
 from linkwise.identification.pseudo_inertia import central
 from linkwise.package.entries import BodyEntry, JointEntry, PassiveEntry, RigidTree
-from linkwise.package.load import Array
 
 ENDLESS = 1e9
 """Limit that is written where there is none, as URDF requires one."""

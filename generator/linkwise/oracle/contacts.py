@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.quantities import Contact
 from linkwise_runtime.rule.joint_tree import TreeFrame
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Index
 from linkwise.oracle.loop_equations import RANK, TURNS_AND_SHIFTS, LoopEquations
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import COMPLEX_STEP
-from linkwise.package.load import Array
 
 POINT = np.array([0.1, -0.2, 0.15])
 AXIS = np.array([0.3, 0.5, -0.8])
@@ -57,7 +56,7 @@ class ContactEquations:
         before = rows.shape[1] - len(self.ties.tree.couplings)
         return np.concatenate([rows[:, :before], own, rows[:, before:]], 1)
 
-    def freedoms(self, q: Array) -> NDArray[np.intp]:
+    def freedoms(self, q: Array) -> Index:
         """Return how many joints may move by themselves, (samples,); metres are scaled by a robot's size."""
         size, rows = self.recursion.reach or 1.0, self.rows(q)
         kinds = [*(tie.kind for tie in (self.ties.tree.ties if self.ties else ())), KINDS[self.kind]]
@@ -66,7 +65,7 @@ class ContactEquations:
         slides = [body.coordinate for body in self.recursion.bodies if body.kind == "prismatic"]
         rows = rows / np.array(units)[:, None] * np.where(np.isin(np.arange(q.shape[1]), slides), size, 1.0)
         sizes = np.linalg.svd(rows, compute_uv=False)
-        found: NDArray[np.intp] = q.shape[1] - (sizes > RANK * np.maximum(sizes[:, :1], 1.0)).sum(-1)
+        found: Index = q.shape[1] - (sizes > RANK * np.maximum(sizes[:, :1], 1.0)).sum(-1)
         return found
 
     def rates(self, q: Array, qd: Array) -> Array:

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.extras import extra
 from linkwise.oracle.formula_text import TextFormula, parameter_values, torch_functions
 from linkwise.oracle.reference import TOLERANCE, Reference, link_sizes
 from linkwise.oracle.states import Found, States, states_where
 from linkwise.package.entries import EnergyEntry, JointEntry
-from linkwise.package.load import Array
 
 NOISE = 1e-9
 """Relative error of each operation of a noisy Lagrangian: what it changes, rounding changes too."""

@@ -8,12 +8,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Index, Mask
 from linkwise.oracle.loop_equations import following
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.states import States
-from linkwise.package.load import Array
 
 FAR = 100.0
 """Value of `condition_of` below which a position is far from singular ones."""
@@ -36,7 +35,7 @@ def condition_of(rows: Array, rest: Sequence[int]) -> Array:
     return condition
 
 
-def far_from_singular(rows: Array, rest: Sequence[int]) -> NDArray[np.intp]:
+def far_from_singular(rows: Array, rest: Sequence[int]) -> Index:
     """Return the indices of those of A (samples, C, n) that are far from singular in columns `rest`.
 
     If none is, the best are returned that can be compared at all, the very best first.
@@ -82,7 +81,7 @@ def motions(mass: Array, rows: Array) -> Array:
     return null / size[:, :, None]
 
 
-def steady(recursion: NewtonEuler, q: Array, mapped: Array) -> NDArray[np.bool_]:
+def steady(recursion: NewtonEuler, q: Array, mapped: Array) -> Mask:
     """Return which positions (samples, n) are not next to a singular mass matrix, compared with the others.
 
     mapped: G (samples, n, m); the least eigenvalue of G^T M G, with ones on its diagonal, counts
@@ -92,7 +91,7 @@ def steady(recursion: NewtonEuler, q: Array, mapped: Array) -> NDArray[np.bool_]
     least = np.linalg.eigvalsh(mass / (size[:, :, None] * size[:, None, :]))[:, 0]
     if not len(least):
         return np.zeros(0, dtype=bool)
-    found: NDArray[np.bool_] = least >= max(STEADY * float(np.median(least)), REGULAR)
+    found: Mask = least >= max(STEADY * float(np.median(least)), REGULAR)
     return found
 
 

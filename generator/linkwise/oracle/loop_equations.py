@@ -12,10 +12,10 @@ import numpy as np
 from linkwise_runtime.rule.joint_tree import TreeFrame
 from numpy.polynomial.polynomial import polyder, polyval
 
+from linkwise.arrays import Array
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import COMPLEX_STEP
 from linkwise.package.entries import RigidTree
-from linkwise.package.load import Array
 
 TURNS_AND_SHIFTS = {"frame": (3, 3), "hinge": (2, 3), "point": (0, 3), "distance": (0, 1)}
 """Rows of each kind of tie that hold rotations, and of those after them that hold translations."""

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.oracle.held_motion import (
     condition_of,
     far_from_singular,
@@ -29,7 +30,6 @@ from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import by_unit
 from linkwise.oracle.rounding import measure_rounding
 from linkwise.oracle.states import States
-from linkwise.package.load import Array
 from linkwise.package.manifest import Manifest, RigidTree
 
 STATES = 12

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.oracle.newton_euler import Points, displacement_bound, path_of
 from linkwise.oracle.rounding import rounding_growth
-from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
 
 

@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from linkwise_runtime.rule.joint_tree import TreeFrame
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Index, Mask
 from linkwise.oracle.rounding import NoisyTree
-from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
 
 Points = Sequence[tuple[int | None, Array]]
@@ -235,9 +234,9 @@ def _moved(
 class _LinkPath:
     """Path of a link, from its body to the ground: bodies, whether each turns, and its coordinate."""
 
-    bodies: NDArray[np.intp]
-    turning: NDArray[np.bool_]
-    coordinates: NDArray[np.intp]
+    bodies: Index
+    turning: Mask
+    coordinates: Index
 
     @classmethod
     def of(cls, bodies: Sequence[BodyEntry], at: int) -> "_LinkPath":

@@ -11,13 +11,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Mask
 from linkwise.oracle.magnitudes import Magnitudes
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.states import NUMBERS, Found, States, states_where
 from linkwise.package.entries import JointEntry
-from linkwise.package.load import Array
 
 TOLERANCE = 1e-9
 """Largest error that passes, relative to the value itself; float64 leaves some 1e-13."""
@@ -73,7 +72,7 @@ class Reference:
         least: Array = np.abs(np.linalg.eigvalsh(scaled)).min(-1)
         return least
 
-    def fits_single(self) -> NDArray[np.bool_]:
+    def fits_single(self) -> Mask:
         """Return which samples have numbers small enough for single precision, squares included, (samples,).
 
         Masses must be large enough for their inverses; regressors have none.
@@ -83,7 +82,7 @@ class Reference:
             mass = np.abs(np.einsum("sii->si", self.values["c2"].sum(2)))
             parts.append(1.0 / np.sqrt(np.where(mass > 0.0, mass, 1.0)))
         sizes = [part.reshape(len(part), -1).max(axis=1, initial=0.0) for part in parts]
-        fits: NDArray[np.bool_] = np.max(sizes, axis=0) < SINGLE
+        fits: Mask = np.max(sizes, axis=0) < SINGLE
         return fits
 
 

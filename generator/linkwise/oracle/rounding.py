@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.package.entries import RigidTree
-from linkwise.package.load import Array
 
 NOISE = 1e-11
 """Relative noise; far above rounding, and small enough for matrices that lose ten digits."""

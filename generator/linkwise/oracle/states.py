@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array, Mask
 from linkwise.package.entries import JointEntry
-from linkwise.package.load import Array
 
 DRAWS = 40
 """Number of times as many states that are tried as were asked for; energies may not be defined everywhere."""
@@ -77,9 +76,7 @@ def _range(joint: JointEntry) -> tuple[float, float]:
     return joint.lower, joint.upper
 
 
-def states_where(
-    defined: Callable[[States], NDArray[np.bool_]], joints: Sequence[JointEntry], samples: int
-) -> Found:
+def states_where(defined: Callable[[States], Mask], joints: Sequence[JointEntry], samples: int) -> Found:
     """Return the states for which `defined` is True, up to `samples` and those at rest.
 
     `defined` returns (count,) for `count` states. If less than half as many as asked for are left, positions

@@ -11,8 +11,8 @@ from typing import Any, cast
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.version import VERSION
-from numpy.typing import NDArray
 
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, LinkwiseWarning
 from linkwise.extras import extra
 from linkwise.package.agreement import disagreements
@@ -20,8 +20,6 @@ from linkwise.package.contents import changed_files
 from linkwise.package.emitted_text import foreign
 from linkwise.package.importer import import_listed
 from linkwise.package.manifest import Manifest, altered_entries
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

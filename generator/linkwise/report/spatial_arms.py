@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from linkwise.package.load import Array
+from linkwise.arrays import Array
 from linkwise.report.term_count import TermPair
 from linkwise.symbolic.system import RigidSystem, System
 

@@ -16,7 +16,7 @@ ORDERS = ("gravity", "velocity", "acceleration")
 
 @dataclass(frozen=True)
 class TermQuery:
-    """One bucket of some torques τ_ij; the default is the paper's. Indices from 0; None means all.
+    """One bucket of some torques τ_ij; the default is the paper's. Index from 0; None means all.
 
     joint: i            link: j            coordinate: k, the joint whose motion is followed
     order: 2 keeps terms that contain q̈_k, 1 those that contain q̇_k, 0 gravity

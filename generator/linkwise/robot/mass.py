@@ -1,10 +1,10 @@
 """Mass properties: merging of rigidly connected bodies, and the test whether a body can exist."""
 
 from collections.abc import Iterable
-from typing import Any, TypeAlias
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.description import ZERO3, ZERO33, Body
@@ -23,7 +23,6 @@ SPECK = 1e-14
 turning and rounding leave at 1e-18 or 1e-35, where no relative slack helps; a solid body so small weighs
 1e-15 kg."""
 
-Array: TypeAlias = np.ndarray[Any, Any]
 Placed = tuple[Body, Rotation, Vec3]
 
 

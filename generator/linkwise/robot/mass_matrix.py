@@ -6,16 +6,14 @@ in every state if it is so at random ones: A is analytic in q, and so its rank i
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
 
 import numpy as np
 
+from linkwise.arrays import Array, Index, Mask
 from linkwise.errors import LinkwiseError
 from linkwise.robot.mass import SPECK, principal
 from linkwise.robot.notes import IMPOSSIBLE, Note
 from linkwise.robot.robot import Coordinate, Joint, Link
-
-Array: TypeAlias = np.ndarray[Any, Any]
 
 STATES = 3
 """Random states that must agree before a robot is refused."""
@@ -38,12 +36,12 @@ class _Factor:
     turned: Array
 
     @property
-    def idle(self) -> Array:
+    def idle(self) -> Mask:
         """True where a coordinate moves no inertia (n,): no mass, or only points on its axis."""
-        moved: Array = (self.a**2).sum(0) <= SPECK * self.turned
+        moved: Mask = (self.a**2).sum(0) <= SPECK * self.turned
         return moved
 
-    def dependent(self, columns: Array) -> tuple[int, ...]:
+    def dependent(self, columns: Index) -> tuple[int, ...]:
         """Return the first column that depends on others before it, behind these; empty if there is none."""
         a = self.a[:, columns]
         a = a / np.sqrt((a**2).sum(0))

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import one_line
 from linkwise.extras import extra
-from linkwise.package.load import Array
 from linkwise.study.patterns import fitting
 from linkwise.study.plan import Comparison
 from linkwise.study.spread import Spread, columns_of_trials, spread, values_of

@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.job import Job
 from linkwise.analysis.logs.checks import named_once
+from linkwise.arrays import Array, Mask
 from linkwise.errors import LinkwiseError, within
 from linkwise.extras import extra
-from linkwise.package.load import Array
 from linkwise.study.ledger import CURVES
 from linkwise.study.paths import opened_here
 from linkwise.study.plan import Cycles, StudyPlan
@@ -55,7 +54,7 @@ def cycle_spans(cycles: Cycles, job: Job, trial: str) -> list[Span]:
     return inside
 
 
-def _on(job: Job) -> NDArray[np.bool_]:
+def _on(job: Job) -> Mask:
     """Return at which samples the phase that defines the cycles is on."""
     (phase,) = (one for one in job.phases if one.name == "cycle")
     samples, robot = job.samples, job.decomposer.robot

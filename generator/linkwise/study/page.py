@@ -7,8 +7,8 @@ from urllib.parse import quote
 import numpy as np
 
 from linkwise.analysis.show.page_curves import encoded, packed, plotly_parts
+from linkwise.arrays import Array
 from linkwise.escape import printable, script_data
-from linkwise.package.load import Array
 from linkwise.plotstyle import COLOURS, ON_DARK
 from linkwise.render import render
 from linkwise.study.comparisons import Compared

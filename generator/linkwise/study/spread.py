@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.package.load import Array
+from linkwise.arrays import Array
 from linkwise.study.plan import SUBJECT
 from linkwise.study.summary import STATISTICS, TrialSummary
 

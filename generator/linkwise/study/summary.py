@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from linkwise.analysis.logs.checks import read_as
-from linkwise.package.load import Array
+from linkwise.arrays import Array
 from linkwise.study.ledger import CURVES, SUMMARY
 from linkwise.study.paths import require_own
 from linkwise.study.plan import StudyPlan

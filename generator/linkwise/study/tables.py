@@ -10,8 +10,8 @@ from typing import Any, Self
 import numpy as np
 
 from linkwise.analysis.result_rows import Column
+from linkwise.arrays import Array
 from linkwise.extras import extra
-from linkwise.package.load import Array
 from linkwise.study.patterns import fitting
 from linkwise.study.spread import Spread, columns_of_trials, groups_of, spread
 from linkwise.study.summary import STATISTICS, TrialSummary

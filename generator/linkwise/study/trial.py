@@ -13,10 +13,10 @@ from linkwise.analysis.job import Job, prepared
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.phases import Phase
 from linkwise.analysis.show.page import report
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
 from linkwise.output import whole_directory
-from linkwise.package.load import Array
 from linkwise.progress import silent
 from linkwise.study.cycles import TrialCycles
 from linkwise.study.inputs import trial_here, trial_key

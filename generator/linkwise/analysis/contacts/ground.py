@@ -25,8 +25,8 @@ from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.constrained_model import ConstrainedModel
-from linkwise.analysis.term_rows import NAMES, Rows, TermArrays
-from linkwise.package.load import Array
+from linkwise.analysis.term_rows import NAMES, TermArrays
+from linkwise.arrays import Array, Index
 
 WRENCH = ("moment_x", "moment_y", "moment_z", "force_x", "force_y", "force_z")
 BLIND = 1e-4
@@ -45,7 +45,7 @@ class GroundContacts:
     """The package's constraints for each contact; these may have rows of ties too."""
     unactuated: tuple[int, ...]
     joints: tuple[int, ...]
-    """Indices of the joints that contacts load, the unactuated ones included."""
+    """Index of the joints that contacts load, the unactuated ones included."""
     tied: ConstrainedModel | None
     """Model of a robot whose joints are tied, None for others; the dependent joints follow."""
 
@@ -176,7 +176,7 @@ def weighted_inverse(equations: Array, weights: Array) -> Array:
 
 
 class Standing:
-    """Rows of the contacts that are on at S samples; the rows of other contacts are zero."""
+    """Index of the contacts that are on at S samples; the rows of other contacts are zero."""
 
     def __init__(self, every: Array, moved: Array, weights: Array, unactuated: list[int]) -> None:
         """Take rows (S, C, n) by all joints' motion, and by that of joints which do not follow others."""
@@ -228,12 +228,12 @@ class _Kind:
 
     rows: tuple[tuple[int, ...], ...]
     block: tuple[int, int]
-    places: tuple[Rows, Rows]
+    places: tuple[Index, Index]
     """Row and column in the block of each packed value of its joints."""
-    sources: Rows
-    """Indices of these packed values."""
-    others: Rows
-    """Indices of the packed values of the other joints."""
+    sources: Index
+    """Index of these packed values."""
+    others: Index
+    """Index of the packed values of the other joints."""
 
     @classmethod
     def of(cls, rows: Sequence[tuple[int, ...]], joints: Sequence[int]) -> "_Kind":
@@ -284,7 +284,7 @@ class ContactTerms:
 
     @property
     def rows(self) -> TermArrays:
-        """Rows (i, j[, k], source) of the values that `left` returns."""
+        """Index (i, j[, k], source) of the values that `left` returns."""
         return TermArrays(*(kind.rows for kind in self.kinds))
 
     def left(self, packed: TermArrays, standing: Standing, n: int) -> TermArrays:
@@ -296,5 +296,5 @@ class ContactTerms:
         return TermArrays(*found)
 
 
-def _index(numbers: Iterable[int]) -> Rows:
+def _index(numbers: Iterable[int]) -> Index:
     return np.fromiter(numbers, dtype=np.intp)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.chosen_names import nearest_first
 from linkwise_runtime.dynamics import Dynamics
-from numpy.typing import NDArray
 
 from linkwise.analysis.column_matching import time_column
 from linkwise.analysis.contacts import Contacts, WhileColumn
@@ -20,9 +19,9 @@ from linkwise.analysis.logs import Log
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.samples import finite_blocks
 from linkwise.analysis.settings import Reading
+from linkwise.arrays import Array, Mask
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
-from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 FLOOR = 1e-3
@@ -36,9 +35,9 @@ class Switch:
     given: WhileColumn
     rows: Array
 
-    def on(self, time: Array) -> NDArray[np.bool_]:
+    def on(self, time: Array) -> Mask:
         """Return whether the contact is on at each of the instants (S,)."""
-        is_on: NDArray[np.bool_] = np.interp(time, self.rows[:, 0], self.rows[:, 1]) > self.given.above
+        is_on: Mask = np.interp(time, self.rows[:, 0], self.rows[:, 1]) > self.given.above
         return is_on
 
 
@@ -93,13 +92,13 @@ class ContactTimes:
         shares: Array = out / np.where(whole > 0.0, whole, 1.0)
         return shares
 
-    def _on(self, number: int, time: Array, force: Array) -> NDArray[np.bool_]:
+    def _on(self, number: int, time: Array, force: Array) -> Mask:
         switch = self.switches[number]
         if switch is not None:
             return switch.on(time)
         if not self.measured[number]:
             return np.ones(len(time), dtype=np.bool_)
-        is_on: NDArray[np.bool_] = force > self.least_force
+        is_on: Mask = force > self.least_force
         return is_on
 
     def _force(self, number: int, model: Dynamics, time: Array, q: Array) -> Array:

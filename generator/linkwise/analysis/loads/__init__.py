@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.package.load import Array
 
 FORCE, MOMENT, POINT = slice(1, 4), slice(4, 7), slice(7, 10)
 """Columns of a load's table after the time in s: force in N, moment in N·m, point in m."""

@@ -15,8 +15,8 @@ from linkwise_runtime.rule.joint_tree import TreeFrame
 
 from linkwise.analysis.loads import FORCE, MOMENT, POINT, WORLD
 from linkwise.analysis.opened_robot import OpenedRobot, body_frame
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.package.load import Array
 from linkwise.package.manifest import RigidTree
 
 Pose = Callable[[TreeFrame, Array], Array]
@@ -39,7 +39,7 @@ class LoadFrame:
     axes: TreeFrame | None
     point_in: TreeFrame | None
     joints: tuple[int, ...]
-    """Indices of the coordinates that move the body."""
+    """Index of the coordinates that move the body."""
 
     @property
     def in_world(self) -> bool:

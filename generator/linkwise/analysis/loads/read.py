@@ -18,9 +18,9 @@ from linkwise.analysis.logs import open_log
 from linkwise.analysis.opened_robot import OpenedRobot, named_body, told_apart
 from linkwise.analysis.samples import finite_blocks, slowness
 from linkwise.analysis.settings import Lowpass, Reading
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
-from linkwise.package.load import Array
 from linkwise.progress import Progress
 
 NAMED = re.compile(r"(?P<load>.+)/(?P<part>force|moment|point)_(?P<axis>[xyz])")

@@ -13,10 +13,10 @@ from linkwise.analysis.logs.checks import named_once
 from linkwise.analysis.logs.parquet import ParquetLog
 from linkwise.analysis.logs.text import open_delimited, open_storage
 from linkwise.analysis.settings import Reading
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
-from linkwise.package.load import Array
 
 AS_IT_IS = Reading()
 DELIMITED, STORAGE = (".csv", ".tsv", ".txt"), (".mot", ".sto")

@@ -27,9 +27,9 @@ from linkwise.analysis.logs.array_columns import (
 )
 from linkwise.analysis.logs.checks import named_once, require_finite, require_held
 from linkwise.analysis.settings import Reading
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
-from linkwise.package.load import Array
 
 
 class ArrayFile(Protocol):

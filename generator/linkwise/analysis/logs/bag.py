@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from linkwise.analysis.logs.checks import named_once, read_as
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed, short
 from linkwise.extras import extra
 from linkwise.input_file import require_file
-from linkwise.package.load import Array
 
 STAMPED, RECORDED = "stamped", "recorded"
 """Quantities of the columns of time: the message's own stamp, and the recorder's time."""

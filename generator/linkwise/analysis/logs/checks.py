@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import one_line, short
-from linkwise.package.load import Array
 
 LONGEST_REASON = 200
 """Most characters shown of a library's message."""

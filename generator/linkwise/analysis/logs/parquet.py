@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from linkwise.analysis.logs.checks import require_held
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import one_line
 from linkwise.extras import extra
-from linkwise.package.load import Array
 
 LONGEST_REASON = 200
 """Most characters shown of pyarrow's message."""

@@ -14,9 +14,9 @@ from typing import TextIO
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import short
-from linkwise.package.load import Array
 
 LONGEST = 1 << 24
 """Most characters of a line, enough for a million columns, and about as many as are in memory at once."""

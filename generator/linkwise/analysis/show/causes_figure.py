@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from linkwise.analysis.joint_causes import Cause, causes_of, curves
 from linkwise.analysis.loads.placed import moving_joints
@@ -25,9 +24,9 @@ from linkwise.analysis.show.drawn_curves import (
     write_title,
     zero_line,
 )
+from linkwise.arrays import Array, Mask
 from linkwise.errors import LinkwiseError
 from linkwise.escape import printable
-from linkwise.package.load import Array
 from linkwise.plotstyle import BLUE, INK, colour, drawn
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ class ShownPhase:
     placed: PlacedPhase | None = None
     is_rest: bool = False
 
-    def on(self, result: AnalysisResult) -> NDArray[np.bool_]:
+    def on(self, result: AnalysisResult) -> Mask:
         """Return which samples (S,) of a result, or a part of one, are in it."""
         if self.placed is None:
             return np.ones(len(result.time), dtype=np.bool_)

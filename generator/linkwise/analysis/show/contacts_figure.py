@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_rows import Indices
 from linkwise.analysis.show.drawn_curves import (
     drawn_curves,
     foot,
@@ -18,7 +17,7 @@ from linkwise.analysis.show.drawn_curves import (
     write_title,
     zero_line,
 )
-from linkwise.package.load import Array
+from linkwise.arrays import Array, Index
 from linkwise.plotstyle import GRAVITY, INK, drawn, tone
 
 if TYPE_CHECKING:
@@ -182,7 +181,7 @@ def _draw_torque(panel: Any, result: AnalysisResult, contact: int, i: int) -> No
     panel.set_title(f"torque of {name} ({unit})", fontsize=9)
 
 
-def _draw_rows(panel: Any, result: AnalysisResult, rows: Indices, **look: Any) -> None:
+def _draw_rows(panel: Any, result: AnalysisResult, rows: Index, **look: Any) -> None:
     if len(rows):
         found = drawn_curves(result, lambda part: part.values[rows])
         panel.plot(found.time[0], found.values[0], **look)

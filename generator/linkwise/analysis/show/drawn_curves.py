@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
+from linkwise.arrays import Array
 from linkwise.extras import extra
-from linkwise.package.load import Array
 from linkwise.plotstyle import drawn
 
 if TYPE_CHECKING:

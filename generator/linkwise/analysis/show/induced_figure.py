@@ -12,7 +12,7 @@ import numpy as np
 from linkwise.analysis.induced_points import CENTRE, JOINTS
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import INDUCED, LOSSES
-from linkwise.analysis.result_rows import Indices, ResultRows
+from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.show.drawn_curves import (
     PIECES,
     DrawnCurves,
@@ -25,8 +25,8 @@ from linkwise.analysis.show.drawn_curves import (
     write_title,
     zero_line,
 )
+from linkwise.arrays import Array, Index
 from linkwise.escape import column_part
-from linkwise.package.load import Array
 from linkwise.plotstyle import BROWN, GRAVITY, INK, colour, dash, drawn
 
 if TYPE_CHECKING:
@@ -48,8 +48,8 @@ class ShareSource:
     label: str
     number: int
     """Index of a joint among those that have torques, or of a load among loads; else 0."""
-    rows: tuple[Indices, ...]
-    """Rows of the result that the share sums up, for each component."""
+    rows: tuple[Index, ...]
+    """Index of the result that the share sums up, for each component."""
 
     def share(self, part: AnalysisResult) -> Array:
         """Return the share in each component, (components, S)."""

@@ -23,9 +23,9 @@ from linkwise.analysis.show.page_curves import (
     point_data,
     stride_for,
 )
+from linkwise.arrays import Array
 from linkwise.escape import printable, script_data
 from linkwise.oracle.newton_euler import displacement
-from linkwise.package.load import Array
 from linkwise.package.manifest import BodyEntry
 from linkwise.plotstyle import COLOURS, GRAVITY, ON_DARK
 from linkwise.render import render

@@ -10,8 +10,8 @@ from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import MOTION, PASSIVE, QUANTITIES
 from linkwise.analysis.show.drawn_curves import DrawnCurves, drawn_curves, piece_size
 from linkwise.analysis.show.induced_figure import numbers_of_curves
+from linkwise.arrays import Array
 from linkwise.extras import extra
-from linkwise.package.load import Array
 
 
 def plotly_parts() -> dict[str, str]:

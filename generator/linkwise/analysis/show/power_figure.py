@@ -15,7 +15,7 @@ from linkwise.analysis.show.drawn_curves import (
     write_title,
     zero_line,
 )
-from linkwise.package.load import Array
+from linkwise.arrays import Array
 from linkwise.plotstyle import INK, colour, dash, drawn, tone
 
 if TYPE_CHECKING:

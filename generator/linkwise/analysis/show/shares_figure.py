@@ -9,7 +9,7 @@ import numpy as np
 from linkwise.analysis.joint_causes import Cause, are_motions_whole, causes_of, sizes
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.drawn_curves import new_figure, write_title
-from linkwise.package.load import Array
+from linkwise.arrays import Array
 from linkwise.plotstyle import BLUE, GRAVITY, SKY, VERMILION, drawn, tone
 
 if TYPE_CHECKING:
