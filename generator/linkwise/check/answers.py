@@ -1,4 +1,4 @@
-"""Answers of a package that can be had here, in turn: its back ends and its C, for values of its parameters."""
+"""Answers that a package can give here, in turn: its back ends, its C, for values of its parameters."""
 
 import os
 from collections.abc import Callable, Iterator, Sequence
