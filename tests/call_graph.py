@@ -1,18 +1,19 @@
 """Stack that functions take together with those that they call, from what gcc says of each."""
 
 import re
-import subprocess
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+
+from kept import run_kept
 
 
 def deepest(command: Sequence[str], source: Path) -> dict[str, int]:
     """Bytes of each function of a C file that others may call; what is in other files counts as nothing."""
     with tempfile.TemporaryDirectory() as folder:
-        made = f"{folder}/robot.o"
-        subprocess.run([*command, "-fcallgraph-info=su", "-c", str(source), "-o", made], check=True)
-        text = next(Path(folder).glob("*.ci")).read_text(encoding="utf-8")
+        made = Path(folder) / "robot.o"
+        run_kept([*command, "-fcallgraph-info=su", "-c", source], made)
+        text = made.with_suffix(".ci").read_text(encoding="utf-8")
     nodes = re.findall(r'node: { title: "([^"]*)" label: "[^"]*?\\n(\d+) bytes \(([a-z,]+)\)', text)
     assert {kind for _, _, kind in nodes} <= {"static", "dynamic,bounded"}, (
         "no function's stack hangs on what it is given"

@@ -1,27 +1,22 @@
 """The emitted C, compiled strictly and called through the functions of its header."""
 
 import ctypes
-import hashlib
 import json
 import math
-import os
 import re
-import shutil
-import subprocess
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from kept import run_kept
 
 WARNED = ("-Wall", "-Wextra", "-Werror", "-pedantic", "-fPIC")
 STRICT = (*WARNED, "-O1")
 PARTS = ("SINES", "ONE_SAMPLE", "BLOCKS", "POSITION_GRADIENT", "CONTROL")
 """Parts of the C that may be compiled apart."""
-CACHE = Path(os.environ.get("LINKWISE_TEST_CACHE") or tempfile.mkdtemp()) / "compiled"
-"""What compilers made, by what of; `make test` keeps it between runs."""
 FIELDS = {"c2": "acceleration", "c1": "velocity", "g": "gravity", "tau": "torque", "h1": "linear"}
 """What the Python API calls the arrays of the header."""
 
@@ -35,15 +30,13 @@ def compile_library(
     directory: Path, target: Path, compiler: Sequence[str] = ("gcc", "-std=c99"), level: str = "-O0"
 ) -> None:
     """Compile the package's double and float to a shared library; any warning fails."""
-    flags = [*compiler, *WARNED, level, "-shared"]
-    made_of(directory, flags, lambda out: [*flags, "-o", str(out), *sources(directory), "-lm"], target)
+    run_kept([*compiler, *WARNED, level, "-shared", *sources(directory), "-lm"], target)
 
 
 def check_syntax(directory: Path, compiler: Sequence[str]) -> None:
     """Read the package's double and float; a warning that needs no optimisation fails: clang has no other."""
-    flags = [*compiler, *WARNED, "-fsyntax-only"]
     for source in sources(directory):
-        made_of(directory, [*flags, Path(source).name], lambda _, source=source: [*flags, source])
+        run_kept([*compiler, *WARNED, "-fsyntax-only", source])
 
 
 def link_parts(directory: Path, compiler: Sequence[str], folder: Path) -> None:
@@ -51,61 +44,14 @@ def link_parts(directory: Path, compiler: Sequence[str], folder: Path) -> None:
     objects = [folder / f"{part}.o" for part in PARTS]
     source = sources(directory)[0]
     for part, made in zip(PARTS, objects, strict=True):
-        flags = [*compiler, *WARNED, "-O0", f"-DLINKWISE_PART={part}", "-c"]
-        made_of(directory, flags, lambda out, flags=flags: [*flags, source, "-o", str(out)], made)
-    _run(
-        [
-            compiler[0],
-            "-shared",
-            "-Wl,--no-undefined",
-            *map(str, objects),
-            "-lm",
-            "-o",
-            str(folder / "all.so"),
-        ]
-    )
-
-
-def made_of(
-    directory: Path,
-    flags: Sequence[str],
-    command: Callable[[Path], Sequence[str]],
-    target: Path | None = None,
-) -> None:
-    """Compile a package, unless the same compiler made the same of the same texts before.
-
-    A success that is kept is the same success: what is compiled is told by the texts of all its files.
-    """
-    digest = hashlib.sha256("\0".join([version_of(flags[0]), *flags]).encode())
-    for path in sorted((directory / "c").rglob("*.[ch]")):
-        digest.update(f"{path.relative_to(directory)}\0".encode() + path.read_bytes())
-    kept = CACHE / digest.hexdigest()[:32]
-    if not kept.is_file():
-        CACHE.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=CACHE) as folder:
-            made = Path(folder) / "made"
-            _run(command(made))
-            made.touch()
-            made.replace(kept)
-    if target is not None:
-        shutil.copy(kept, target)
-
-
-@cache
-def version_of(compiler: str) -> str:
-    """What a compiler says of itself."""
-    return subprocess.run([compiler, "--version"], capture_output=True, text=True, check=True).stdout
+        run_kept([*compiler, *WARNED, "-O0", f"-DLINKWISE_PART={part}", "-c", source], made)
+    run_kept([compiler[0], "-shared", "-Wl,--no-undefined", *objects, "-lm"], folder / "all.so")
 
 
 def sources(directory: Path) -> list[str]:
     """Files of a package that are compiled, in double and in float."""
     name = name_of(directory)
     return [str(directory / "c" / file) for file in (f"{name}.c", f"{name}f.c")]
-
-
-def _run(command: Sequence[str]) -> None:
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
 
 
 @cache

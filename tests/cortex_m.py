@@ -19,6 +19,7 @@ import numpy as np
 from answers import random_states
 from compiled import name_of
 from conftest import LOCKED_FINGERS, PANDA
+from kept import run_kept
 from linkwise import Options, generate, read_system, write_package
 from needed import missing
 
@@ -144,9 +145,8 @@ def run(
             "-lm",
             "--specs=nosys.specs",
         )
-        sources = map(str, (main, HERE / "board.c", source))
-        command = [*COMPILER, *board.processor, *flags, *including, *sources, *linking, "-o", str(made)]
-        subprocess.run(command, check=True, capture_output=True, text=True)
+        sources = (main, HERE / "board.c", source)
+        run_kept([*COMPILER, *board.processor, *flags, *including, *sources, *linking], made)
         emulator = [
             "qemu-system-arm",
             "-M",
@@ -174,9 +174,9 @@ def flash(directory: Path, real: str, board: Board, flags: Any = SMALL) -> int:
     """Bytes of code and constants of all functions of one number type, the math library apart."""
     name = name_of(directory)
     with tempfile.TemporaryDirectory() as folder:
-        made = str(Path(folder) / "robot.o")
-        source = str(directory / "c" / f"{name}{'f' if real == 'float' else ''}.c")
-        subprocess.run([*COMPILER, *board.processor, *flags, "-c", source, "-o", made], check=True)
+        made = Path(folder) / "robot.o"
+        source = directory / "c" / f"{name}{'f' if real == 'float' else ''}.c"
+        run_kept([*COMPILER, *board.processor, *flags, "-c", source], made)
         sizes = subprocess.run(["arm-none-eabi-size", "-A", made], check=True, capture_output=True, text=True)
     return sum(int(size) for size in re.findall(r"^\.(?:text|rodata)\S* +(\d+)", sizes.stdout, re.M))
 

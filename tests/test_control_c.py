@@ -14,6 +14,7 @@ import pytest
 from answers import random_states, relative_error
 from compiled import WARNED, compile_library, name_of
 from conftest import DATA, needs_compiler
+from kept import run_kept
 from linkwise import Options, generate, read_system, write_package
 from linkwise.check.compiled_c import declarations
 from linkwise.package.load import import_package
@@ -85,9 +86,8 @@ int main(void)
 """,
         encoding="utf-8",
     )
-    made, source = str(tmp_path / "main"), str(directory / "c" / f"{name}.c")
-    including = f"-I{directory / 'c'}"
-    subprocess.run([command, *flags, *WARNED, including, str(program), source, "-lm", "-o", made], check=True)
+    made, source = tmp_path / "main", directory / "c" / f"{name}.c"
+    run_kept([command, *flags, *WARNED, f"-I{directory / 'c'}", program, source, "-lm"], made)
     printed = subprocess.run([made], check=True, capture_output=True, text=True).stdout
     expected = (
         model.kinematics.pose(q, frame),

@@ -7,6 +7,7 @@ from pathlib import Path
 import pages
 from compiled import STRICT
 from conftest import needs_compiler
+from kept import run_kept
 
 ROOT = Path(__file__).parents[1]
 
@@ -35,9 +36,8 @@ int main(void)
 """,
         encoding="utf-8",
     )
-    c, made = ROOT / "generated/planar3/c", str(tmp_path / "main")
-    compiled = ["gcc", "-std=c99", *STRICT, f"-I{c}", str(program), str(c / "planar3.c"), "-lm", "-o", made]
-    subprocess.run(compiled, check=True)
+    c, made = ROOT / "generated/planar3/c", tmp_path / "main"
+    run_kept(["gcc", "-std=c99", *STRICT, f"-I{c}", program, c / "planar3.c", "-lm"], made)
     printed = subprocess.run([made], check=True, capture_output=True, text=True).stdout
     example = blocks("control.md", "python")[0] + "\nprint(*tau)"
     expected = subprocess.run(

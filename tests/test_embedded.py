@@ -18,6 +18,7 @@ from call_graph import deepest
 from compiled import Compiled, compile_library, name_of
 from conftest import DATA, PANDA, needs_compiler
 from impedance_in_c import formula
+from kept import run_kept
 from linkwise import generate, read_system
 from linkwise.package.manifest import Manifest
 from needed import missing, needs
@@ -54,10 +55,7 @@ def sources(directory: Path) -> list[Path]:
 
 def needed(command: list[str], source: Path, made: Path) -> set[str]:
     """Compile, and return what the object asks of others."""
-    done = subprocess.run(
-        [*command, "-c", str(source), "-o", str(made)], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr[:2000]
+    run_kept([*command, "-c", source], made)
     nm = subprocess.run(["nm", "-u", str(made)], check=True, capture_output=True, text=True).stdout
     return {line.split()[-1] for line in nm.splitlines()}
 
@@ -277,12 +275,10 @@ ANALYSERS = {
 def test_analysers_find_nothing(kind: str, tool: str, directory_of: Callable[[str], Path]) -> None:
     if lacking := missing(tool):
         pytest.skip(lacking)
-    source = str(sources(directory_of(KINDS[kind]))[0])
+    source = sources(directory_of(KINDS[kind]))[0]
     for defined in ((), ("-DLINKWISE_FLOAT",)):
         tail = ("--", "-std=c99", SMALL, *defined) if tool == "clang-tidy" else defined
-        command = [*ANALYSERS[tool], source, *tail]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stdout + done.stderr
+        run_kept([*ANALYSERS[tool], source, *tail])
 
 
 def test_the_example_of_the_docs_runs(package_of: Callable[[str], ModuleType], tmp_path: Path) -> None:

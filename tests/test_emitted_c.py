@@ -16,6 +16,7 @@ import pytest
 from answers import random_states, relative_error
 from compiled import Compiled, check_syntax, compile_library, library_of, link_parts, name_of
 from conftest import DATA, PANDA, needs_compiler
+from kept import run_kept
 from linkwise import Coordinate, LinkEnergy, Options, energy_system, generate, read_system, write_package
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import import_package
@@ -454,23 +455,14 @@ def test_no_call_leaves_its_arrays_and_many_samples_are_one_by_one(
     # What the others would say of pointers, the address sanitizer says at a third of the time to compile.
     told = ("-fsanitize=address,undefined", "-fno-sanitize=null,object-size,pointer-overflow")
     guard = ("gcc", "-O1", "-g", *told, "-fno-sanitize-recover=all", "-D_GNU_SOURCE")
-    makes = [
-        [
-            *guard,
-            "-std=c99",
-            *kind,
-            *counting(tmp_path, 64),
-            "-c",
-            str(folder / f"planar4{suffix}.c"),
-            "-o",
-            "arm.o",
-        ],
-        [*guard, "-std=c99", *defined, f"-I{folder}", "main.c", "arm.o", "-lm", "-o", "main"],
-        ["./main"],
-    ]
-    for command in makes:
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
+    arm, main = tmp_path / "arm.o", tmp_path / "main"
+    run_kept(
+        [*guard, "-std=c99", *kind, *counting(tmp_path, 64), "-c", folder / f"planar4{suffix}.c"],
+        arm,
+    )
+    run_kept([*guard, "-std=c99", *defined, f"-I{folder}", tmp_path / "main.c", arm, "-lm"], main)
+    done = subprocess.run([main], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_it_takes_run_time_parameters(

@@ -7,7 +7,6 @@ import gzip
 import html.parser
 import json
 import re
-import subprocess
 import tokenize
 import unicodedata
 import warnings
@@ -18,6 +17,7 @@ from pathlib import Path
 import pytest
 from compiled import STRICT
 from conftest import needs_compiler
+from kept import run_kept
 from linkwise import Options, generate, read_system, write_package
 from linkwise import escape as to
 from linkwise.analysis import analyze
@@ -130,10 +130,7 @@ def test_c_comments_hold_every_name_as_c_and_as_cpp(tmp_path: Path) -> None:
     assert all(line.isascii() and "??" not in line for line in lines)
     (tmp_path / "a.c").write_text("\n".join([*lines, "int nothing(void);"]) + "\n")
     for compiler in (["gcc", "-std=c99", "-Wcomment", "-Wtrigraphs"], ["g++", "-x", "c++", "-std=c++17"]):
-        done = subprocess.run(
-            [*compiler, *STRICT, "-fsyntax-only", str(tmp_path / "a.c")], capture_output=True, text=True
-        )
-        assert done.returncode == 0, done.stderr
+        run_kept([*compiler, *STRICT, "-fsyntax-only", tmp_path / "a.c"])
 
 
 def test_identifiers_are_told_apart_and_fit_every_compiler() -> None:
@@ -252,9 +249,7 @@ def test_c_files_compile_without_a_warning(
     packages: dict[str, Path], compiler: tuple[str, ...], every: int
 ) -> None:
     for package in list(packages.values())[::every]:
-        command = [*compiler, *STRICT, "-fsyntax-only", str(package / "c" / "evil.c")]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
+        run_kept([*compiler, *STRICT, "-fsyntax-only", package / "c" / "evil.c"])
 
 
 LATEX = re.compile(r"\\(?:\[|\]|left\(|right\)|[A-Za-z]+|_)|[-+=0-9A-Za-z{}_^() .]")

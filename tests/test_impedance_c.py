@@ -11,6 +11,7 @@ import pytest
 from compiled import WARNED, name_of
 from conftest import DATA, PANDA, needs_compiler
 from impedance_in_c import ImpedanceInC, formula, frame_formula
+from kept import run_kept
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
 from test_emitted_c import strict
@@ -320,9 +321,8 @@ def test_a_turn_that_is_rounding_alone_is_no_turn(tmp_path: Path) -> None:
     "robot", ["torso", f"{CRANE} loops", TURNTABLE], ids=["straight", "loops", "energies"]
 )
 def test_nothing_is_allocated(robot: str, directory_of: Callable[[str], Path], tmp_path: Path) -> None:
-    name, made = name_of(directory_of(robot)), str(tmp_path / "made.o")
-    source = str(directory_of(robot) / "c" / f"{name}.c")
-    subprocess.run(["gcc", "-std=c99", *WARNED, "-c", source, "-o", made], check=True)
+    name, made = name_of(directory_of(robot)), tmp_path / "made.o"
+    run_kept(["gcc", "-std=c99", *WARNED, "-c", directory_of(robot) / "c" / f"{name}.c"], made)
     lines = subprocess.run(["nm", made], check=True, capture_output=True, text=True).stdout.splitlines()
     defined = {line.split()[-1] for line in lines if " T " in line}
     taken = {line.split()[-1] for line in lines if " U " in line}
@@ -335,11 +335,10 @@ def test_nothing_is_allocated(robot: str, directory_of: Callable[[str], Path], t
 @pytest.mark.ship
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_the_control_loop_of_the_docs_runs_without_a_system_call(compiler: str, tmp_path: Path) -> None:
-    source, made = DOCS / "control_loop.c", str(tmp_path / "control_loop")
+    source, made = DOCS / "control_loop.c", tmp_path / "control_loop"
     command, *flags = strict(compiler)
     robot = GENERATED / "puma560/c"
-    sources = [str(source), str(robot / "puma560.c")]
-    subprocess.run([command, *flags, *WARNED, "-O2", f"-I{robot}", *sources, "-lm", "-o", made], check=True)
+    run_kept([command, *flags, *WARNED, "-O2", f"-I{robot}", source, robot / "puma560.c", "-lm"], made)
     if compiler != "gcc":
         return
     said = subprocess.run([made], check=True, capture_output=True, text=True).stdout.splitlines()

@@ -15,6 +15,7 @@ import pytest
 from answers import random_states, relative_error
 from compiled import Compiled, check_syntax, compile_library, library_of, link_parts, name_of
 from conftest import DATA, needs_compiler
+from kept import run_kept
 from linkwise import LinkwiseError, Options, generate, read_system, write_package
 from linkwise.check import check_package
 from linkwise.cli.app import app
@@ -175,11 +176,8 @@ def test_large_blocks_go_past_the_cache_where_lines_are_whole(
 @needs_compiler
 def test_its_code_does_not_grow_with_the_robot(directory_of: Callable[[str], Path], tmp_path: Path) -> None:
     def instructions(robot: str) -> int:
-        directory, made = directory_of(f"{robot} loops"), str(tmp_path / "robot.o")
-        source = str(directory / "c" / f"{robot}.c")
-        subprocess.run(
-            ["gcc", "-std=c99", "-O2", "-DLINKWISE_PART=BLOCKS", "-c", source, "-o", made], check=True
-        )
+        source, made = directory_of(f"{robot} loops") / "c" / f"{robot}.c", tmp_path / "robot.o"
+        run_kept(["gcc", "-std=c99", "-O2", "-DLINKWISE_PART=BLOCKS", "-c", source], made)
         sizes = subprocess.run(["size", "-A", made], check=True, capture_output=True, text=True).stdout
         return int(re.findall(r"^\.text\S* +(\d+)", sizes, re.M)[0])
 
@@ -195,9 +193,7 @@ def test_the_header_counts_its_operations(
     name = name_of(directory)
     defined = f'-DSOURCE="{directory / "c" / name}.c"'
     made = tmp_path / "count"
-    subprocess.run(
-        ["g++", "-std=c++17", "-w", defined, DATA / "count_operations.cpp", "-o", made], check=True
-    )
+    run_kept(["g++", "-std=c++17", "-w", defined, DATA / "count_operations.cpp"], made)
     counted = subprocess.run([made], check=True, capture_output=True, text=True).stdout.split()
     header = (directory / "c" / f"{name}.h").read_text(encoding="utf-8")
     told = [re.search(rf"{what}: (\d+) operations", header) for what in ("but c0", "Torques alone")]
@@ -295,9 +291,8 @@ def test_the_header_says_how_much_stack_it_takes(robot: str, kernel: str, tmp_pa
     write_package(generate(read_system(robot), ["c"], kernel=kernel), tmp_path / robot)
     header = (tmp_path / robot / "c" / f"{robot}.h").read_text(encoding="utf-8")
     told = int(re.findall(r"of which none takes\s+more than ([\d,]+) bytes", header)[0].replace(",", ""))
-    source = str(tmp_path / robot / "c" / f"{robot}.c")
-    command = ["gcc", "-std=c99", "-O2", "-fstack-usage", "-c", source, "-o", str(tmp_path / "robot.o")]
-    subprocess.run(command, check=True)
+    command = ["gcc", "-std=c99", "-O2", "-fstack-usage", "-c", tmp_path / robot / "c" / f"{robot}.c"]
+    run_kept(command, tmp_path / "robot.o")
     lines = (tmp_path / "robot.su").read_text(encoding="utf-8").splitlines()
     most = max(int(line.split("\t")[1]) for line in lines)
     assert 0.85 * told < most < told

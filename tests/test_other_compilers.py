@@ -16,6 +16,7 @@ import pytest
 from answers import random_states, relative_error
 from compiled import name_of
 from conftest import needs_compiler
+from kept import run_kept
 from linkwise_runtime.native.build import PARTS
 from linkwise_runtime.native.compiler import FLAGS, MinGW
 from needed import needs
@@ -86,7 +87,7 @@ class Robot:
     def dtype(self) -> type:
         return np.float64 if self.real == "double" else np.float32
 
-    def main(self) -> list[str]:
+    def main(self) -> list[str | Path]:
         """Return what compiles answers.c for this robot."""
         constants = {key: f"{self.name.upper()}_{key}" for key in ("JOINTS", "LINKS", "C2", "C1", "G")}
         call = f"{self.name}_##name{'##f' if self.real == 'float' else ''}"
@@ -95,10 +96,12 @@ class Robot:
             *(f"-D{k}={v}" for k, v in (constants | given).items()),
             f"-I{self.source.parent}",
             "-c",
-            str(PROGRAM),
-            "-o",
-            "main.o",
+            PROGRAM,
         ]
+
+    def compile(self, *command: str | Path, to: str | None = None) -> None:
+        """Run a compiler, with `-o` of a file in the folder; fail where it does."""
+        run_kept(command, None if to is None else self.folder / to, self.folder)
 
     def command(self, *command: str) -> str:
         """Return what a command prints; fail where it does."""
@@ -171,9 +174,9 @@ def test_a_program_for_windows_says_what_numpy_says_in_float(
     name: str, robot_of: Make, wine: dict[str, object]
 ) -> None:
     robot = robot_of(name, "float", **wine)
-    robot.command(MINGW, *STRICT, "-c", str(robot.source), "-o", "robot.o")
-    robot.command(MINGW, *STRICT, *robot.main())
-    robot.command(MINGW, "-static", "main.o", "robot.o", "-o", "main.exe")
+    robot.compile(MINGW, *STRICT, "-c", robot.source, to="robot.o")
+    robot.compile(MINGW, *STRICT, *robot.main(), to="main.o")
+    robot.compile(MINGW, "-static", "main.o", "robot.o", to="main.exe")
     robot.says_what_numpy_says("main.exe")
 
 
@@ -185,12 +188,14 @@ def test_the_library_that_native_would_make_on_windows_says_what_numpy_says(
     robot, compiler = robot_of(name, **wine), MinGW((MINGW,))
     parts = sorted({part for library in PARTS.values() for part in library})
     for part in parts:
-        robot.command(*compiler.compiling(robot.source, part, f"{part}.o"), "-Werror")
-    robot.command(*compiler.linking([f"{part}.o" for part in parts], "native.dll"))
+        *compiling, _, made = compiler.compiling(robot.source, part, f"{part}.o")
+        robot.compile(*compiling, "-Werror", to=made)
+    *linking, _, made = compiler.linking([f"{part}.o" for part in parts], "native.dll")
+    robot.compile(*linking, to=made)
     needed = set(re.findall(r"DLL Name: (\S+)", robot.command(OBJDUMP, "-p", "native.dll")))
     assert needed <= {"KERNEL32.dll", "msvcrt.dll"}  # Python looks for no others beside it
-    robot.command(MINGW, *STRICT, *robot.main())
-    robot.command(MINGW, "main.o", "native.dll", "-static", "-o", "main.exe")
+    robot.compile(MINGW, *STRICT, *robot.main(), to="main.o")
+    robot.compile(MINGW, "main.o", "native.dll", "-static", to="main.exe")
     robot.says_what_numpy_says("main.exe")
 
 
@@ -209,7 +214,7 @@ target_link_libraries(main PRIVATE planar3)
 def test_cmake_makes_a_library_and_a_program_for_windows(robot_of: Make, wine: dict[str, object]) -> None:
     robot = robot_of("planar3", **wine)
     shutil.copy(PROGRAM, robot.folder)
-    defined = " ".join(f"[==[{word}]==]" for word in robot.main() if word.startswith("-D"))
+    defined = " ".join(f"[==[{word}]==]" for word in robot.main() if str(word).startswith("-D"))
     (robot.folder / "CMakeLists.txt").write_text(LISTS.format(defined=defined), encoding="utf-8")
     toolchain = ("-DCMAKE_SYSTEM_NAME=Windows", f"-DCMAKE_C_COMPILER={MINGW}")
     linkwise = (f"-Dlinkwise_DIR={CMAKE}", f"-DLINKWISE_EXECUTABLE={LINKWISE}")
@@ -236,20 +241,10 @@ def test_without_any_extension_it_says_what_numpy_says(
 ) -> None:
     """gcc, whose headers stay away, denies being gcc: what is left to the other compilers is compiled."""
     robot = robot_of(name, real)
-    robot.command(
-        "gcc",
-        *STRICT,
-        "-U__GNUC__",
-        "-fno-asm",
-        "-nostdinc",
-        f"-I{plain}",
-        "-c",
-        str(robot.source),
-        "-o",
-        "robot.o",
-    )
-    robot.command("gcc", *STRICT, *robot.main())
-    robot.command("gcc", "main.o", "robot.o", "-lm", "-o", "main")
+    denied = ("-U__GNUC__", "-fno-asm", "-nostdinc", f"-I{plain}")
+    robot.compile("gcc", *STRICT, *denied, "-c", robot.source, to="robot.o")
+    robot.compile("gcc", *STRICT, *robot.main(), to="main.o")
+    robot.compile("gcc", "main.o", "robot.o", "-lm", to="main")
     robot.says_what_numpy_says("main")
 
 
@@ -269,7 +264,7 @@ def test_it_compiles_for_microsofts_linker_without_a_warning(
     robot = robot_of(name, real)
     target = "--target=x86_64-pc-windows-msvc"
     *options, include = options
-    robot.command("clang", target, *options, f"{include}{plain}", str(robot.source))
+    robot.compile("clang", target, *options, f"{include}{plain}", robot.source)
 
 
 def test_flags_of_windows_have_nothing_of_one_processor() -> None:

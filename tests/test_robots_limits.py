@@ -10,6 +10,7 @@ import urdf_text
 from command_line import run_linkwise
 from compiled import STRICT
 from conftest import needs_compiler
+from kept import run_kept
 from linkwise import LinkwiseError, generate, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
@@ -125,8 +126,8 @@ def test_the_header_has_names_and_limits(compiler: tuple[str, ...], arm: Path, t
         '#include "arm.h"\nint unused(void);\nint unused(void) { return ARM_JOINTS; }\n'
     )
     command = [*compiler, *STRICT, f"-I{tmp_path / 'arm/c'}"]
-    subprocess.run([*command, "-c", tmp_path / "unused.c", "-o", tmp_path / "unused.o"], check=True)
-    subprocess.run([*command, tmp_path / "main.c", "-o", tmp_path / "main"], check=True)
+    run_kept([*command, "-c", tmp_path / "unused.c"], tmp_path / "unused.o")
+    run_kept([*command, tmp_path / "main.c"], tmp_path / "main")
     said = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout
     assert said == 'shoulder "left"? -1.5 0.25 inf 40'
 

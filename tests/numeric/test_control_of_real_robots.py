@@ -1,7 +1,6 @@
 """C functions of one sample against Pinocchio: frames, mass matrix, forward dynamics, partial impedance."""
 
 import ctypes
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import pytest
 from compiled import STRICT
 from conftest import needs_compiler
 from impedance_in_c import frame_struct, joint_struct, left_jacobian, pointer_to, rotation_vector
+from kept import run_kept
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.manifest import Manifest
 from linkwise_runtime.structure import passive_sums
@@ -25,14 +25,12 @@ pytestmark = needs_compiler
 
 def functions(package: Path) -> ctypes.CDLL:
     """Return the library of the part that has functions for control, and of the sines."""
-    made = str(package / "control.so")
-    source, objects = str(package / "c" / "robot.c"), []
-    for part in ("CONTROL", "SINES"):
-        objects.append(str(package / f"{part}.o"))
-        command = ["gcc", "-std=c99", *STRICT, f"-DLINKWISE_PART={part}", "-c", source, "-o", objects[-1]]
-        subprocess.run(command, check=True)
-    subprocess.run(["gcc", "-shared", *objects, "-lm", "-o", made], check=True)
-    return ctypes.CDLL(made)
+    objects = [package / f"{part}.o" for part in ("CONTROL", "SINES")]
+    for made in objects:
+        command = ["gcc", "-std=c99", *STRICT, f"-DLINKWISE_PART={made.stem}", "-c"]
+        run_kept([*command, package / "c" / "robot.c"], made)
+    run_kept(["gcc", "-shared", *objects, "-lm"], package / "control.so")
+    return ctypes.CDLL(str(package / "control.so"))
 
 
 @pytest.mark.parametrize("robot", OPTIONS)

@@ -1,0 +1,69 @@
+"""What compilers made and analysers let pass, by what of: a success that is kept is the same success."""
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+CACHE = Path(os.environ.get("LINKWISE_TEST_CACHE") or tempfile.mkdtemp()) / "compiled"
+"""`make test` keeps it between runs."""
+
+
+def run_kept(command: Sequence[str | Path], target: Path | None = None, folder: Path | None = None) -> None:
+    """Run a compiler or an analyser in a folder, unless the same one was given the same texts before.
+
+    It has `-o target`, where a target is given, and all that it writes beside it is kept and is there again.
+    Raise AssertionError with what it says where it fails; nothing is kept then.
+    """
+    words = [str(word) for word in command]
+    ending = "" if target is None else target.suffix
+    digest = hashlib.sha256(f"{version_of(words[0])}\0{ending}\0{target is None}".encode())
+    for part in _told(words, folder or Path.cwd()):
+        digest.update(len(part).to_bytes(8) + part)
+    kept = CACHE / digest.hexdigest()[:32]
+    if not kept.is_dir():
+        CACHE.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=CACHE) as place:
+            made = Path(place) / "made"
+            made.mkdir()
+            out = [] if target is None else ["-o", str(made / target.name)]
+            done = subprocess.run([*words, *out], cwd=folder, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, (words, done.stderr, done.stdout)
+            with suppress(OSError):  # another process was first
+                made.rename(kept)
+    if target is not None:
+        for path in kept.iterdir():
+            shutil.copy(path, target.with_name(f"{target.stem}{path.suffix}"))
+
+
+def _told(words: Sequence[str], folder: Path) -> Iterator[bytes]:
+    """Yield the words, and of files and folders among them or in them, in place of where they are, the texts.
+
+    A file may include all C files and headers in its folder and below, and in a folder that is named.
+    """
+    for word in words:
+        named = re.search(r'/[^"]*', word)
+        path = Path(named[0]) if named else folder / word
+        if not path.exists():
+            yield word.encode()
+            continue
+        yield word.replace(str(path), path.name).encode()
+        if path.is_file():
+            yield path.read_bytes()
+        if path.is_dir() or path.suffix in (".c", ".cpp"):
+            below = path if path.is_dir() else path.parent
+            for text in sorted(below.rglob("*.[ch]")):
+                yield str(text.relative_to(below)).encode()
+                yield text.read_bytes()
+
+
+@cache
+def version_of(tool: str) -> str:
+    """Return what a compiler or an analyser says of itself."""
+    return subprocess.run([tool, "--version"], capture_output=True, text=True, check=True).stdout
