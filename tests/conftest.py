@@ -5,17 +5,24 @@ import os
 # Before NumPy and torch: two files run at a time, and threads that wait for a busy core cost torch ten times.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import ctypes
+import gc
 import shutil
+import sys
 import sysconfig
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+from kept import keeping
 from linkwise import Options, generate, read_system, write_package
+from linkwise.package.emitted_text import foreign_text
 from linkwise.package.load import import_package
+from linkwise_runtime.native.process import run_all
 from needed import missing, needs
 
 DATA = Path(__file__).parent / "data"
@@ -28,32 +35,39 @@ OPTIONS = {
     str(PANDA): Options(lock=LOCKED_FINGERS),
     "planar3 symbolic": Options("symbolic"),
 }
+SHARED: dict[str, Path] = {}
+"""Packages of the session, by robot."""
+LARGEST = 1024
+"""MB that a process of tests may hold when it is through with a file of tests."""
 needs_compiler = needs("gcc")
 
 
 @pytest.fixture(scope="session", autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Compiled packages go into a directory of the session, not the user's; mutants share one."""
+    """Compiled packages go into a directory of the session, not the user's; mutants share one.
+
+    What `linkwise check` compiles, and holds against the package, is kept there too.
+    """
     session = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         session = session.parent  # so that what one process compiled is there for the other
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LINKWISE_CACHE", os.environ.get("LINKWISE_TEST_CACHE") or str(session / "cache"))
+        patch.setattr("linkwise.check.compiled_c.run_all", keeping(run_all))
         yield
 
 
 @pytest.fixture(scope="session")
 def directory_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Directory of a robot's package; "planar3 symbolic" keeps parameters, "planar3 loops" is in loops."""
-    made: dict[str, Path] = {}
 
     def directory(robot: str) -> Path:
-        if robot not in made:
+        if robot not in SHARED:
             read, kernel = robot.removesuffix(" loops"), "loops" if robot.endswith(" loops") else "straight"
             system = read_system(read.removesuffix(" symbolic"), OPTIONS.get(read))
-            made[robot] = tmp_path_factory.mktemp("package") / system.name
-            write_package(generate(system, kernel=kernel), made[robot])
-        return made[robot]
+            SHARED[robot] = tmp_path_factory.mktemp("package") / system.name
+            write_package(generate(system, kernel=kernel), SHARED[robot])
+        return SHARED[robot]
 
     return directory
 
@@ -80,6 +94,49 @@ def driver() -> Iterator[Any]:
     driver = webdriver.Chrome(options, webdriver.ChromeService(service))
     yield driver
     driver.quit()
+
+
+def pytest_collection_finish() -> None:
+    """What is imported by now stays: no search for garbage looks at it again."""
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _forget() -> Iterator[None]:
+    """A file of tests leaves no memory with what it imported or compiled for itself."""
+    yield
+    forget_packages()
+    foreign_text.cache_clear()  # by texts of packages
+    if "torch._dynamo" in sys.modules:
+        sys.modules["torch._dynamo"].reset()
+    gc.collect()
+    if sys.platform == "linux":
+        with suppress(OSError, AttributeError):  # another C library than GNU's
+            ctypes.CDLL("libc.so.6").malloc_trim(0)
+        held = resident()
+        assert held <= LARGEST, f"this process of tests holds {held} MB of memory, and {LARGEST} are the most"
+
+
+def forget_packages() -> None:
+    """Forget imported packages, but those of the session."""
+    kept = {os.path.realpath(directory) for directory in SHARED.values()}
+    gone = {
+        name
+        for name, module in sys.modules.items()
+        if name.startswith("_linkwise_")
+        and "." not in name
+        and os.path.dirname(str(module.__file__)) not in kept
+    }
+    for name in [name for name in sys.modules if name.partition(".")[0] in gone]:
+        del sys.modules[name]
+    sys.meta_path[:] = [finder for finder in sys.meta_path if getattr(finder, "name", None) not in gone]
+
+
+def resident() -> int:
+    """MB of memory that this process holds, on Linux."""
+    [line] = (row for row in Path("/proc/self/status").read_text().splitlines() if row.startswith("VmRSS:"))
+    return int(line.split()[1]) // 1024
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

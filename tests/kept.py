@@ -6,10 +6,14 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+
+from linkwise_runtime.native.compiler import processor
+
+RunAll = Callable[[Sequence[Sequence[str]], Callable[[str], None]], None]
 
 CACHE = Path(os.environ.get("LINKWISE_TEST_CACHE") or tempfile.mkdtemp()) / "compiled"
 """`make test` keeps it between runs."""
@@ -22,24 +26,61 @@ def run_kept(command: Sequence[str | Path], target: Path | None = None, folder: 
     Raise AssertionError with what it says where it fails; nothing is kept then.
     """
     words = [str(word) for word in command]
-    ending = "" if target is None else target.suffix
-    digest = hashlib.sha256(f"{version_of(words[0])}\0{ending}\0{target is None}".encode())
-    for part in _told(words, folder or Path.cwd()):
-        digest.update(len(part).to_bytes(8) + part)
-    kept = CACHE / digest.hexdigest()[:32]
+    kept = _place(words, target, folder or Path.cwd())
     if not kept.is_dir():
-        CACHE.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=CACHE) as place:
-            made = Path(place) / "made"
-            made.mkdir()
+        with _made(kept) as made:
             out = [] if target is None else ["-o", str(made / target.name)]
             done = subprocess.run([*words, *out], cwd=folder, capture_output=True, text=True, check=False)
             assert done.returncode == 0, (words, done.stderr, done.stdout)
-            with suppress(OSError):  # another process was first
-                made.rename(kept)
     if target is not None:
-        for path in kept.iterdir():
-            shutil.copy(path, target.with_name(f"{target.stem}{path.suffix}"))
+        _restore(kept, target)
+
+
+def keeping(run_all: RunAll) -> RunAll:
+    """Return what runs those of the commands, each of which ends with `-o target`, that no run had before."""
+
+    def run(commands: Sequence[Sequence[str]], tell: Callable[[str], None]) -> None:
+        missing = []
+        for command in commands:
+            *words, _, target = command
+            kept = _place(words, Path(target), Path.cwd())
+            if kept.is_dir():
+                _restore(kept, Path(target))
+            else:
+                missing.append((command, kept))
+        run_all([command for command, _ in missing], tell)
+        for command, kept in missing:
+            with _made(kept) as made:
+                shutil.copy(command[-1], made)
+
+    return run
+
+
+def _place(words: Sequence[str], target: Path | None, folder: Path) -> Path:
+    """Return the folder for what a command makes, by its words and all texts that it may read."""
+    ending = "" if target is None else target.suffix
+    heads = (version_of(words[0]), processor(), ending, str(target is None))
+    digest = hashlib.sha256("\0".join(heads).encode())
+    for part in _told(words, folder):
+        digest.update(len(part).to_bytes(8) + part)
+    return CACHE / digest.hexdigest()[:32]
+
+
+@contextmanager
+def _made(kept: Path) -> Iterator[Path]:
+    """Yield a folder, which is kept whole if nothing fails."""
+    CACHE.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=CACHE) as place:
+        made = Path(place) / "made"
+        made.mkdir()
+        yield made
+        with suppress(OSError):  # another process was first
+            made.rename(kept)
+
+
+def _restore(kept: Path, target: Path) -> None:
+    for path in kept.iterdir():
+        shutil.copy(path, target.with_name(f"{target.stem}{path.suffix}"))
 
 
 def _told(words: Sequence[str], folder: Path) -> Iterator[bytes]:

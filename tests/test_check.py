@@ -41,7 +41,7 @@ from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.version import VERSION
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def planar2(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("check") / "planar2"
     write_package(generate(read_system("planar2"), ["numpy"]), directory)
@@ -51,7 +51,7 @@ def planar2(tmp_path_factory: pytest.TempPathFactory) -> Path:
 Copy = Callable[..., Path]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def passing(tmp_path_factory: pytest.TempPathFactory) -> Copy:
     """Packages of planar2 for some back ends, which pass; each is made once."""
 
@@ -659,7 +659,7 @@ def test_without_torch_a_users_energies_are_held_against_their_own_torques_which
     assert marks(package)["numpy: c1 against differences of numpy's torques"] == "FAIL"
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def of_parameters(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A package all of whose numbers are run-time parameters."""
     directory = tmp_path_factory.mktemp("parameters") / "odd"
@@ -672,7 +672,7 @@ def of_parameters(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def loaded_with_parameters(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a package with run-time parameters on three back ends."""
     directory = tmp_path_factory.mktemp("loaded") / "odd"

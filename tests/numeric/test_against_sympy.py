@@ -1,7 +1,6 @@
 """Planar arms, and links some of which have one energy alone, against SymPy's own LagrangesMethod."""
 
 from collections.abc import Callable
-from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -119,18 +118,28 @@ def by_lagranges_method(coordinates: list[Coordinate], link: LinkEnergy, states:
     return OfLink(*values[:3], *(value[..., 0] for value in values[3:]))
 
 
-@pytest.mark.parametrize("backend", ["numpy", "autograd", "autograd mapped"])
-@pytest.mark.parametrize("case", ONE_ENERGY_ALONE)
-def test_links_with_one_energy_alone_move_as_lagranges_method_says(
-    case: str, backend: str, tmp_path: Path
-) -> None:
-    coordinates, links = ONE_ENERGY_ALONE[case]
-    write_package(generate(energy_system("robot", coordinates, links), ["numpy", "autograd"]), tmp_path / "r")
-    robot = import_package(tmp_path / "r").load(backend.split()[0])
+@pytest.fixture(scope="module", params=ONE_ENERGY_ALONE)
+def case(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[ModuleType, Any, OfLink]:
+    """A package of one of these, states, and what is expected there."""
+    (coordinates, links), folder = ONE_ENERGY_ALONE[request.param], tmp_path_factory.mktemp("case") / "r"
+    write_package(generate(energy_system("robot", coordinates, links), ["numpy", "autograd"]), folder)
     states = random_states(len(coordinates), 7)
     of_links = [by_lagranges_method(coordinates, link, states) for link in links]
-    expected = OfLink(*(np.stack(part, 2) for part in zip(*of_links, strict=True)))
-    motion: Any = states
+    return (
+        import_package(folder),
+        states,
+        OfLink(*(np.stack(part, 2) for part in zip(*of_links, strict=True))),
+    )
+
+
+@pytest.mark.parametrize("backend", ["numpy", "autograd", "autograd mapped"])
+def test_links_with_one_energy_alone_move_as_lagranges_method_says(
+    case: tuple[ModuleType, Any, OfLink], backend: str
+) -> None:
+    package, states, expected = case
+    robot, motion = package.load(backend.split()[0]), states
     if backend != "numpy":
         torch = pytest.importorskip("torch")
         motion = [torch.from_numpy(state) for state in states]
