@@ -19,19 +19,24 @@ CACHE = Path(os.environ.get("LINKWISE_TEST_CACHE") or tempfile.mkdtemp()) / "com
 """`make test` keeps it between runs."""
 
 
-def run_kept(command: Sequence[str | Path], target: Path | None = None, folder: Path | None = None) -> None:
+def run_kept(
+    command: Sequence[str | Path], target: Path | None = None, folder: Path | None = None, named: bool = True
+) -> None:
     """Run a compiler or an analyser in a folder, unless the same one was given the same texts before.
 
     It has `-o target`, where a target is given, and all that it writes beside it is kept and is there again.
+    Not `named`, a target in the folder is what it makes there by itself.
     Raise AssertionError with what it says where it fails; nothing is kept then.
     """
     words = [str(word) for word in command]
     kept = _place(words, target, folder or Path.cwd())
     if not kept.is_dir():
         with _made(kept) as made:
-            out = [] if target is None else ["-o", str(made / target.name)]
+            out = ["-o", str(made / target.name)] if target is not None and named else []
             done = subprocess.run([*words, *out], cwd=folder, capture_output=True, text=True, check=False)
             assert done.returncode == 0, (words, done.stderr, done.stdout)
+            if target is not None and not named:
+                shutil.move(target, made)
     if target is not None:
         _restore(kept, target)
 
