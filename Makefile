@@ -46,8 +46,8 @@ control: $(READY)
 demo-control: $(READY)
 	$(BIN)/python tests/demo_control.py --out out/control
 
-# What compilers made of what, which later runs find again.
-KEPT = LINKWISE_TEST_CACHE=$(CURDIR)/.cache/tests TORCHINDUCTOR_CACHE_DIR=$(CURDIR)/.cache/inductor
+# What compilers made of what, which later runs find again; Python's too, which every process that a test starts reads.
+KEPT = LINKWISE_TEST_CACHE=$(CURDIR)/.cache/tests TORCHINDUCTOR_CACHE_DIR=$(CURDIR)/.cache/inductor PYTHONDONTWRITEBYTECODE=
 
 # Two files of tests at a time.
 test: $(READY)

@@ -108,11 +108,13 @@ def _forget() -> Iterator[None]:
     yield
     forget_packages()
     foreign_text.cache_clear()  # by texts of packages
-    if "torch._dynamo" in sys.modules:
-        sys.modules["torch._dynamo"].reset()
+    if compiler := sys.modules.get("torch._dynamo"):
+        compiler.reset()
     gc.collect()
-    if "pyarrow" in sys.modules:
-        sys.modules["pyarrow"].default_memory_pool().release_unused()
+    if native := sys.modules.get("linkwise_runtime.native.memory"):
+        native.lasting(native.MOST)  # which takes the place of all blocks that are kept for results to come
+    if arrow := sys.modules.get("pyarrow"):
+        arrow.default_memory_pool().release_unused()
     if sys.platform == "linux":
         with suppress(OSError, AttributeError):  # another C library than GNU's
             ctypes.CDLL("libc.so.6").malloc_trim(0)
