@@ -18,7 +18,7 @@ STRICT = (*WARNED, "-O1")
 PARTS = ("SINES", "ONE_SAMPLE", "BLOCKS", "POSITION_GRADIENT", "CONTROL")
 """Parts of the C that may be compiled apart."""
 FIELDS = {"c2": "acceleration", "c1": "velocity", "g": "gravity", "tau": "torque", "h1": "linear"}
-"""What the Python API calls the arrays of the header."""
+"""Names in the Python API of the arrays of the header."""
 
 
 def name_of(directory: Path) -> str:
@@ -56,7 +56,7 @@ def sources(directory: Path) -> list[str]:
 
 @cache
 def library_of(directory: Path) -> ctypes.CDLL:
-    """Of a package that no test changes: compiled once, however many ask, with what optimisation warns of."""
+    """Return the library of a package that no test changes: compiled once, with warnings of optimisation."""
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / f"{name_of(directory)}.so"
         compile_library(directory, target, level="-O1")
@@ -103,7 +103,7 @@ class Compiled:
         return dict(zip(FIELDS.values(), outputs, strict=True))
 
     def decomposition_of_blocks(self, *motion: Any) -> dict[str, Any]:
-        """The same, through the function on blocks of samples."""
+        """Return the same coefficients, through the function on blocks of samples."""
         width = self.numbers["BLOCK" if motion[0].dtype == np.float64 else "BLOCKF"]
         blocks, n = len(motion[0]) // width, motion[0].shape[-1]
         inside = [m.reshape(blocks, width, n).swapaxes(1, 2) for m in motion]

@@ -97,7 +97,7 @@ def driver() -> Iterator[Any]:
 
 
 def pytest_collection_finish() -> None:
-    """What is imported by now stays: no search for garbage looks at it again."""
+    """Keep what is imported by now out of the search for garbage."""
     gc.collect()
     gc.freeze()
 
@@ -144,7 +144,7 @@ def held_megabytes() -> int:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """What was skipped, a line for each reason: how many tests, of which files."""
+    """Say what was skipped, a line for each reason: how many tests, of which files."""
     files: dict[str, Counter[str]] = {}
     for report in terminalreporter.getreports("skipped"):
         where, _, reason = report.longrepr if isinstance(report.longrepr, tuple) else ("", 0, "")

@@ -1,4 +1,4 @@
-"""What compilers made and analysers let pass, by what of: a success that is kept is the same success."""
+"""Results of compilers and analysers, kept by their input: a success that is kept is the same success."""
 
 import hashlib
 import os
