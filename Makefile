@@ -17,7 +17,7 @@ demo: $(READY)
 	$(BIN)/linkwise generate puma560 --out out
 	$(BIN)/linkwise check out/planar3
 	$(BIN)/linkwise check out/puma560
-	$(BIN)/python tests/demo.py out
+	$(BIN)/python tests/tools/demo.py out
 	$(BIN)/linkwise motion --out out/motions
 	$(BIN)/linkwise analyze out/motions/recorded.csv --robot out/planar3 --out out/recorded --cutoff 4 --figure paper --figure shares
 	$(BIN)/linkwise analyze out/motions/simulated.csv --robot out/planar3 --out out/simulated --figure paper --figure shares
@@ -34,17 +34,17 @@ docs: $(READY)
 
 # What the pages of the documentation show, run; their pictures drawn anew.
 pictures: $(READY)
-	$(BIN)/python tests/pages.py
+	$(BIN)/python tests/tools/pages.py
 	$(BIN)/python docs/pictures/draw.py
 
 # The figure and the tables of docs/control.md: what is cancelled at the root, and what a loop at 1 kHz keeps.
 control: $(READY)
-	$(BIN)/python tests/control_root.py --out docs
+	$(BIN)/python tests/tools/control_root.py --out docs
 	$(BIN)/python tests/numeric/finite_rate_tables.py --out out/control
 
 # Panda pushed at its hand in MuJoCo: limp, soft and stiff.
 demo-control: $(READY)
-	$(BIN)/python tests/demo_control.py --out out/control
+	$(BIN)/python tests/tools/demo_control.py --out out/control
 
 # What compilers made of what, which later runs find again; Python's too, which every process that a test starts reads.
 KEPT = LINKWISE_TEST_CACHE=$(CURDIR)/.cache/tests TORCHINDUCTOR_CACHE_DIR=$(CURDIR)/.cache/inductor PYTHONDONTWRITEBYTECODE=
@@ -74,21 +74,21 @@ report: $(READY)
 
 # Every .osim of a folder beside OpenSim: make opensim MODELS=folder
 opensim: $(READY)
-	$(BIN)/python tests/opensim_folder.py $(MODELS)
+	$(BIN)/python tests/tools/opensim_folder.py $(MODELS)
 
 # Every real robot at hand, beside Pinocchio, and whether `linkwise check` calls each right: half an hour.
 corpus: $(READY)
-	$(BIN)/python tests/corpus.py --check --out out/corpus
-	$(BIN)/python tests/corpus.py --kernel loops --out out/corpus-loops
+	$(BIN)/python tests/tools/corpus.py --check --out out/corpus
+	$(BIN)/python tests/tools/corpus.py --kernel loops --out out/corpus-loops
 
 # Every call of docs/exports.md compiled, exported and under onnxruntime: some ten minutes.
 exports: $(READY)
-	$(BIN)/python tests/exports.py --out out/exports
+	$(BIN)/python tests/tools/exports.py --out out/exports
 
 # `generate` and `analyze` killed at each system call that touches files, which needs strace, and `study` interrupted: hours.
 crash: $(READY)
-	$(BIN)/python tests/crash.py
-	$(BIN)/python tests/interrupts.py
+	$(BIN)/python tests/tools/crash.py
+	$(BIN)/python tests/tools/interrupts.py
 
 # 200 random robots of up to 15 joints, each link beside Pinocchio: ten minutes.
 random: $(READY)
@@ -100,19 +100,19 @@ fuzz: $(READY)
 
 # The same bytes whatever the surroundings, one change at a time: minutes.
 same: $(READY)
-	$(BIN)/python tests/same_bytes.py
+	$(BIN)/python tests/tools/same_bytes.py
 
 # The tests in Python 3.12, 3.13 and 3.14, where these are: an hour, and gigabytes where torch comes with what GPUs need.
 pythons: $(READY)
-	$(BIN)/python tests/pythons.py
+	$(BIN)/python tests/tools/pythons.py
 
 # The tables of docs/licences.md.
 licences: $(READY)
-	$(BIN)/python tests/licences.py
+	$(BIN)/python tests/tools/licences.py
 
 # The tables of docs/calls.md.
 calls: $(READY)
-	$(BIN)/python tests/call_page.py
+	$(BIN)/python tests/tools/call_page.py
 
 # Speed beside Pinocchio and CasADi, reports and motions at length: minutes, on a quiet machine.
 bench: $(READY)
@@ -126,7 +126,7 @@ bench: $(READY)
 
 # The table of docs/embedded.md: stack and instructions on a Cortex-M that QEMU plays.
 embedded: $(READY)
-	$(BIN)/python tests/cortex_m.py
+	$(BIN)/python tests/tools/cortex_m.py
 
 clean:
 	rm -rf out .cache $(VENV)

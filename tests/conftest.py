@@ -18,12 +18,12 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from kept import keeping
+from helpers.kept import keeping
+from helpers.needed import missing, needs
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.emitted_text import foreign_text
 from linkwise.package.load import import_package
 from linkwise_runtime.native.process import run_all
-from needed import missing, needs
 
 DATA = Path(__file__).parent / "data"
 PANDA = (

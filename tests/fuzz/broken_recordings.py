@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 
 import h5py
 import numpy as np
-from bags import State, write_bag
+from helpers.bags import State, write_bag
 
 from fuzz.broken_logs import log_case, random_rows
 from fuzz.case import JOINTS, Case

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, cast
 
-from search_path import before
+from helpers.search_path import before
 
 from fuzz.case import Case
 from fuzz.worker import MODULES, Outcome

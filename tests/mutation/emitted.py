@@ -19,10 +19,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from helpers.urdf_text import chain, joint, link, mimic, robot
 from linkwise import Options, check_package, generate, read_system, write_package
 from linkwise.emit.formulas import too_many_to_read
 from mutation.mutants import Mutant, Rules, mutants
-from urdf_text import chain, joint, link, mimic, robot
 
 DATA = Path(__file__).parents[1] / "data"
 FORMULAS = (

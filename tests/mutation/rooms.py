@@ -35,23 +35,23 @@ def _folder(name: str, *tests: str) -> Room:
 
 
 C = (
-    "tests/test_control_c.py",
-    "tests/test_emitted_c.py",
-    "tests/test_loops.py",
-    "tests/test_native.py",
-    "tests/test_impedance_c.py",
-    "tests/test_passive_torque.py",
-    "tests/test_curves.py",
-    "tests/test_check.py",
+    "tests/emit/test_control_c.py",
+    "tests/emit/test_emitted_c.py",
+    "tests/emit/test_loops.py",
+    "tests/runtime/test_native.py",
+    "tests/emit/test_impedance_c.py",
+    "tests/runtime/test_passive_torque.py",
+    "tests/robot/test_curves.py",
+    "tests/check/test_check.py",
     "tests/numeric/test_regressors.py",
-    "tests/test_embedded.py",
+    "tests/emit/test_embedded.py",
 )
 ROOMS: dict[str, Room] = {
     "cli": _folder("cli"),
     "study": _folder("study"),
     "report": Room(
         (f"{HOUSE}report/", "templates/report/"),
-        ("tests/test_report_pages.py", "tests/test_report_reduction.py", "tests/test_report_commands.py"),
+        ("tests/report/test_pages.py", "tests/report/test_reduction.py", "tests/report/test_commands.py"),
     ),
     "identification": _folder("identification"),
     "analysis": _folder("analysis"),
@@ -64,7 +64,7 @@ ROOMS: dict[str, Room] = {
     "expression": _folder("expression"),
     "constraints": _folder("constraints"),
     "symbolic": _folder("symbolic"),
-    "robot": _folder("robot", "tests/test_robots_builtin.py", "tests/numeric/test_against_pinocchio.py"),
+    "robot": _folder("robot", "tests/robot/test_builtin.py", "tests/numeric/test_against_pinocchio.py"),
     "output": _folder("output"),
     "single-files": Room(
         tuple(
@@ -78,28 +78,30 @@ ROOMS: dict[str, Room] = {
         )
     ),
     "runtime": Room((RUNTIME,)),
-    "runtime/native": Room((f"{RUNTIME}native/",), ("tests/test_native_module.py", "tests/test_native.py")),
-    "runtime/arrays": Room((f"{RUNTIME}arrays/",), ("tests/test_exports.py",)),
+    "runtime/native": Room(
+        (f"{RUNTIME}native/",), ("tests/runtime/test_native_module.py", "tests/runtime/test_native.py")
+    ),
+    "runtime/arrays": Room((f"{RUNTIME}arrays/",), ("tests/emit/test_exports.py",)),
     **{
         f"runtime/{name}": Room((f"{RUNTIME}{name}/",))
         for name in ("lagrangians", "control", "motion", "constraints", "kinematics", "answers", "rule")
     },
     "c": _folder("c", *C),
-    "cmake": _folder("cmake", "tests/test_cmake.py"),
+    "cmake": _folder("cmake", "tests/emit/test_cmake.py"),
     "templates": Room(
         (
             "templates/__init__.py",
             *(f"templates/{kind}/" for kind in ["c", "closed_forms", "energies", "formulas", "package"]),
         ),
-        ("tests/test_templates.py", "tests/test_package_import.py", "tests/test_package_calls.py", *C),
+        ("tests/emit/test_templates.py", "tests/runtime/test_import.py", "tests/runtime/test_calls.py", *C),
     ),
     "pages": Room(
         ("templates/analysis/", "templates/study/"),
         (
-            "tests/test_study_page.py",
-            "tests/test_analysis_page.py",
-            "tests/test_analysis_shares.py",
-            "tests/test_analysis_browser.py",
+            "tests/study/test_page.py",
+            "tests/analysis/test_page.py",
+            "tests/analysis/test_shares.py",
+            "tests/analysis/test_browser.py",
         ),
     ),
 }
@@ -107,26 +109,31 @@ LEFT_OUT = {
     f"{HOUSE}py.typed": "empty",
     f"{RUNTIME}py.typed": "empty",
     f"{RUNTIME}LICENSE": "the project's",
-    f"{RUNTIME}pyproject.toml": "what is packed, which tests/test_packaging.py looks at",
+    f"{RUNTIME}pyproject.toml": "what is packed, which tests/house/test_packaging.py looks at",
     "templates/analysis/report.css.j2": "how a page looks; that all of it can be read, tests of pages hold",
 }
 NOT_COUNTED = {
-    "tests/test_generated.py": "that a text changed, not that it became wrong",
-    "tests/test_mutation.py": "of this sweep itself",
+    "tests/emit/test_generated.py": "that a text changed, not that it became wrong",
+    "tests/house/test_mutation.py": "of this sweep itself",
     **dict.fromkeys(
-        ("tests/test_rooms.py", "tests/test_docs.py", "tests/test_pages.py", "tests/test_licences.py"),
+        (
+            "tests/house/test_rooms.py",
+            "tests/house/test_docs.py",
+            "tests/house/test_pages.py",
+            "tests/house/test_licences.py",
+        ),
         "reads texts of the checkout, which are not changed",
     ),
     **dict.fromkeys(
         (
-            "tests/test_trust.py",
-            "tests/test_stated_figures.py",
-            "tests/test_skipped.py",
-            "tests/test_packaging.py",
+            "tests/house/test_trust.py",
+            "tests/house/test_stated_figures.py",
+            "tests/house/test_skipped.py",
+            "tests/house/test_packaging.py",
         ),
         "reads texts of the checkout, which are not changed",
     ),
-    "tests/test_runtime.py::test_a_package_and_its_user_are_typed_strictly": "mypy, in minutes",
+    "tests/runtime/test_runtime.py::test_a_package_and_its_user_are_typed_strictly": "mypy, in minutes",
 }
 """Files of tests, or tests, whose failure is no catch, with the reason."""
 

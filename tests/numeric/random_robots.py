@@ -15,8 +15,8 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
-from answers import random_states
 from fuzz.valid_robots import RobotData, random_robot
+from helpers.answers import random_states
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
 

@@ -5,7 +5,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from answers import random_states, relative_error
+from helpers.answers import random_states, relative_error
 
 pytest.importorskip("mujoco")
 

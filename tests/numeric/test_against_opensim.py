@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from answers import relative_error
 from fuzz.valid_robots import JointData, LinkData, RobotData
+from helpers.answers import relative_error
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
 

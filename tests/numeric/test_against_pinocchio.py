@@ -6,8 +6,8 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from answers import packed, random_states, relative_error
 from conftest import DATA, PANDA, needs_compiler
+from helpers.answers import packed, random_states, relative_error
 
 pytest.importorskip("pinocchio")
 

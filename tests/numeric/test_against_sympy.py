@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 import sympy as sp
-from answers import random_states, relative_error
+from helpers.answers import random_states, relative_error
 from linkwise import Coordinate, LinkEnergy, energy_system, generate, write_package
 from linkwise.package.load import import_package
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols

@@ -10,7 +10,7 @@ from linkwise.package.load import import_package
 
 pytest.importorskip("pinocchio")
 
-from motion_logs import write_csv
+from helpers.motion_logs import write_csv
 
 from numeric.loops import MECHANISMS, LoopOracle
 

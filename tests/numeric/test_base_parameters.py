@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from answers import random_states
-from corpus import ROBOTS
+from helpers.answers import random_states
 from linkwise import Options, generate, read_system, write_package
 from linkwise.identification.base_parameters import base_parameters
 from linkwise.package.load import open_package
+from tools.corpus import ROBOTS
 
 pytest.importorskip("pinocchio")
 

@@ -10,8 +10,8 @@ from conftest import needs_compiler
 
 pytest.importorskip("matplotlib")
 
-import control_root
-from control_root import CANCELLED, END, EVERY, LINK_2_MOVES, START, STEP, Run
+from tools import control_root
+from tools.control_root import CANCELLED, END, EVERY, LINK_2_MOVES, START, STEP, Run
 
 pytestmark = needs_compiler
 

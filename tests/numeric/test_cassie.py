@@ -16,7 +16,7 @@ from linkwise.package.manifest import Manifest
 pytest.importorskip("pinocchio")
 
 import pinocchio as pin
-from corpus import ROBOTS
+from tools.corpus import ROBOTS
 
 FILE = ROBOTS / "cassie_description/robots/cassie_v2.sdf"
 if not FILE.is_file():

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from answers import relative_error
+from helpers.answers import relative_error
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise_runtime.quantities import Contact
@@ -15,7 +15,7 @@ from linkwise_runtime.quantities import Contact
 pytest.importorskip("pinocchio")
 
 import pinocchio as pin
-from corpus import ROBOTS
+from tools.corpus import ROBOTS
 
 from numeric.loops import MECHANISMS, LoopOracle, constraint_dynamics
 from numeric.pinocchio_model import PinocchioModel

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from corpus import ROBOTS
+from helpers.motion_logs import smooth, write_csv
 from linkwise import LinkwiseError, Load, Options, generate, read_system, write_package
 from linkwise.analysis import Contacts, WhileColumn, analyze
 from linkwise.analysis.opened_robot import load_robot
 from linkwise_runtime.quantities import Contact
-from motion_logs import smooth, write_csv
+from tools.corpus import ROBOTS
 
 from numeric.pinocchio_model import PinocchioModel
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from compiled import STRICT
 from conftest import needs_compiler
-from impedance_in_c import frame_struct, joint_struct, left_jacobian, pointer_to, rotation_vector
-from kept import run_kept
+from helpers.compiled import STRICT
+from helpers.impedance_in_c import frame_struct, joint_struct, left_jacobian, pointer_to, rotation_vector
+from helpers.kept import run_kept
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.manifest import Manifest
 from linkwise_runtime.structure import passive_sums

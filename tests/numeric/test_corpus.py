@@ -6,8 +6,8 @@ import pytest
 
 pytest.importorskip("pinocchio")
 
-from corpus import ROBOTS, study
-from corpus_report import LIMIT
+from tools.corpus import ROBOTS, study
+from tools.corpus_report import LIMIT
 
 if not ROBOTS.is_dir():
     pytest.skip("needs real robots: pip install example-robot-data", allow_module_level=True)

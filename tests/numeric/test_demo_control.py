@@ -10,8 +10,8 @@ from conftest import PANDA, needs_compiler
 pytest.importorskip("mujoco")
 pytest.importorskip("matplotlib")
 
-import demo_control
-from demo_control import PERIOD, PUSH, STOP
+from tools import demo_control
+from tools.demo_control import PERIOD, PUSH, STOP
 
 from numeric.mujoco_plant import PANDA_AT_WORK, panda_model
 

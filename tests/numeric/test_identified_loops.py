@@ -15,7 +15,7 @@ from linkwise.package.manifest import Manifest
 pytest.importorskip("pinocchio")
 
 import pinocchio as pin
-from motion_logs import write_csv
+from helpers.motion_logs import write_csv
 
 from numeric.loops import MECHANISMS, LoopOracle, Mechanism
 

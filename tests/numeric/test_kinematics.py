@@ -11,7 +11,7 @@ from linkwise.package.load import import_package
 pytest.importorskip("pinocchio")
 
 import pinocchio as pin
-from corpus import ROBOTS
+from tools.corpus import ROBOTS
 
 from numeric.pinocchio_model import BASE, PinocchioModel
 

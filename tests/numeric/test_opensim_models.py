@@ -6,9 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from linkwise import generate, read_robot, read_system, write_package
-from linkwise.package.load import import_package
-from osim_text import (
+from helpers.osim_text import (
     KNEE,
     LINEAR,
     LINES,
@@ -23,6 +21,8 @@ from osim_text import (
     multiplied,
     points,
 )
+from linkwise import generate, read_robot, read_system, write_package
+from linkwise.package.load import import_package
 
 pytest.importorskip(
     "opensim", reason="needs opensim, which has wheels for Linux on x86-64: pip install opensim"

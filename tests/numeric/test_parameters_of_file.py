@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from answers import random_states, relative_error
+from helpers.answers import random_states, relative_error
 from linkwise import Options, generate, read_robot, read_system, write_package
 from linkwise.package.load import import_package
 

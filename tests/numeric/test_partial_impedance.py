@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from answers import relative_error
+from helpers.answers import relative_error
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
 
 pytest.importorskip("pinocchio")
 
 import pinocchio as pin
-from corpus import ROBOTS
+from tools.corpus import ROBOTS
 
 from numeric.pinocchio_model import PinocchioModel
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from answers import random_states, relative_error
 from conftest import DATA, LOCKED_FINGERS, PANDA, needs_compiler
+from helpers.answers import random_states, relative_error
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
 

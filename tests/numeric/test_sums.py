@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from answers import random_states, relative_error
-from compiled import compile_library
 from conftest import LOCKED_FINGERS, PANDA, needs_compiler
+from helpers.answers import random_states, relative_error
+from helpers.compiled import compile_library
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
 
 pytest.importorskip("pinocchio")
 
 import pinocchio as pin
-from corpus import ROBOTS
+from tools.corpus import ROBOTS
 
 from numeric.pinocchio_model import PinocchioModel
 

@@ -1,0 +1,452 @@
+"""Link energies that a user writes in SymPy, against equations of motion written by hand."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from conftest import DATA, needs_compiler
+from helpers.answers import packed, random_states, relative_error
+from helpers.motion_logs import smooth, write_csv
+from linkwise import (
+    Coordinate,
+    LinkEnergy,
+    LinkwiseError,
+    energy_system,
+    generate,
+    read_robot,
+    read_system,
+    write_package,
+)
+from linkwise.analysis import analyze
+from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.show.page import page_data
+from linkwise.emit.c.quantity_table import potential, quantity_lines
+from linkwise.graphs import overlay, part_label
+from linkwise.package.load import import_package
+from linkwise.progress import silent
+from linkwise.report import TermQuery, terms_markdown, terms_report
+from linkwise.symbolic.system import EnergySystem
+from matplotlib.text import Text
+
+CART, TURNTABLE = str(DATA / "cart_pendulum.py"), str(DATA / "turntable.py")
+BACKENDS = ("numpy", "torch", "autograd", *(pytest.param(b, marks=needs_compiler) for b in ("c", "native")))
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_cart_with_spring_and_pendulum(
+    backend: str, directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    cart, bob, k, r, g = 2.0, 0.3, 40.0, 0.5, 9.81
+    q, qd, qdd = random_states(2, 100)
+    (x, theta), (_, w), (a, alpha) = q.T, qd.T, qdd.T
+    on_cart_by_cart = cart * a + k * x
+    on_cart_by_bob = bob * (a + r * (alpha * np.cos(theta) - w**2 * np.sin(theta)))
+    on_bob = bob * r * (r * alpha + a * np.cos(theta) + g * np.sin(theta))
+    given = packed(package_of(CART), directory_of(CART), backend, q, qd, qdd)
+    assert relative_error(given["torque"].T, [on_cart_by_cart, on_cart_by_bob, on_bob]) <= 1e-14
+
+
+@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd"])
+def test_moving_base_closes_and_its_linear_terms_agree_in_both_conventions(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    rate, mass = 1.7, 0.4
+    states = random_states(2, 100)
+    (x, y), (u, v), (a, b) = (state.T for state in states)
+    if backend != "numpy":
+        torch = pytest.importorskip("torch")
+        states = tuple(torch.from_numpy(state) for state in states)
+    dynamics = package_of(TURNTABLE).load(backend)
+
+    quadratic = np.array([-mass * x * v**2, 2 * mass * x * u * v])
+    linear = np.array([-2 * mass * rate * v, 2 * mass * rate * u])
+    rest = np.array([mass * (a - rate**2 * x), mass * ((2 + x**2) * b - rate**2 * y)])
+    tau = np.asarray(dynamics.partial_torque(*states))[..., 0].T
+    assert relative_error(tau, quadratic + linear + rest) <= 1e-14
+
+    closing, gradient = (dynamics.propagation(*states, convention=c) for c in ("closing", "gradient"))
+    velocity = np.asarray(closing.velocity)[:, :, 0].sum(-1).T
+    assert relative_error(velocity, quadratic + linear) <= 1e-14
+    velocity = np.asarray(gradient.velocity)[:, :, 0].sum(-1).T
+    assert relative_error(velocity, 2 * quadratic + linear) <= 1e-14
+
+
+@needs_compiler
+def test_emitted_c_has_the_linear_part_too(
+    directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    from helpers.compiled import Compiled
+
+    states = random_states(2, 5)
+    given = Compiled(directory_of(TURNTABLE)).decomposition(*states)
+    expected = package_of(TURNTABLE).load("numpy").packed(*states)
+    assert relative_error(given["linear"], expected.velocity_linear) <= 1e-14
+    assert np.abs(given["linear"]).max() > 1.0
+
+
+X, Y = Coordinate("x", "m"), Coordinate("y")
+
+
+@pytest.mark.parametrize("factor", [1 / (1 + X.q**2), 1 / (2 + X.q), 3 - 1 / (2 + X.q**2)], ids=str)
+def test_graphs_of_quotients_say_what_torques_are(factor: sp.Expr, tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    links = [LinkEnergy("a", X.qd**2 / 2 + Y.qd**2 * factor / 2, 0)]
+    write_package(generate(energy_system("bead", [X, Y], links), ["autograd"]), tmp_path / "bead")
+    robot = import_package(tmp_path / "bead").load("autograd")
+    (x, _), (v, w), (_, a) = motion = np.array([[0.7, 0.2], [1.3, -0.4], [0.5, 2.0]])
+    # d/dt(qd_y f(x)) = f qdd_y + f' qd_x qd_y
+    f, slope = (float(value.subs(X.q, x)) for value in (factor, sp.diff(factor, X.q)))
+    assert float(robot.graph(1, 0).evaluate(*motion)) == pytest.approx(f * a + slope * v * w, rel=1e-12)
+
+
+WITHOUT_FORCE = {
+    "a belt": [LinkEnergy("cart", 2 * (X.qd + 3) ** 2 / 2, 2 * X.q**2)],
+    "beside others": [
+        LinkEnergy("plain", (2 + X.q**2) * Y.qd**2 + X.qd * Y.qd, 0),
+        LinkEnergy("sloped", X.qd**2 * (2 + sp.cos(Y.q)) + Y.qd**2 + Y.q * X.qd + X.q * Y.qd, X.q),
+        LinkEnergy("puck", (X.qd - 1.7 * Y.q) ** 2 + (Y.qd + 1.7 * X.q) ** 2 * (1 + X.q**2), 0),
+        LinkEnergy("spring", 0, 3 * X.q**2 + Y.q),
+    ],
+}
+"""Kinetic energies with terms b(q) . qd that have no force: b is the slope of a function, 3 x or x y."""
+
+
+@pytest.mark.parametrize("case", WITHOUT_FORCE)
+@pytest.mark.parametrize("backend", ["numpy", "autograd", pytest.param("native", marks=needs_compiler)])
+def test_terms_linear_in_the_velocities_may_have_no_force(backend: str, case: str, tmp_path: Path) -> None:
+    links = WITHOUT_FORCE[case]
+    robot = energy_system("robot", [X, Y] if len(links) > 1 else [X], links)
+    write_package(generate(robot), tmp_path / "robot")
+    states = random_states(len(robot.coordinates), 7)
+    motion: Any = states
+    if backend == "autograd":
+        motion = [pytest.importorskip("torch").from_numpy(state) for state in states]
+    answer = import_package(tmp_path / "robot").load(backend).packed(*motion)
+    c2, c1, g, h1 = by_sympy(robot, *states)
+    pairs = (
+        (answer.acceleration, c2),
+        (answer.velocity, c1),
+        (answer.gravity, g),
+        (answer.velocity_linear, h1),
+    )
+    for found, expected in pairs:
+        np.testing.assert_allclose(np.asarray(found), expected, rtol=1e-14, atol=1e-13)
+
+
+def by_sympy(robot: EnergySystem, q: np.ndarray, qd: np.ndarray, _: np.ndarray) -> list[np.ndarray]:
+    """Packed c2, c1, g and h1, the last of links with terms linear in qd, derived in SymPy."""
+    x, v = [c.q for c in robot.coordinates], [c.qd for c in robot.coordinates]
+    forms: list[list[sp.Expr]] = [[], [], [], []]
+    c2, c1, g, h1 = forms
+    rest = dict.fromkeys(v, 0)
+    for j, link in enumerate(robot.links):
+        path, lagrangian = robot.path(j), link.kinetic - link.potential
+        leans = any(lagrangian.diff(v[i]).subs(rest).expand() != 0 for i in path)
+        for i in path:
+            momentum = lagrangian.diff(v[i])
+            h = sum(momentum.diff(x[s]) * v[s] for s in path) - lagrangian.diff(x[i])
+            slopes = [h.diff(v[k]) for k in path]
+            c2 += [momentum.diff(v[k]) for k in path if k >= i]
+            c1 += [(slope + slope.subs(rest)) / 2 for slope in slopes]
+            g += [h.subs(rest)]
+            h1 += [slope.subs(rest) for slope in slopes if leans]
+    values = [sp.lambdify([*x, *v], part)(*q.T, *qd.T) for part in forms]
+    return [np.stack([np.broadcast_to(a, len(q)) for a in part], -1) for part in values]
+
+
+A, B = sp.symbols("a b")
+
+
+def puck(kinetic: sp.Expr, potential: sp.Expr = sp.S.Zero) -> object:
+    return energy_system("puck", [Coordinate("x", "m")], [LinkEnergy("disc", kinetic, potential)])
+
+
+@pytest.mark.parametrize(
+    ("kinetic", "potential", "sorted_out"),
+    [
+        (X.qd**2 / 2 + 3 * X.q**2, sp.S.Zero, (X.qd**2 / 2, -3 * X.q**2)),
+        (X.qd**2 / 2, -5 * X.q * X.qd, (X.qd**2 / 2 + 5 * X.q * X.qd, sp.S.Zero)),
+        (X.qd**2 / 2, 3 * X.q**2, (X.qd**2 / 2, 3 * X.q**2)),
+    ],
+    ids=["kinetic at rest", "potential in motion", "neither"],
+)
+def test_kinetic_is_what_moves_and_potential_what_does_not(
+    kinetic: sp.Expr, potential: sp.Expr, sorted_out: tuple[sp.Expr, sp.Expr]
+) -> None:
+    (disc,) = energy_system("puck", [X], [LinkEnergy("disc", kinetic, potential)]).links
+    assert (sp.expand(disc.kinetic), sp.expand(disc.potential)) == sorted_out
+
+
+@pytest.mark.parametrize("degree", [3, 10**9])
+def test_a_degree_beyond_two_in_the_velocities_is_refused(degree: int) -> None:
+    message = f"link 'disc': its energies have degree {degree} in the velocities"
+    with pytest.raises(LinkwiseError, match=message):
+        puck(Coordinate("x", "m").qd ** degree)
+
+
+def test_energy_that_is_not_a_polynomial_in_the_velocities_is_refused() -> None:
+    with pytest.raises(LinkwiseError, match="its energies are not polynomials in the velocities"):
+        puck(sp.sin(Coordinate("x", "m").qd))
+
+
+def test_unknown_symbol_is_refused_by_name() -> None:
+    with pytest.raises(
+        LinkwiseError, match=r"link 'disc': the symbol mu is neither .* nor among `parameters`"
+    ):
+        puck(sp.Symbol("mu") * Coordinate("x", "m").qd ** 2)
+
+
+@pytest.mark.parametrize("symbolic", [False, True])
+def test_two_parameters_of_one_name_are_refused(symbolic: bool) -> None:
+    x = Coordinate("x", "m")
+    m, m2 = sp.Symbol("m"), sp.Symbol("m", positive=True)
+    links = [LinkEnergy("a", m * x.qd**2 / 2, m2 * x.q)]
+    with pytest.raises(LinkwiseError, match=r"^2 different parameters are called m, told apart by their"):
+        energy_system("puck", [x], links, {m: 1.0, m2: 5.0}, symbolic)
+    with pytest.raises(LinkwiseError, match=r"^link 'a': the symbol m is not the one among `parameters`"):
+        energy_system("puck", [x], links, {m: 1.0}, symbolic)
+
+
+@pytest.mark.parametrize(
+    ("potential", "message"),
+    [
+        (sp.nan, "link 'disc': its energies hold NaN or infinity"),
+        (sp.oo * X.q, "link 'disc': its energies hold NaN or infinity"),
+        (-sp.oo, "link 'disc': its energies hold NaN or infinity"),
+        (X.q / (A - B), "link 'disc': its energies hold NaN or infinity"),
+        (sp.sqrt(-A) * X.q, "link 'disc': its energies hold the imaginary unit"),
+        (sp.I * X.q, "link 'disc': its energies hold the imaginary unit"),
+        (sp.asin(2) * X.q + 1, r"link 'disc': its energies hold asin\(2\), which is not a real number"),
+        (10**309 * X.q, "link 'disc': its energies hold a number beyond 1e308"),
+        (None, "link 'disc': its potential energy is None; give a SymPy expression"),
+        ("x", "link 'disc': its potential energy is 'x'; give a SymPy expression"),
+        (True, "link 'disc': its potential energy is True; give a SymPy expression"),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("symbolic", [False, True])
+def test_energy_that_is_no_real_number_is_refused(potential: object, message: str, symbolic: bool) -> None:
+    links = [LinkEnergy("disc", X.qd**2, potential)]
+    with pytest.raises(LinkwiseError, match=f"^{message}"):
+        energy_system("puck", [X], links, {A: 2.0, B: 2.0}, symbolic)
+
+
+HEAD = "from linkwise import *\nimport sympy as sp\nx = Coordinate('x')\n"
+GOOD = HEAD + "coordinates = [x]\nlinks = [LinkEnergy('a', x.qd**2, 0)]\n"
+FILES = {
+    "exit": (GOOD + "import sys; sys.exit(0)", "running the file failed in line 6: SystemExit: 0"),
+    "raised": (
+        HEAD + "def f(a):\n    return a / 0\nf(1)",
+        "running the file failed in line 5: ZeroDivisionError: d",
+    ),
+    "raised beyond": (
+        HEAD + "\nsp.Symbol(3)",
+        "running the file failed in line 5: TypeError: name should be",
+    ),
+    "raised without a word": (HEAD + "assert 0", "running the file failed in line 4: AssertionError"),
+    "raised with words that cannot be said": (
+        HEAD + "class Z(Exception):\n    def __str__(self):\n        raise ValueError('x')\nraise Z",
+        "running the file failed in line 7: Z",
+    ),
+    "no Python": (HEAD + "x = = 1\n", "running the file failed in line 4: SyntaxError: invalid syntax"),
+    "number": (GOOD + "coordinates = [Coordinate(3)]", "the coordinate name 3 is not a string"),
+    "twice": (GOOD + "coordinates = [x, x]", "the coordinate name 'x' is used twice; give each its own"),
+    "blank": (
+        GOOD + "coordinates = [Coordinate(' ')]",
+        "the coordinate name ' ' is empty; give each its own",
+    ),
+    "own words": (GOOD + "raise LinkwiseError('in my own words')", "in my own words"),
+    "unit": (GOOD + "coordinates = [Coordinate('x', 'deg')]", "coordinate 'x' has the unit 'deg'; give rad"),
+    "link": (GOOD + "links = [LinkEnergy(None, x.qd**2, 0)]", "the link name None is not a string"),
+    "name": (GOOD + "name = 3", "the robot's name is 3; give a string"),
+    "no links": (HEAD + "coordinates = [x]", "the file must define 'links', a list of linkwise.LinkEnergy"),
+    "one of two": (GOOD + "links += [3]", "the file must define 'links', a list of linkwise.LinkEnergy"),
+    "list": (GOOD + "parameters = [3]", "`parameters` must be a dictionary of SymPy symbols"),
+    "text": (GOOD + "parameters = {'m': 1}", "`parameters` must be a dictionary of SymPy symbols"),
+    "digits": (
+        GOOD + "parameters = {sp.Symbol('m'): '1'}",
+        "parameter m is '1'; give a number, without quotes",
+    ),
+    "word": (GOOD + "parameters = {sp.Symbol('m'): [1]}", "parameter m has no value as a real number"),
+    "a name that nobody reads": (
+        GOOD + "k = sp.Symbol('k')\ndissipation = k * x.qd**2 / 2",
+        "'dissipation' in line 7 would count for nothing: linkwise reads ",
+    ),
+    "a function that nobody calls": (
+        GOOD + "def forces(q, qd):\n    return -qd\n",
+        "'forces' in line 6 would count for nothing: linkwise reads ",
+    ),
+    "a name added to": (
+        GOOD + "if x:\n    damping: list = []\n    damping += [3]",
+        "'damping' in line 7 would count for nothing: linkwise reads ",
+    ),
+    "a name made of itself": (
+        GOOD + "damping = 0\ndamping = damping + x.qd**2",
+        "'damping' in line 6 would count for nothing: linkwise reads ",
+    ),
+    "a table that is filled": (
+        GOOD + "damping = {}\ndamping['x'] = 3",
+        "'damping' in line 6 would count for nothing: linkwise reads ",
+    ),
+    "names of several": (
+        GOOD + "damping, friction = 1, 2",
+        "'damping' in line 6 would count for nothing: linkwise reads ",
+    ),
+    "a name of a list": (
+        GOOD + "shown = [*links, friction := x.qd**2]\nprint(shown)",
+        "'friction' in line 6 would count for nothing: linkwise reads ",
+    ),
+    "a name of what is opened": (
+        GOOD + "with open(__file__) as friction:\n    pass",
+        "'friction' in line 6 would count for nothing: linkwise reads ",
+    ),
+    "a name misspelt": (
+        GOOD + "parametres = {sp.Symbol('m'): 1.0}",
+        "'parametres' in line 6 would count for nothing: linkwise reads parameters, ",
+    ),
+    "complex": (GOOD + "parameters = {sp.Symbol('m'): sp.I}", "parameter m has no value as a real number"),
+    "huge": (GOOD + "parameters = {sp.Symbol('m'): 10**400}", "parameter m has no value as a real number"),
+    "infinite": (GOOD + "parameters = {sp.Symbol('m'): sp.oo}", "parameter m has NaN or infinity"),
+}
+
+
+@pytest.mark.parametrize("case", FILES)
+def test_defect_of_a_python_file_is_named(case: str, tmp_path: Path) -> None:
+    text, message = FILES[case]
+    (tmp_path / "bad.py").write_text(text)
+    with pytest.raises(LinkwiseError) as caught:
+        read_system(tmp_path / "bad.py")
+    assert str(caught.value).startswith(f"{tmp_path / 'bad.py'}: {message}")
+
+
+def test_a_python_file_is_no_robot_and_what_reads_it_is_told(tmp_path: Path) -> None:
+    (tmp_path / "puck.py").write_text(GOOD)
+    with pytest.raises(
+        LinkwiseError, match=r"puck.py: a Python file holds energies.*linkwise.read_system reads"
+    ):
+        read_robot(tmp_path / "puck.py")
+
+
+def test_what_a_python_file_uses_itself_is_its_own_matter(tmp_path: Path) -> None:
+    own = (
+        "import math\nm, unused = sp.symbols('m unused')\nk = 3\nfor turn in range(2):\n    last = turn\n"
+        "def spring(a):\n    stiffness = k * last\n    return stiffness * a**2\n_note = 'mine'\n"
+        "links += [LinkEnergy('spring', 0, spring(x.q) * m)]\nname = 'mine'\nparameters = {m: 2.0}\n"
+        "if __name__ == '__main__':\n    shown = links\n"
+    )
+    (tmp_path / "own.py").write_text(GOOD + own)
+    assert read_system(tmp_path / "own.py").link_names == ("a", "spring")
+
+
+@pytest.mark.parametrize(
+    ("exponent", "parameters"), [(2.0, {}), (A, {A: 2}), (-A, {A: 2.0}), (2 * A + 0.5, {A: 1.25})], ids=str
+)
+@pytest.mark.parametrize("backend", ["numpy", "autograd"])
+def test_a_whole_power_that_is_written_with_a_point_is_one_for_negative_positions_too(
+    exponent: object, parameters: dict[sp.Symbol, float], backend: str, tmp_path: Path
+) -> None:
+    link = LinkEnergy("disc", X.qd**2.0 / 2, X.q**exponent)
+    write_package(generate(energy_system("puck", [X], [link], parameters), [backend]), tmp_path / "puck")
+    states = np.array([[[-1.7], [0.4]], [[0.3], [-0.2]], [[2.0], [1.0]]])
+    if backend == "autograd":
+        states = pytest.importorskip("torch").from_numpy(states)
+    found = np.asarray(import_package(tmp_path / "puck").load(backend).partial_torque(*states))
+    n = float(sp.sympify(exponent).subs(parameters))
+    expected = [2.0 + n * (-1.7) ** (n - 1), 1.0 + n * 0.4 ** (n - 1)]
+    assert found.ravel().tolist() == pytest.approx(expected, rel=1e-14)
+
+
+def test_a_half_power_that_is_written_with_a_point_is_a_root() -> None:
+    text = generate(puck(X.qd**2, (X.q**2 + 1) ** 1.5), ["numpy"])["forms/link_1.py"]  # type: ignore[arg-type]
+    assert "log" not in text
+
+
+@pytest.mark.parametrize("potential", [X.q**A, sp.cos(X.q) * (X.q - B) ** (2 * A), A**B * X.q], ids=str)
+def test_a_parameter_as_exponent_is_refused_where_the_base_may_be_negative(potential: sp.Expr) -> None:
+    links, values = [LinkEnergy("disc", X.qd**2, potential)], {A: 2.0, B: 2.0}
+    message = (
+        r"^link 'disc': .* has parameters in its exponent, .* numbers for the parameters, .*positive=True"
+    )
+    with pytest.raises(LinkwiseError, match=message):
+        energy_system("puck", [X], links, values, symbolic=True)
+    generate(energy_system("puck", [X], links, values), ["numpy"])
+
+
+@pytest.mark.parametrize("potential", [(X.q**2 + 1) ** A, sp.exp(X.q) ** A, 2**X.q, B**X.q], ids=str)
+def test_an_exponent_is_taken_where_the_power_is_that_of_a_logarithm(potential: sp.Expr) -> None:
+    links, values = [LinkEnergy("disc", X.qd**2, potential)], {A: 2.0, B: 2.0}
+    assert generate(energy_system("puck", [X], links, values, symbolic=True), ["numpy"])
+
+
+def test_unsupported_function_is_refused_by_name() -> None:
+    x = Coordinate("x", "m")
+    system = puck(x.qd**2, sp.gamma(x.q))
+    with pytest.raises(LinkwiseError, match="link 'disc': the function gamma is not supported"):
+        generate(system)  # type: ignore[arg-type]
+
+
+def test_parameters_of_a_python_file_stay_symbols_on_request() -> None:
+    from linkwise import Options
+
+    system = read_system(CART, Options("symbolic"))
+    assert {symbol.name: value for symbol, value in system.parameters.items()} == {
+        "M": 2.0,
+        "m": 0.3,
+        "k": 40.0,
+        "r": 0.5,
+        "g": 9.81,
+    }
+
+
+def test_parameters_that_no_energy_has_are_left_out() -> None:
+    x, used, unused = Coordinate("x", "m"), sp.Symbol("used"), sp.Symbol("unused")
+    links = [LinkEnergy("disc", used * x.qd**2, 0)]
+    system = energy_system("puck", [x], links, {used: 1.0, unused: 2.0}, symbolic=True)
+    assert system.parameters == {used: 1.0}
+    assert system.request == {"parameters": "symbolic"}
+    assert energy_system("puck", [x], links, {used: 1.0}).request == {"parameters": "numeric"}
+
+
+@pytest.mark.parametrize(("file", "told"), [("turntable.py", True), ("cart_pendulum.py", False)])
+def test_the_header_explains_linear_terms_where_there_are_some(file: str, told: bool) -> None:
+    system = read_system(str(DATA / file))
+    table = generate(system, ["c"])[f"c/{system.name}.h"].partition("An array holds")[0]
+    assert ("what energies linear in qd add to c1" in table) == told
+
+
+@pytest.mark.parametrize(("robot", "word"), [(CART, "potential energy"), ("planar3", "gravity")])
+def test_what_energies_give_at_rest_is_called_gravity_only_where_it_is(
+    robot: str, word: str, directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    package = directory_of(robot)
+    joints = load_robot(package).joints
+    log = write_csv(tmp_path / "log.csv", smooth(40, len(joints)), joints)
+    analysis = analyze(log, package, induced=["joints"])
+    symbolic = read_system(robot)
+    model = import_package(package).load("autograd")
+    graph = overlay(model, 0, 0, model.graph_parts(0, 0))
+    query = TermQuery(joint=None, order=0)
+    page = json.loads(page_data(analysis))
+    said = {name: _texts(analysis.figure(name)) for name in ("causes", "shares", "induced")} | {
+        "page": [page["potential"]],
+        "page, induced": [curve["label"] for curve in page["induced"][0]["curves"]],
+        "notebook": [analysis._repr_html_().replace("<td>", " ")],
+        "graph": [part_label(graph, at) for at in range(len(graph.parts))],
+        "terms": [terms_markdown(terms_report(symbolic, query, 10**6, False, silent))],
+        "C": [*quantity_lines(symbolic, linear=False), potential(symbolic)],
+    }
+    for place, texts in said.items():
+        if place != "notebook":  # which has the largest cause alone
+            assert any(word in text for text in texts), place
+        assert word == "gravity" or not any("gravity" in text for text in texts), place
+    meanings = [column["meaning"] for column in analysis.record()["columns"]]
+    assert all("other potentials" in meaning for meaning in meanings if "gravity" in meaning)
+
+
+def _texts(figure: Any) -> list[str]:
+    return [text.get_text() for text in figure.findobj(Text)]

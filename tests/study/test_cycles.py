@@ -1,0 +1,80 @@
+"""Cycles of a trial: in order, wherever blocks of samples end, and without what lies between them."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from helpers.motion_logs import JOINTS, write_csv
+from helpers.studies import Here
+from linkwise import LinkwiseError
+from linkwise.study import run_study
+from linkwise.study.cycles import CycleSink, written_cycles
+
+TIME = np.arange(0, 60, 0.01)
+ROWS = np.stack([TIME, np.sin(TIME), TIME**2])
+
+
+@pytest.mark.parametrize("size", [37, 500, 6000])
+def test_cycles_are_the_same_wherever_blocks_end(size: int) -> None:
+    spans = [(0.0, 1.3), (1.3, 2.0), (1.5, 2.5), (20.004, 31.006), (55.0, TIME[-1])]
+    found: dict[int, np.ndarray] = {}
+    sink = CycleSink(spans, 11, found.__setitem__)
+    most = 0
+    for at in range(0, len(TIME), size):
+        sink(ROWS[:, at : at + size])
+        most = max(most, sum(block.shape[1] for block in sink._kept))
+    sink.finish()
+    for number, (start, end) in enumerate(spans):
+        at = np.linspace(start, end, 11)
+        np.testing.assert_allclose(found[number], [at, np.sin(at), at**2], atol=1e-8)
+    assert most <= 1200 + 2 * size, "the longest cycle, and not what lies between"
+
+
+BAD = {
+    "no header": ("a,b\n", "name its columns trial, start and end"),
+    "a word": ("trial,start,end\na,x,2\n", "row 2: start and end are numbers"),
+    "backwards": ("trial,start,end\na,0,1\na,2,1\n", "row 3: the cycle from 2 to 1 s does not go forwards"),
+    "no number": ("trial,start,end\na,nan,2\n", "row 2: the cycle from nan to 2 s does not go forwards"),
+    "a column twice": ("trial,start,end,start\na,1,2,0\n", "columns 2 and 4 are both named 'start'"),
+    "latin": ("trial,start,end\n\xe4,1,2\n", "not a table of text in UTF-8"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_table_that_is_none_is_told_with_its_row(case: str, tmp_path: Path) -> None:
+    text, message = BAD[case]
+    table = tmp_path / "cycles.csv"
+    table.write_text(text, encoding="latin-1")
+    with pytest.raises(LinkwiseError, match=message):
+        written_cycles(str(table))
+
+
+WAYS = {
+    "a column": ('start = "stands>0.5"', [(0.5, 1.5), (1.5, 2.5)]),
+    "as long as it lasts": ('during = "stands"', [(0.5, 0.79), (1.5, 1.79), (2.5, 2.79)]),
+    "a load": ('start = "push>20"', [(0.25, 1.25), (1.25, 2.25)]),
+    "a table": ('table = "cycles.csv"', [(0.305, 0.9), (1.0, 2.0), (2.0, 2.99)]),
+    "a length": ('table = "cycles.csv"\nshortest = 0.7', [(1.0, 2.0), (2.0, 2.99)]),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_cycles_begin_by_a_column_a_load_or_a_table(way: str, tmp_path: Path) -> None:
+    text, spans = WAYS[way]
+    time = np.round(np.arange(0, 3, 0.01), 2)
+    stands, pushed = (((time - begin) % 1 < 0.295) & (time >= begin) for begin in (0.5, 0.25))
+    q = np.sin(time)[:, None] * [1, 0.5, 0.2]
+    write_csv(tmp_path / "a.csv", np.column_stack([time, q, stands]), (*JOINTS, "stands"))
+    forces = np.column_stack([time, 50.0 * pushed, 0 * time, 0 * time])
+    write_csv(tmp_path / "forces.csv", forces, [f"push:link3/force_{axis}" for axis in "xyz"])
+    (tmp_path / "cycles.csv").write_text("trial,start,end\nb,0,1\na,1,2\na,0.305,0.9\na,2,2.99\n")
+    entry = 'log = "a.csv"\nrobot = "planar3"\nloads = ["forces.csv"]\n'
+    file = tmp_path / "study.toml"
+    trials = "".join(f'[[trial]]\nname = "{name}"\n{entry}' for name in "ab")
+    choices = "[analysis]\nignore_extra = true\n"
+    file.write_text(f"schema = 1\npages = false\n{choices}[cycles]\n{text}\n{trials}")
+    assert run_study(file, tmp_path / "out", Here()).broken == ()
+    table = pd.read_parquet(tmp_path / "out/trials/a/samples.parquet")
+    ends = table.groupby("cycle").time.agg(["min", "max"]).to_numpy()
+    np.testing.assert_allclose(ends, spans, atol=1e-9)
