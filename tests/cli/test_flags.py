@@ -168,7 +168,7 @@ def test_analyze_writes_what_is_asked_for(
     monkeypatch.setattr("linkwise.cli.analyze.opened_robot", lambda *given: "the robot")
     out, log, robot, asked, _ = called("analyze", "analyze_to", chosen)
     assert (out, log, robot) == (Path("out"), Path("walk.csv"), "the robot")
-    assert (asked.reading, asked.processing, asked.wanted) == (Reading(), Processing(), wanted)
+    assert (asked.reading, asked.processing, asked.outputs) == (Reading(), Processing(), wanted)
 
 
 def test_every_flag_of_a_robot_is_the_option_of_its_name(called: Any) -> None:
