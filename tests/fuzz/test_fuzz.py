@@ -62,7 +62,7 @@ BAD = {
 
 @pytest.fixture(scope="module")
 def hasty() -> Iterator[Client]:
-    with Client(seconds=1.0, modules=("linkwise.cli.inspect",)) as started:
+    with Client(seconds=3.0, modules=("linkwise.cli.inspect",)) as started:
         yield started
 
 
