@@ -1,4 +1,4 @@
-"""What tests compile is kept by all that it is made of, where it went well; a file of tests leaves no memory."""
+"""What tests compile is kept by all that it is made of, and a file of tests leaves no memory."""
 
 import sys
 from collections.abc import Sequence
