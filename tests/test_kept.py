@@ -66,8 +66,7 @@ def test_it_is_made_again_by_another_compiler_or_with_other_words(compiler: str,
     kept.run_kept([compiler, "-O1", source], tmp_path / "made.o")
     kept.run_kept([compiler, source])
     assert times(tmp_path) == 3
-    Path(compiler).write_text(Path(compiler).read_text().replace("version 1", "version 2"))
-    kept.version_of.cache_clear()
+    Path(compiler).write_text(Path(compiler).read_text().replace("version 1", "version 12"))
     kept.run_kept([compiler, source], tmp_path / "made.o")
     assert times(tmp_path) == 4
 
@@ -100,6 +99,9 @@ def test_of_a_list_those_are_run_that_were_not_run_before(compiler: str, tmp_pat
         with pytest.raises(RuntimeError, match="wrong"):
             run([[compiler, "-wrong", source, "-o", made]], lambda _: None)
     assert len(asked) == 4
+    with pytest.raises(RuntimeError, match="wrong"):  # in the words of what runs it
+        run([["/no/compiler", "-wrong", "-o", made]], lambda _: None)
+    assert len(asked) == 5
 
 
 def test_packages_of_a_file_of_tests_are_forgotten_and_those_of_the_session_stay(

@@ -46,26 +46,34 @@ def keeping(run_all: RunAll) -> RunAll:
 
     def run(commands: Sequence[Sequence[str]], tell: Callable[[str], None]) -> None:
         missing = []
-        for command in commands:
-            *words, _, target = command
-            kept = _place(words, Path(target), Path.cwd())
-            if kept.is_dir():
-                _restore(kept, Path(target))
-            else:
-                missing.append((command, kept))
+        try:
+            for command in commands:
+                *words, _, target = command
+                kept = _place(words, Path(target), Path.cwd())
+                if kept.is_dir():
+                    _restore(kept, Path(target))
+                else:
+                    missing.append((command, kept))
+        except (
+            OSError,
+            subprocess.CalledProcessError,
+        ):  # none at all: who runs it has words for that
+            return run_all(commands, tell)
         run_all([command for command, _ in missing], tell)
         for command, kept in missing:
-            with _made(kept) as made:
-                shutil.copy(command[-1], made)
+            if Path(command[-1]).is_file():
+                with _made(kept) as made:
+                    shutil.copy(command[-1], made)
 
     return run
 
 
 def _place(words: Sequence[str], target: Path | None, folder: Path) -> Path:
-    """Return the folder for what a command makes, by its words and all texts that it may read."""
-    ending = "" if target is None else target.suffix
-    heads = (version_of(words[0]), processor(), ending, str(target is None))
-    digest = hashlib.sha256("\0".join(heads).encode())
+    """Return the folder for what a command makes, by its program, words, and all texts that it may read."""
+    program = Path(shutil.which(words[0]) or words[0])
+    found, ending = program.stat(), None if target is None else target.suffix
+    heads = (str(program), found.st_size, found.st_mtime_ns, version_of(program), processor(), ending)
+    digest = hashlib.sha256(repr(heads).encode())
     for part in _told(words, folder):
         digest.update(len(part).to_bytes(8) + part)
     return CACHE / digest.hexdigest()[:32]
@@ -110,6 +118,6 @@ def _told(words: Sequence[str], folder: Path) -> Iterator[bytes]:
 
 
 @cache
-def version_of(tool: str) -> str:
+def version_of(tool: Path) -> str:
     """Return what a compiler or an analyser says of itself."""
     return subprocess.run([tool, "--version"], capture_output=True, text=True, check=True).stdout
