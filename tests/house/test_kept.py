@@ -4,9 +4,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import kept
 import pytest
 from conftest import SHARED, forget_packages, held_megabytes
+from helpers import kept
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
 
