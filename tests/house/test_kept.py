@@ -1,4 +1,4 @@
-"""What tests compile is kept by all that it is made of, and a file of tests leaves no memory."""
+"""Results of compilers are kept by all that they are made of, and a file of tests leaves no memory."""
 
 import sys
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ def compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def times(folder: Path) -> int:
-    """How often the compiler ran."""
+    """Count how often the compiler ran."""
     said = folder / "said"
     return len(said.read_text().splitlines()) if said.is_file() else 0
 
