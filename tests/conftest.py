@@ -106,6 +106,8 @@ def pytest_collection_finish() -> None:
 def _forget() -> Iterator[None]:
     """A file of tests leaves no memory with what it imported or compiled for itself."""
     yield
+    if robots := sys.modules.get("linkwise.study.robots"):
+        robots.loaded.cache_clear()  # whose packages are forgotten next
     forget_packages()
     foreign_text.cache_clear()  # by texts of packages
     if compiler := sys.modules.get("torch._dynamo"):

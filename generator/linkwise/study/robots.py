@@ -94,11 +94,11 @@ def _refuse_unread(robot: str, package: Path) -> None:
 def opened_robot(robot: str, plan: StudyPlan) -> OpenedRobot:
     """Return a trial's robot, loaded; those of the last trials are kept in memory."""
     directory = package_of(robot, plan).directory
-    return _loaded(directory, version_of(str(directory / FILE)))
+    return loaded(directory, version_of(str(directory / FILE)))
 
 
 @lru_cache(ROBOTS)
-def _loaded(directory: Path, version: str) -> OpenedRobot:
+def loaded(directory: Path, version: str) -> OpenedRobot:
     """Return the robot of a package whose manifest is of that version."""
     return load_robot(directory)
 
