@@ -149,6 +149,18 @@ def test_joints_with_motors_then_with_springs_are_rather_independent(tmp_path: P
     assert robot_of(written(tmp_path, "both.xml", sprung.format(more=motor))).independent == (2,)
 
 
+def test_of_joints_with_motors_one_that_follows_another_is_rather_dependent(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    text = """<mujoco><option gravity="0 0 0"/><worldbody>
+      <body><joint name="near" axis="0 1 0"/><geom size="0.1" mass="1"/>
+        <body pos="0.3 0 0"><joint name="far" axis="0 1 0"/><geom size="0.1" mass="1"/></body></body>
+      </worldbody><actuator><motor joint="near"/><motor joint="far"/></actuator>
+      <equality><joint joint1="{follower}" joint2="{other}"/></equality></mujoco>"""
+    for follower, other, free in (("near", "far", 1), ("far", "near", 0)):
+        path = written(tmp_path, f"{follower}.xml", text.format(follower=follower, other=other))
+        assert robot_of(path).independent == (free,)
+
+
 def test_joints_that_urdf_files_have_actuators_on_are_rather_independent(tmp_path: Path) -> None:
     beside = str(written(tmp_path, "loop.toml", LOOP))
     commanded = '<ros2_control><joint name="c"><command_interface name="effort"/></joint></ros2_control>'
