@@ -149,6 +149,12 @@ def test_joints_with_motors_then_with_springs_are_rather_independent(tmp_path: P
     assert robot_of(written(tmp_path, "both.xml", sprung.format(more=motor))).independent == (2,)
 
 
+def test_a_sum_with_a_slope_is_taken_whatever_the_sizes_of_its_terms(tmp_path: Path) -> None:
+    arm = urdf_text.chain(urdf_text.joint("ab", "a", "b"), urdf_text.joint("bc", "b", "c"))
+    beside = written(tmp_path, "sum.toml", COUPLED + "terms = { ab = [0, 0, 1e9], bc = 1 }")
+    assert robot_of(written(tmp_path, "arm.urdf", arm), constraints=str(beside)).independent == (1,)
+
+
 def test_of_joints_with_motors_one_that_follows_another_is_rather_dependent(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     text = """<mujoco><option gravity="0 0 0"/><worldbody>
