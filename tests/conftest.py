@@ -151,6 +151,6 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     for report in terminalreporter.getreports("skipped"):
         where, _, reason = report.longrepr if isinstance(report.longrepr, tuple) else ("", 0, "")
         of_reason = files.setdefault(reason.removeprefix("Skipped: "), Counter())
-        of_reason[Path(report.nodeid.split("::")[0] or where).name] += 1
+        of_reason["/".join(Path(report.nodeid.split("::")[0] or where).parts[-2:])] += 1
     for reason, counts in sorted(files.items()):
         terminalreporter.write_line(f"skipped {counts.total()} of {', '.join(counts)}: {reason}")

@@ -24,9 +24,8 @@ def test_a_page_runs_as_printed(page: Path, tmp_path: Path) -> None:
     if reason := pages.lacking(page):
         pytest.skip(reason)
     # Each in a process of its own: their packages have the same names.
-    script = (
-        f"import pages, pathlib; pages.run_page(pathlib.Path({str(page)!r}), pathlib.Path({str(tmp_path)!r}))"
-    )
+    paths = f"pathlib.Path({str(page)!r}), pathlib.Path({str(tmp_path)!r})"
+    script = f"import pathlib; from tools import pages; pages.run_page({paths})"
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", script],
         cwd=ROOT / "tests",

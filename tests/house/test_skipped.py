@@ -9,7 +9,7 @@ import pytest
 from helpers.needed import missing
 
 TESTS = Path(__file__).parents[1]
-PAGES = "test_analysis_browser.py"
+PAGES = "analysis/test_browser.py"
 
 
 @pytest.mark.ship

@@ -251,7 +251,7 @@ class AnalysisResult(WholeMovement):
         return np.stack([ground.wrench(c, self.robot.model, self.q, forces) for c in each], axis=1)
 
     def dense(self, quantity: str) -> Array:
-        """Return a quantity over its axes, (S, *axes), zero where it has no row."""
+        """Return a quantity (S, …) over its axes, zero where it has no row."""
         return self.rows.dense(quantity, self.values)
 
     def is_ever_on(self, contact: int) -> bool:
