@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parents[1] / "tests"))
 
-from pages import run_page  # noqa: E402
+from tools.pages import run_page  # noqa: E402  # in the folder that the line above adds
 
 LENGTHS = (0.30, 0.26, 0.17)
 COLOUR_OF = {"shoulder": VERMILION, "elbow": BLUE, "wrist": GREEN}

@@ -193,3 +193,16 @@ def test_documentation_begins_with_what_it_tells_of(folder: str) -> None:
     told = [line for path in files for line in documentation(path)]
     assert told
     assert not [line for line in told if FRAGMENTS.match(line.split(": ", 1)[1])]
+
+
+def test_what_tests_share_is_imported_by_its_folder() -> None:
+    tests = ROOT / "tests"
+    stems = {path.stem for path in tests.rglob("*.py")}
+    for path in sorted((*tests.rglob("*.py"), *(ROOT / "docs").rglob("*.py"))):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and node.level == 0:
+                names = [str(node.module)]
+            for first in (name.partition(".")[0] for name in names):
+                places = (tests / first, tests / f"{first}.py", path.with_name(f"{first}.py"))
+                assert first not in stems or any(place.exists() for place in places), f"{path}: {first}"
