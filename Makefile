@@ -49,9 +49,9 @@ demo-control: $(READY)
 # What compilers made of what, which later runs find again; Python's too, which every process that a test starts reads.
 KEPT = LINKWISE_TEST_CACHE=$(CURDIR)/.cache/tests TORCHINDUCTOR_CACHE_DIR=$(CURDIR)/.cache/inductor PYTHONDONTWRITEBYTECODE=
 
-# Two files of tests at a time.
+# Three files of tests at a time, for two cores: some wait for a browser, a server or a process that ends.
 test: $(READY)
-	$(KEPT) $(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not ship"
+	$(KEPT) $(BIN)/python -m pytest --numprocesses 3 --dist loadfile -m "not ship"
 
 # What leaves the house, as others get it: pages, wheels, CMake's projects, exports, other processors and systems; minutes.
 ship: $(READY)

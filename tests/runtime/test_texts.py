@@ -12,7 +12,8 @@ from conftest import DATA
 from linkwise import LinkwiseError, Options, check_package, generate, read_system, write_package
 from linkwise.errors import LinkwiseWarning
 from linkwise.expression.expression_graph import FUNCTIONS as OF_GRAPHS
-from linkwise.package.emitted_text import FUNCTIONS, Source, foreign_text
+from linkwise.package.emitted_c import FUNCTIONS
+from linkwise.package.emitted_text import Source, foreign_text
 from linkwise.package.load import open_package
 from linkwise.package.manifest import FILE
 from linkwise_runtime.version import VERSION

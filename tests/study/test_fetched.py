@@ -54,7 +54,7 @@ class Sender(BaseHTTPRequestHandler):
 def flood() -> Iterator[Flood]:
     pytest.importorskip("aiohttp")
     with Flood() as server:
-        Thread(target=server.serve_forever, daemon=True).start()
+        Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
         yield server
         server.shutdown()
 
