@@ -4,13 +4,14 @@
     energies in Python ─read_energies───────────▶ EnergySystem ─┤
                                                                 ▼
     constrained_system   loops are closed, and independent coordinates found
+    plan           the kernel is chosen, and what files there will be
     derive         closed forms, link by link: by the rigid-link rule, which differentiates nothing, or
                    by Euler–Lagrange from energies, those that a user wrote or, if asked for, those of rigid
                    links; left out where the kernel is in loops
     package_files  their text in each back end, the runtime, the manifest
 
-SymPy energies of rigid links take no part in this otherwise: they are worked out for what shows or
-differentiates them, the autograd back end, formulas and reports.
+SymPy energies of rigid links take no part in this otherwise: they are worked out for formulas and reports.
+The autograd back end has a rigid link's energies from its joints and its body (`emit.rigid_energy`).
 """
 
 from collections.abc import Iterable, Mapping

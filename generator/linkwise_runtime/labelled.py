@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arguments import has_tensors
-from .call_table import CALLS, Call
+from .call import Call
+from .call_table import CALLS
 from .chosen_names import choice, short
 from .named_arrays import Part, SampleAxes, alone, arrays_in_order, dataset, samples_along, xarray
 from .quantities import AppliedLoad

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arguments import shape_of
-from .call_table import ORDER, Quantity
+from .call import ORDER, Quantity
 from .chosen_names import choice, short
 from .robot_axes import NamedAxis, Unit, inertial, measured, product, written
 

@@ -69,11 +69,17 @@ NO_LIMITS = JointLimits((), (), (), ())
 """Limits of a structure that was made without any."""
 
 
-class PassiveJoint(NamedTuple):
-    """A joint on a coordinate, counted from 0; rest is the p at which its spring is without load."""
+@dataclass(frozen=True)
+class PassiveJoint:
+    """Passive properties of a joint, at the position p = ratio · q of a coordinate, in rad or m.
+
+    To move it takes stiffness (p − rest) + damping ṗ + friction sign(ṗ) + armature p̈, in N·m or N, beside
+    its links' share.
+    """
 
     joint: str
     coordinate: int
+    """Index of the coordinate."""
     ratio: float
     """dp/dq; not 1 where the joint follows another one."""
     stiffness: float = 0.0

@@ -17,7 +17,7 @@ from linkwise.analysis.show.drawn_curves import largest_few
 from linkwise.analysis.show.page import page_data, poses
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
-from linkwise.package.manifest import BodyEntry
+from linkwise.package.entries import BodyEntry
 from matplotlib.figure import Figure
 
 

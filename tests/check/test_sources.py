@@ -28,8 +28,8 @@ from linkwise.oracle.reference import (
     torque_reference,
 )
 from linkwise.oracle.states import States, random_states, states_where
-from linkwise.package.entries import JointEntry
-from linkwise.package.manifest import EnergyEntry, Manifest
+from linkwise.package.entries import EnergyEntry, JointEntry
+from linkwise.package.manifest import Manifest
 from linkwise.symbolic.definition import rigid_tree
 
 LEG, TURNTABLE = str(DATA / "leg.toml"), str(DATA / "turntable.py")

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from helpers.urdf_text import joint, link, mimic, robot
 from linkwise import LinkwiseError, Options, read_robot
-from linkwise.robot.robot import Passive, PassiveAxis
+from linkwise_runtime.structure import PassiveJoint
 
 HINGE = '<dynamics damping="0.5" friction="0.2"/>'
 SPRING = """<gazebo reference="ab"><springStiffness>3</springStiffness><springReference>0.4</springReference>
@@ -14,7 +14,7 @@ ROTOR = """<transmission xmlns:drake="http://drake.mit.edu"><joint name="bc"/>
 <actuator><drake:rotor_inertia value="2e-4"/><drake:gear_ratio value="50"/></actuator></transmission>"""
 
 
-def read(path: Path, text: str, **options: object) -> tuple[PassiveAxis, ...]:
+def read(path: Path, text: str, **options: object) -> tuple[PassiveJoint, ...]:
     path.write_text(text)
     return read_robot(path, Options(**options)).passive  # type: ignore[arg-type]
 
@@ -28,11 +28,11 @@ def test_urdf_and_its_simulators_say_what_joints_have_of_their_own(tmp_path: Pat
         ROTOR,
     )
     assert read(tmp_path / "arm.urdf", text) == (
-        PassiveAxis("ab", 0, 1.0, Passive(3.0, 0.4, 0.5, 0.2)),
-        PassiveAxis("bc", 1, 1.0, Passive(armature=0.5)),
+        PassiveJoint("ab", 0, 1.0, 3.0, 0.4, 0.5, 0.2),
+        PassiveJoint("bc", 1, 1.0, armature=0.5),
     )
     (held,) = read(tmp_path / "arm.urdf", text, lock={"ab": 0.1})
-    assert held == PassiveAxis("bc", 0, 1.0, Passive(armature=0.5))
+    assert held == PassiveJoint("bc", 0, 1.0, armature=0.5)
 
 
 def test_joint_that_follows_another_has_its_rest_counted_from_its_offset(tmp_path: Path) -> None:
@@ -41,8 +41,7 @@ def test_joint_that_follows_another_has_its_rest_counted_from_its_offset(tmp_pat
         *map(link, "abc"), joint("ab", "a", "b", inner=follows + HINGE), joint("bc", "b", "c"), SPRING
     )
     (found,) = read(tmp_path / "arm.urdf", text)
-    assert (found.joint, found.coordinate, found.ratio) == ("ab", 0, -2.0)
-    assert found.own == Passive(3.0, 0.4 - 0.3, 0.5, 0.2)
+    assert found == PassiveJoint("ab", 0, -2.0, 3.0, 0.4 - 0.3, 0.5, 0.2)
 
 
 ARM = """schema = 1
@@ -56,7 +55,8 @@ link = [{{name = "rod", mass = 1, com = [0.1, 0, 0], inertia = {{xx = 1, yy = 1,
 def test_toml_says_it_in_the_joints_table(tmp_path: Path) -> None:
     own = 'stiffness = 3, rest = "pi/2", damping = 0.5, friction = 0.2, armature = 0.01'
     (found,) = read(tmp_path / "arm.toml", ARM.format(type="revolute", own=own))
-    assert found.own == Passive(3.0, pytest.approx(1.5707963267948966), 0.5, 0.2, 0.01)  # type: ignore[arg-type]
+    rest = pytest.approx(1.5707963267948966)
+    assert found == PassiveJoint("ab", 0, 1.0, 3.0, rest, 0.5, 0.2, 0.01)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_what_no_joint_has_is_named(kind: str, own: str, message: str, tmp_path:
 def test_losses_below_zero_are_taken_where_they_are_allowed(tmp_path: Path) -> None:
     text = ARM.format(type="revolute", own="damping = -1")
     (found,) = read(tmp_path / "arm.toml", text, allow_unphysical=True)
-    assert found.own == Passive(damping=-1.0)
+    assert found == PassiveJoint("ab", 0, 1.0, damping=-1.0)
 
 
 def test_numbers_that_the_format_does_not_have_are_told_as_ignored(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ import pytest
 from conftest import DATA, needs_compiler
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
-from linkwise_runtime.call_table import CALLS, PACKED, REQUIRED, Call, Quantity
+from linkwise_runtime.call import PACKED, Call, Quantity
+from linkwise_runtime.call_table import CALLS, REQUIRED
 from linkwise_runtime.constraints.robot_constraints import Constraints
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.kinematics.robot_kinematics import Kinematics

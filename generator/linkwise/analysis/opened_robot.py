@@ -16,6 +16,7 @@ from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.file_joints import FileJoint, Order
 from linkwise_runtime.qpos_motion import Qpos
 from linkwise_runtime.rule.joint_tree import TreeFrame
+from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.contacts.ground import GroundContacts
@@ -24,8 +25,9 @@ from linkwise.analysis.settings import Payload
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, without_ending
 from linkwise.oracle.newton_euler import NewtonEuler
+from linkwise.package.entries import BodyEntry
 from linkwise.package.load import Package, open_package
-from linkwise.package.manifest import FILE, BodyEntry, PassiveEntry
+from linkwise.package.manifest import FILE
 from linkwise.package.potential_word import potential_word
 
 
@@ -53,7 +55,7 @@ class OpenedRobot:
     package: Package
     recursion: NewtonEuler | None = None
     """Independent computation of partial torques; None where the energies were written by hand."""
-    passive: tuple[PassiveEntry, ...] = ()
+    passive: tuple[PassiveJoint, ...] = ()
     """Passive elements of the joints that have any: springs, damping, friction, armatures."""
     payloads: tuple[Payload, ...] = ()
     """Payloads, which follow the robot's own links in `links`."""

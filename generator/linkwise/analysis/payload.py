@@ -15,8 +15,8 @@ from linkwise.analysis.term_rows import NAMES, TermArrays
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.oracle.newton_euler import NewtonEuler
+from linkwise.package.entries import BodyEntry, LinkEntry, RigidTree
 from linkwise.package.load import Package
-from linkwise.package.manifest import BodyEntry, LinkEntry, RigidTree
 
 UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 NOTHING = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

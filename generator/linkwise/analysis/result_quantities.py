@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from linkwise_runtime import call_table
-from linkwise_runtime.call_table import CALLS, PASSIVE_KINDS, PROPAGATION, TORQUE, Quantity
+from linkwise_runtime.call import Quantity
+from linkwise_runtime.call_table import CALLS, PASSIVE_KINDS, PROPAGATION, TORQUE
 
 MOTION = ("tau_qdd", "tau_qd")
 """The parts of a partial torque by the motion of each joint."""
@@ -17,7 +18,7 @@ PASSIVE = {
     "tau_armature": "armature",
 }
 """Parts of a joint's torque beside those of the links, in the order of `passive_torque`, each with the field
-of a `PassiveEntry` that is zero where there is no such part."""
+of a `PassiveJoint` that is zero where there is no such part."""
 TORQUE_OF = {
     torque.replace("tau", "power", 1): torque for torque in ("tau", "tau_link", "tau_load", *TERMS, *PASSIVE)
 }

@@ -28,7 +28,8 @@ from linkwise.analysis.logs.checks import require_finite
 from linkwise.analysis.settings import Reading
 from linkwise.arrays import Array
 from linkwise.errors import within
-from linkwise.package.manifest import BodyEntry, Manifest
+from linkwise.package.entries import BodyEntry
+from linkwise.package.manifest import Manifest
 from linkwise.progress import Progress
 
 SLOW = 5.0

@@ -17,7 +17,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.oracle.contacts import contact_rows
 from linkwise.oracle.loop_equations import LoopEquations
 from linkwise.oracle.newton_euler import NewtonEuler
-from linkwise.package.manifest import RigidTree
+from linkwise.package.entries import RigidTree
 
 LIMIT = 1e-9
 """A relative error above this is not rounding: the package does not compute what it says."""

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.check.compare import Entries
 from linkwise.check.compiled_c import Numbers, Prototype
@@ -11,7 +12,6 @@ from linkwise.check.frame_checks import FrameReference
 from linkwise.check.sum_checks import REGULAR, SHARES, SINGLE, acceleration_scales, passive_reference, regular
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import States
-from linkwise.package.entries import PassiveEntry
 from linkwise.package.manifest import Manifest
 
 CONTROL = {
@@ -89,7 +89,7 @@ def _masses(call: Call, function: Prototype, reference: Reference) -> Iterator[E
 
 
 def _passive_torques(
-    call: Call, function: Prototype, reference: Reference, joints: Sequence[PassiveEntry]
+    call: Call, function: Prototype, reference: Reference, joints: Sequence[PassiveJoint]
 ) -> Iterator[Entries]:
     for row in _some(np.arange(len(reference.states.q))):
         state = reference.states.at(np.array([row]))
@@ -100,7 +100,7 @@ def _passive_torques(
 
 
 def _accelerations(
-    call: Call, function: Prototype, reference: Reference, joints: Sequence[PassiveEntry]
+    call: Call, function: Prototype, reference: Reference, joints: Sequence[PassiveJoint]
 ) -> Iterator[Entries]:
     """Yield accelerations under the reference's torques and the passive torques of `joints`."""
     least = SINGLE if function.real == "float" else REGULAR

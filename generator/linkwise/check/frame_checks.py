@@ -17,7 +17,8 @@ from linkwise.oracle.magnitudes import Magnitudes
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import COMPLEX_STEP, TOLERANCE
 from linkwise.oracle.states import States
-from linkwise.package.manifest import Manifest, RigidTree
+from linkwise.package.entries import RigidTree
+from linkwise.package.manifest import Manifest
 
 STATES = 12
 MOST_FRAMES = 16

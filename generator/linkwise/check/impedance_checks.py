@@ -5,13 +5,14 @@ from typing import Any
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.arrays import Array
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.sum_checks import is_tied, passive_reference, regular
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import States
-from linkwise.package.entries import PassiveEntry, RigidTree
+from linkwise.package.entries import RigidTree
 
 WIDTH = 0.5
 """Width `friction_width` of the friction that is compensated."""
@@ -57,7 +58,7 @@ def _are_masses(tree: RigidTree | None) -> bool:
 
 def _shaped(
     model: Dynamics,
-    joints: Sequence[PassiveEntry],
+    joints: Sequence[PassiveJoint],
     reference: Reference,
     rows: Any,
     kept: Array,
@@ -114,7 +115,7 @@ def _eliminated(inertia: Array) -> Array:
     return entries
 
 
-def _cancelled(model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference, rows: Any) -> Entries:
+def _cancelled(model: Dynamics, joints: Sequence[PassiveJoint], reference: Reference, rows: Any) -> Entries:
     """Return a torque that cancels the last link's velocity torques on the first joint that moves it.
 
     No inertia is changed.

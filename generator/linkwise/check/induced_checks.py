@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.arrays import Array, Index
 from linkwise.check.compare import Entries, Result, compare, skipped
@@ -14,7 +15,6 @@ from linkwise.check.model_calls import FLOAT32
 from linkwise.check.sum_checks import SINGLE, passive_reference, regular
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import States
-from linkwise.package.entries import PassiveEntry
 
 Quantity = tuple[Array, Array]
 """Values (samples, n, ...) and their scales."""
@@ -52,7 +52,7 @@ class _Sources:
 def induced_calls(
     name: str,
     model: Dynamics,
-    joints: Sequence[PassiveEntry],
+    joints: Sequence[PassiveJoint],
     reference: Reference,
     frames: FrameReference | None,
     load_of: Callable[..., Any],
@@ -81,7 +81,7 @@ def induced_calls(
 
 def _given(
     model: Dynamics,
-    joints: Sequence[PassiveEntry],
+    joints: Sequence[PassiveJoint],
     reference: Reference,
     rows: Index,
     kind: type = np.float64,
@@ -144,7 +144,7 @@ def _of_a_point(
     yield Entries(f"kinematic of {frame}", found.kinematic, rate * qd, change * np.abs(qd))
 
 
-def _sources(reference: Reference, rows: Index, joints: Sequence[PassiveEntry]) -> _Sources:
+def _sources(reference: Reference, rows: Index, joints: Sequence[PassiveJoint]) -> _Sources:
     """Return all sources but loads; the states' qdd serve as the actuators' torques."""
     states = reference.states.at(rows)
     values, scales = ({k: a[rows] for k, a in kept.items()} for kept in (reference.values, reference.scales))

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from typing import NamedTuple, TypeVar
 
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.arrays import Array
 from linkwise.check.c_functions import CFunctions
@@ -26,7 +27,7 @@ from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import Reference, body_reference, states_of_torques, torque_reference
 from linkwise.oracle.states import States, affordable, random_states
 from linkwise.own_process import ProcessLimits, in_own_process
-from linkwise.package.entries import PassiveEntry, RigidTree
+from linkwise.package.entries import RigidTree
 from linkwise.package.load import Package
 from linkwise.package.manifest import Manifest
 
@@ -121,7 +122,7 @@ class Subject:
         return self.tree is not None and self.tree.tied
 
     @property
-    def passive(self) -> tuple[PassiveEntry, ...]:
+    def passive(self) -> tuple[PassiveJoint, ...]:
         """Passive properties of the joints."""
         return () if self.tree is None else self.tree.passive
 

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.arrays import Array, Mask
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.model_calls import FLOAT32, TOO_LARGE
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import NUMBERS, States
-from linkwise.package.entries import PassiveEntry
 
 REGULAR = 1e-8
 """Least eigenvalue of a mass matrix, with ones on its diagonal, for which accelerations are checked."""
@@ -180,7 +180,7 @@ SHARES = ("spring", "damping", "friction", "armature")
 
 
 def passive_calls(
-    name: str, model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference
+    name: str, model: Dynamics, joints: Sequence[PassiveJoint], reference: Reference
 ) -> Iterator[Result]:
     """Yield checks of the call for many states, for one, and in single precision.
 
@@ -215,7 +215,7 @@ def passive_calls(
 
 
 def _torques_of_accelerations(
-    model: Dynamics, joints: Sequence[PassiveEntry], reference: Reference, at: Mask
+    model: Dynamics, joints: Sequence[PassiveJoint], reference: Reference, at: Mask
 ) -> Entries:
     """Return torques given to forward dynamics beside those that its accelerations need.
 
@@ -232,7 +232,7 @@ def _torques_of_accelerations(
     return Entries("tau", model.inverse_dynamics(q, qd, found) + taken.sum(0), tau, scale)
 
 
-def passive_reference(joints: Sequence[PassiveEntry], states: States) -> tuple[Array, Array]:
+def passive_reference(joints: Sequence[PassiveJoint], states: States) -> tuple[Array, Array]:
     """Return shares (4, samples, n), and the sizes of what they are summed from.
 
     For a joint at p = r q a torque f does the work f dp = r f dq: it counts r times on the coordinate.

@@ -5,7 +5,7 @@ without --verbose it reports no more than that where the output is no terminal.
 """
 
 import sys
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +15,7 @@ import typer
 
 from linkwise import pipeline
 from linkwise.cli import counted, tell
+from linkwise.cli.build_step import BuildStep, is_stale
 from linkwise.cli.depfile import depfile_text, own_modules
 from linkwise.cli.flags import RobotNames, takes, tell_run
 from linkwise.dynamics.derive import Method
@@ -22,11 +23,10 @@ from linkwise.emit.backend import BACKENDS
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.generator_fingerprint import generator_files
-from linkwise.input_file import is_inside, is_same
-from linkwise.option import REQUIRED, flag_of, option
-from linkwise.output import require_writable, sweep, write_files
+from linkwise.option import REQUIRED, option
+from linkwise.output import require_writable, sweep
 from linkwise.package.manifest import FILE
-from linkwise.package.write import check_target, differences, refuse_inside_package, write_package
+from linkwise.package.write import check_target, write_package
 from linkwise.progress import progress, silent
 from linkwise.robot import Options, effects, robot_files
 from linkwise.symbolic.system import RigidSystem
@@ -63,45 +63,6 @@ class PackageChoices:
 
 
 @dataclass(frozen=True)
-class BuildStep:
-    """Requests of a build tool beside the packages, or in their place."""
-
-    PANEL = "For build tools"
-    list_outputs: bool = option(False, "Print the paths that would be written; write none")
-    check: bool = option(
-        False, "Say which files differ from what would be written; write none; exit status 1 if any does"
-    )
-    depfile: Path | None = option(None, "File that gets, as a rule of make, what the packages depend on")
-    stamp: Path | None = option(
-        None,
-        "Empty file that is made anew at the end: the target of --depfile's rule, by default the "
-        "manifests, which keep their time where nothing differs",
-    )
-
-    @property
-    def writes(self) -> bool:
-        """True if packages are written."""
-        return not (self.list_outputs or self.check)
-
-    def check_flags(self) -> None:
-        """Raise LinkwiseError for a flag that writes nothing together with another one."""
-        given = [flag_of(name) for name, value in vars(self).items() if value]
-        if len(given) > 1 and not self.writes:
-            raise LinkwiseError(f"{given[0]} writes nothing and stands alone; leave {given[1]} out")
-
-    def finish(self, rule: str) -> None:
-        """Write the depfile with its rule, and make the stamp anew.
-
-        The stamp is the last of all: an interrupted build has none, or an older one.
-        """
-        if self.depfile is not None:
-            write_files(self.depfile.parent, {self.depfile.name: rule.encode()})
-        if self.stamp is not None:
-            self.stamp.parent.mkdir(parents=True, exist_ok=True)
-            self.stamp.touch()
-
-
-@dataclass(frozen=True)
 class Order:
     """A package that was asked for: its robot, the plan of its files, and their directory."""
 
@@ -131,7 +92,8 @@ def generate(robot: RobotNames, asked: PackageChoices, step: BuildStep, options:
     if step.list_outputs:
         tell(*((order.directory / path).as_posix() for order, files in packages for path in sorted(files)))
     elif step.check:
-        raise typer.Exit(_compare(packages, watched))
+        stale = [is_stale(files, order.directory, watched) for order, files in packages]
+        raise typer.Exit(STALE if any(stale) else 0)
     else:
         rule = "" if step.depfile is None else _rule(packages, options, step.stamp, before)
         _write(packages, asked, watched)
@@ -143,7 +105,8 @@ def _orders(robots: Sequence[str], asked: PackageChoices, step: BuildStep, optio
     orders = [_order(spec, asked, options) for spec in robots]
     tell_run(*robots)
     _check_places(orders)
-    _check_side_files(orders, [place for place in (step.depfile, step.stamp) if place is not None], options)
+    for order in orders:
+        step.check_places(order.robot, order.directory, options)
     if step.writes:
         for order in orders:
             require_writable(order.directory)
@@ -174,49 +137,6 @@ def _check_places(orders: Iterable[Order]) -> None:
                 "of them in its own call, with --name"
             )
         taken[order.directory] = order.robot
-
-
-def _check_side_files(orders: Sequence[Order], places: Iterable[Path], options: Options) -> None:
-    """Raise LinkwiseError for a depfile or a stamp in the place of an input or inside a package."""
-    for place in places:
-        refuse_inside_package(place.parent)
-        for order in orders:
-            inputs = any(is_same(place, path) for path in robot_files(order.robot, options))
-            if (
-                inputs
-                or place.is_dir()
-                or is_inside(place, order.directory)
-                or is_same(place, order.directory)
-            ):
-                raise LinkwiseError(
-                    f"{place} cannot be a depfile or a stamp: {order.robot} is read from it, or it is a "
-                    "folder or in a package; choose another name"
-                )
-
-
-def _compare(packages: Packages, watched: bool) -> int:
-    """Print how each package on disk differs from its files; return the exit status for any difference."""
-    status = 0
-    for order, files in packages:
-        found = differences(files, order.directory)
-        if not order.directory.is_dir():
-            tell(f"{order.directory} is not there: {counted(len(files), 'file')}")
-        elif found:
-            _tell_stale(order.directory, files, found)
-        elif watched:
-            tell(f"{order.directory} is up to date")
-        status = STALE if found else status
-    return status
-
-
-def _tell_stale(directory: Path, files: Collection[str], found: dict[str, str]) -> None:
-    kinds: dict[str, list[str]] = {}
-    for path, fault in found.items():
-        kinds.setdefault(fault, []).append(path)
-    gone = len(found.keys() - set(files))
-    more = f", and {gone} that would go" if gone else ""
-    tell(f"{directory} is stale: {counted(len(found) - gone, 'file')} of {len(files)}{more}")
-    tell(*(f"  {fault}: {listed(paths)}" for fault, paths in kinds.items()))
 
 
 def _rule(packages: Packages, options: Options, stamp: Path | None, before: Iterable[str]) -> str:

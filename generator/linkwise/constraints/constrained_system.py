@@ -92,7 +92,7 @@ def _proposed(robot: Robot, rows: Array) -> tuple[int, ...]:
     holds, those farthest from the ground, and the last.
     """
     followers = {coupling.follower for coupling in robot.couplings}
-    sprung = {axis.coordinate for axis in robot.passive if axis.own.stiffness}
+    sprung = {axis.coordinate for axis in robot.passive if axis.stiffness}
     free = range(len(robot.coordinates))
     depths = [min(_depths(robot, k), default=0) for k in free]
     slides = [coordinate.unit == "m" for coordinate in robot.coordinates]

@@ -19,7 +19,7 @@ Method = Literal["rule", "energy"]
 def link_forms(system: System, link: int, method: Method = "rule") -> LinkForms:
     """Return the closed forms of one link from its own path alone, whatever else the robot has.
 
-    For energies that a user wrote, they are derived from these in any case. Raises LinkwiseError for joints
+    Energies that a user wrote are differentiated whatever the method. Raises LinkwiseError for joints
     that follow curves.
     """
     refuse_curves(system)

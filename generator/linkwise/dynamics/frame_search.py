@@ -61,8 +61,9 @@ class FrameSearch:
     def _origin_in_words(self, chain: JointChain, origin: Origin) -> str:
         if origin.frame is None:
             mass, text = self.link.mass, "the link's centre of mass, moving with it"
-            number = isinstance(mass, (int, float)) and mass >= 0
-            return f"{text}; lengths are times the square root of its mass, {mass!r} kg" if number else text
+            scaled = isinstance(mass, (int, float)) and mass >= 0
+            scale = f"; lengths are multiplied by the square root of its mass, {mass!r} kg"
+            return text + scale if scaled else text
         if origin.frame == 0:
             return "the base's, at rest"
         return f"where joint {chain.label[origin.frame]} is at the instant, at rest"

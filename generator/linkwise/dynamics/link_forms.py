@@ -29,13 +29,15 @@ class Inputs:
 class LinkForms:
     """Link j's closed forms over its path(j), coordinates ascending; every dictionary is keyed (i, k) or i.
 
-    graph: the graph of the nodes           inputs: the motion
+    graph: the graph of the nodes
+    inputs: the motion
     frame: the common frame of its vectors in words, axes and origin; empty for hand-written energies
     acceleration: c2_ijk for i ≤ k, link j's mass matrix M^j, which is symmetric
     velocity: c1_ijk, of the closing convention
     velocity_linear: the part ∂h1/∂q̇ of c1 that stems from energy terms linear in q̇, zero where they have no
     force; empty where the energy has no such terms
-    gravity: g_ij                         torque: τ_ij
+    gravity: g_ij
+    torque: τ_ij
     decomposed_torque: τ_ij where the coefficients are computed too, the same value in the cheaper of two ways
     position_gradient: c0_ijk = ∂τ_ij/∂q_k
     energy: kinetic and potential energy of a link whose energies were written by hand

@@ -13,7 +13,7 @@ k one wrench (N, f) gives a column of coefficients, c_ijk = z_i · N + s_i · f:
 
     c2_k:  N = h × s_k + I z_k                f = m s_k + z_k × h
     c1_k:  N = h × ṡ_k + I ż_k + B z_k        f = m ṡ_k + ż_k × h + z_k × P
-    τ:     N and f likewise with the acceleration and twist of the link, minus gravity (g: gravity alone);
+    τ:     N and f likewise with the link's twist, and its acceleration minus gravity (g: gravity alone);
            where the coefficients are computed too, their sum is often cheaper (`torque_sums`)
 
 The position gradient follows from how a link's wrench F turns with joint k:

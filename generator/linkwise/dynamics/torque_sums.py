@@ -1,8 +1,8 @@
 """Torques from their own coefficients: τ_ij = g_ij + Σ_k (c2_ijk q̈_k + c1_ijk q̇_k).
 
-A decomposition has the coefficients at hand, so that on short paths τ is cheaper by this sum, two products
-for each (i, k), than by the link's wrench, which is computed once and pays on long paths. The sum is taken
-column by column: after joint k there is one value of τ for each joint i, however many coefficients there are.
+A decomposition has the coefficients at hand. On short paths τ costs less as this sum, two products for each
+(i, k); on long ones by the link's wrench, which is computed once. The sum is taken column by column: after
+joint k there is one value of τ for each joint i, however many coefficients there are.
 """
 
 from collections.abc import Mapping

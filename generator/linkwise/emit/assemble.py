@@ -19,7 +19,8 @@ from linkwise.emit.derivation import Derivation
 from linkwise.emit.shared_texts import init_text, names_text
 from linkwise.emit.vendored_runtime import with_runtime
 from linkwise.errors import LinkwiseError
-from linkwise.package.manifest import FILE, LinkEntry, Manifest, RuntimeEntry
+from linkwise.package.entries import LinkEntry, RuntimeEntry
+from linkwise.package.manifest import FILE, Manifest
 from linkwise.package.runtime_imports import RUNTIME
 from linkwise.progress import Progress, silent
 from linkwise.symbolic.definition import (

@@ -1,4 +1,4 @@
-"""The registry of back ends: adding one adds an entry here and touches no other list of names.
+"""The registry of back ends: adding one adds an entry here, and its name to LOOPS if loops serve it.
 
 An entry is read by the command line too, so this file imports emitters only when it emits.
 """

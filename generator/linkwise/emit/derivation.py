@@ -13,7 +13,7 @@ from linkwise.symbolic.system import System
 class Derivation:
     """Input of every back end: the system, the closed forms of each link, and the request that led to it.
 
-    Without closed forms, which rigid bodies alone can do, the package's kernel is in loops.
+    Rigid bodies alone can do without closed forms; the package's kernel is in loops then.
     """
 
     system: System

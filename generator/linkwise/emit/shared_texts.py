@@ -6,12 +6,12 @@ They are made only of what a manifest has too, so `linkwise check` makes them ag
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
-from linkwise_runtime.structure import JointLimits
+from linkwise_runtime.structure import JointLimits, PassiveJoint
 from linkwise_runtime.version import VERSION
 
 from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.escape import python_docstring, python_literal
-from linkwise.package.entries import FileJointEntry, JointEntry, KernelKind, PassiveEntry
+from linkwise.package.entries import FileJointEntry, JointEntry, KernelKind
 from linkwise.render import render
 
 LINE = 100
@@ -104,7 +104,7 @@ def names_text(
     linear: Iterable[int],
     parameters: Mapping[str, float],
     bodies: Sequence[BodyText],
-    passive: Sequence[PassiveEntry],
+    passive: Sequence[PassiveJoint],
     file_joints: Sequence[FileJointEntry],
 ) -> str:
     """Return names.py: the joints, the links, and what depends on parameters.
@@ -139,7 +139,7 @@ def _limit_text(what: str, joints: Iterable[JointEntry]) -> str:
     return f"({', '.join(numbers)},)"
 
 
-def _passive_text(entry: PassiveEntry) -> str:
+def _passive_text(entry: PassiveJoint) -> str:
     """Return the arguments of a PassiveJoint, which has the fields of the entry; zeros are its defaults."""
     joint, coordinate, ratio, *own = asdict(entry).items()
     moved = python_literal(joint[1]), repr(coordinate[1]), repr(ratio[1])

@@ -11,11 +11,12 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from linkwise_runtime.rule.joint_tree import TreeFrame
+from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.arrays import Array
 from linkwise.escape import printable
 from linkwise.identification.pseudo_inertia import central
-from linkwise.package.entries import BodyEntry, JointEntry, PassiveEntry, RigidTree
+from linkwise.package.entries import BodyEntry, JointEntry, RigidTree
 
 ENDLESS = 1e9
 """Limit that is written where there is none, as URDF requires one."""
@@ -125,7 +126,7 @@ def _limits(body: BodyEntry, joint: JointEntry) -> tuple[str, list[str]]:
     return kind, ["<limit " + " ".join(f'{what}="{value!r}"' for what, value in said.items()) + "/>"]
 
 
-def _passive(entry: PassiveEntry) -> list[str]:
+def _passive(entry: PassiveJoint) -> list[str]:
     """Return spring and armature of a joint, in extensions of URDF by simulators."""
     joint = _attribute(entry.joint)
     lines = []

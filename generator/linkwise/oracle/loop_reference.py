@@ -30,7 +30,8 @@ from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import by_unit
 from linkwise.oracle.rounding import measure_rounding
 from linkwise.oracle.states import States
-from linkwise.package.manifest import Manifest, RigidTree
+from linkwise.package.entries import RigidTree
+from linkwise.package.manifest import Manifest
 
 STATES = 12
 TRIED = 60

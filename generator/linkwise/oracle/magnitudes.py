@@ -14,7 +14,8 @@ import numpy as np
 from linkwise.arrays import Array
 from linkwise.oracle.newton_euler import Points, displacement_bound, path_of
 from linkwise.oracle.rounding import rounding_growth
-from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
+from linkwise.package.entries import BodyEntry, RigidTree
+from linkwise.package.manifest import Manifest
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ from numpy.polynomial import Polynomial
 
 from linkwise.arrays import Array, Index, Mask
 from linkwise.oracle.rounding import NoisyTree
-from linkwise.package.manifest import BodyEntry, Manifest, RigidTree
+from linkwise.package.entries import BodyEntry, RigidTree
+from linkwise.package.manifest import Manifest
 
 Points = Sequence[tuple[int | None, Array]]
 """Carrier of each point, a body or None for the ground, and the point in the carrier's axes, (3,)."""

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from linkwise_runtime.rule.joint_tree import TreeCoupling, TreeCurve, TreeFrame, TreeTie
+from linkwise_runtime.structure import PassiveJoint
 
 Row = tuple[float, float, float]
 
 KernelKind = Literal["straight", "loops"]
-"""Kernel of a package: its C is straight lines of closed forms, or loops over links and joints."""
+"""Kernel of a package: closed forms in straight lines, or none, with C in loops over links and joints."""
 
 PLACE = re.compile(
     r"(?:gravity|bodies\[(?P<body>\d+)\]\.(?:translation|com))\[[0-2]\]"
@@ -74,7 +75,7 @@ class FollowerEntry:
 class FileJointEntry:
     """A moving joint of the robot's file, its joints here by their indices, and its place in Pinocchio.
 
-    kind: as `FileJoint` in runtime.file_joints has it
+    kind: as `FileJoint` in linkwise_runtime.file_joints has it
     """
 
     name: str
@@ -106,23 +107,6 @@ class BodyEntry:
 
 
 @dataclass(frozen=True)
-class PassiveEntry:
-    """Passive properties of a body's joint, at the position p = ratio · q of a coordinate, in rad or m.
-
-    To move it takes stiffness (p − rest) + damping ṗ + friction sign(ṗ) + armature p̈, in N·m or N.
-    """
-
-    joint: str
-    coordinate: int
-    ratio: float
-    stiffness: float
-    rest: float
-    damping: float
-    friction: float
-    armature: float
-
-
-@dataclass(frozen=True)
 class RigidTree:
     """The rigid bodies, parents before children, the frames, and gravity in m/s² in the base's axes.
 
@@ -139,7 +123,7 @@ class RigidTree:
     gravity: Row
     bodies: tuple[BodyEntry, ...]
     frames: tuple[TreeFrame, ...]
-    passive: tuple[PassiveEntry, ...]
+    passive: tuple[PassiveJoint, ...]
     ties: tuple[TreeTie, ...]
     couplings: tuple[TreeCoupling, ...]
     independent: tuple[int, ...]

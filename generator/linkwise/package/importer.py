@@ -16,7 +16,8 @@ from linkwise_runtime.version import VERSION
 
 from linkwise.package.contents import link_on_the_way
 from linkwise.package.emitted_text import Source, foreign_text
-from linkwise.package.manifest import FILE, Manifest, RuntimeEntry, is_too_large
+from linkwise.package.entries import RuntimeEntry
+from linkwise.package.manifest import FILE, Manifest, is_too_large
 from linkwise.package.runtime_imports import of_library
 
 

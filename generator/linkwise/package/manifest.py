@@ -9,14 +9,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from linkwise_runtime.rule.joint_tree import TreeCoupling, TreeFrame, TreeTie
-
 from linkwise.errors import LinkwiseError
 from linkwise.output import sweep
 from linkwise.package.checked_tree import check_curve, check_tree
 from linkwise.package.decode import decode, parse_json, require
 from linkwise.package.entries import (
-    BodyEntry,
     CodeSize,
     EnergyEntry,
     FileJointEntry,
@@ -24,7 +21,6 @@ from linkwise.package.entries import (
     JointEntry,
     KernelKind,
     LinkEntry,
-    PassiveEntry,
     RigidTree,
     RuntimeEntry,
 )
@@ -33,25 +29,6 @@ SCHEMA = 14
 LARGEST = 1 << 28
 """Most bytes of a manifest, or of any file of a package; a manifest of a robot of 1000 joints takes some 2
 MB."""
-__all__ = [
-    "FILE",
-    "BodyEntry",
-    "CodeSize",
-    "EnergyEntry",
-    "JointEntry",
-    "LinkEntry",
-    "Manifest",
-    "PassiveEntry",
-    "RigidTree",
-    "RuntimeEntry",
-    "TreeCoupling",
-    "TreeFrame",
-    "TreeTie",
-    "altered_entries",
-    "is_inside",
-    "is_too_large",
-]
-
 FILE = "manifest.json"
 UNITS = {"angle": "rad", "length": "m", "mass": "kg", "time": "s", "torque": "N m", "force": "N"}
 CONVENTIONS = {

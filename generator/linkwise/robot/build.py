@@ -1,4 +1,4 @@
-"""Building a Robot from the description of a file: expand, cut, substitute, merge, and check."""
+"""Building a Robot from the description of a file: cut, split into axes, give coordinates, merge, check."""
 
 from dataclasses import replace
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.rule.joint_tree import TreeCurve
 from numpy.polynomial import polynomial
 
 Polynomial = tuple[float, ...]
@@ -15,15 +16,11 @@ Polynomial = tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class Curve:
+class Curve(TreeCurve):
     """Polynomials in x − start, each from its `start` to the next one's; the first holds before it too.
 
     The curve's values are in rad or m; x is in the unit of the coordinate that it follows.
     """
-
-    starts: tuple[float, ...]
-    """Places where the pieces begin, ascending; the first two may be the same."""
-    pieces: tuple[Polynomial, ...]
 
     def __call__(self, x: float, derivative: int = 0) -> float:
         """Return the value at x, or the value of a derivative of the given order."""

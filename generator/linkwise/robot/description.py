@@ -27,7 +27,7 @@ IDENTITY: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class Body:
     """A link as the file has it; com, and the inertia about it, are in the link's frame.
 
-    `origin` is the position of that frame's origin relative to the place of the link's joint, in the same
+    `origin` is the position of that frame's origin as seen from the place of the link's joint, in the same
     axes. `unphysical` holds the file's own reason for an inertia that no rigid body has (empty: none);
     `invented` says that the reader made the body up, between two axes of one joint.
     """
@@ -71,7 +71,7 @@ class Anchor:
 
 @dataclass(frozen=True)
 class AnchoredTie:
-    """A constraint between two bodies beside the tree, as the file has it; see `Tie` for its kinds."""
+    """A constraint between two bodies beside the tree, as the file has it; see `TreeTie` for its kinds."""
 
     name: str
     kind: TieKind

@@ -9,6 +9,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, replace
 from typing import Literal
 
+from linkwise_runtime.structure import PassiveJoint
+
 from linkwise.errors import LinkwiseError
 from linkwise.robot.coordinates import AxisRule, Movement
 from linkwise.robot.curve import Curve
@@ -22,7 +24,6 @@ from linkwise.robot.robot import (
     Follower,
     Limits,
     MovingJoint,
-    PassiveAxis,
     unusable,
 )
 
@@ -102,7 +103,7 @@ def checked_passive(connections: Iterable[Connection], allow_unphysical: bool) -
 
 def passive_axes(
     connections: Iterable[Connection], motion: Mapping[str, AxisRule]
-) -> tuple[PassiveAxis, ...]:
+) -> tuple[PassiveJoint, ...]:
     """Return the moving joints of one axis that have passive properties, with their coordinates.
 
     The rest of a joint at ratio · q + offset is counted from the offset.
@@ -112,11 +113,11 @@ def passive_axes(
         rule = motion.get(c.name)
         if c.passive != NOTHING and c.type in SINGLE and rule and rule.coordinate is not None:
             own = replace(c.passive, rest=c.passive.rest - rule.offset if c.passive.stiffness else 0.0)
-            found.append(PassiveAxis(c.name, rule.coordinate, rule.ratio, own))
+            found.append(PassiveJoint(c.name, rule.coordinate, rule.ratio, *astuple(own)))
     return tuple(found)
 
 
-def passive_notes(connections: Iterable[Connection], axes: Iterable[PassiveAxis]) -> Iterator[Note]:
+def passive_notes(connections: Iterable[Connection], axes: Iterable[PassiveJoint]) -> Iterator[Note]:
     """Yield a note on each passive property of each joint, kind by kind, with the file's numbers."""
     moving = {axis.joint for axis in axes}
     there = [c for c in connections if c.name in moving]

@@ -8,6 +8,7 @@ from typing import Any, Literal, TypeAlias
 
 import sympy as sp
 from linkwise_runtime.rule.joint_tree import TreeTie
+from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.curve import Curve
@@ -101,7 +102,8 @@ class Joint:
 class MovingJoint:
     """A joint of the file that moves, and its coordinates: fewer than its kind has where some are locked.
 
-    kind: as in `FileJoint` of runtime.file_joints; pinocchio: index among the joints of Pinocchio's model
+    kind: as in `FileJoint` of linkwise_runtime.file_joints
+    pinocchio: index among the joints of Pinocchio's model
     """
 
     name: str
@@ -151,17 +153,6 @@ class Limits:
 UNLIMITED = Limits()
 LIMITS = tuple(asdict(UNLIMITED))
 """Names of the kinds of limits."""
-
-
-@dataclass(frozen=True)
-class PassiveAxis:
-    """Passive properties of a joint at ratio · q of a coordinate q."""
-
-    joint: str
-    coordinate: int
-    """Index among the robot's coordinates."""
-    ratio: float
-    own: Passive
 
 
 @dataclass(frozen=True)
@@ -245,7 +236,7 @@ class Robot:
     notes: tuple[Note, ...] = field(default=(), compare=False)
     request: Mapping[str, Any] = field(default_factory=dict, compare=False)
     frames: tuple[Frame, ...] = ()
-    passive: tuple[PassiveAxis, ...] = ()
+    passive: tuple[PassiveJoint, ...] = ()
     ties: tuple[TreeTie, ...] = ()
     couplings: tuple[Coupling, ...] = ()
     requested_independent: tuple[str, ...] = ()

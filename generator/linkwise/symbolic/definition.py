@@ -5,12 +5,18 @@ from dataclasses import astuple
 from math import isfinite
 
 import sympy as sp
-from linkwise_runtime.rule.joint_tree import TreeCoupling, TreeCurve, TreeFrame
+from linkwise_runtime.rule.joint_tree import TreeCoupling, TreeFrame
 from sympy.printing.str import StrPrinter
 
-from linkwise.package.entries import FileJointEntry, FollowerEntry
+from linkwise.package.entries import (
+    BodyEntry,
+    EnergyEntry,
+    FileJointEntry,
+    FollowerEntry,
+    JointEntry,
+    RigidTree,
+)
 from linkwise.package.formula_symbols import motion_symbol, parameter_symbols
-from linkwise.package.manifest import BodyEntry, EnergyEntry, JointEntry, PassiveEntry, RigidTree
 from linkwise.robot.robot import Robot, Scalar, Vec3
 from linkwise.symbolic.system import EnergySystem, RigidSystem, System
 
@@ -56,7 +62,7 @@ def rigid_tree(system: System) -> RigidTree | None:
                 number(link.mass),
                 numbers(link.com),
                 (numbers(link.inertia[0]), numbers(link.inertia[1]), numbers(link.inertia[2])),
-                TreeCurve(link.joint.curve.starts, link.joint.curve.pieces) if link.joint.curve else None,
+                link.joint.curve,
             )
             for link in robot.links
         ),
@@ -69,10 +75,7 @@ def rigid_tree(system: System) -> RigidTree | None:
             )
             for frame in robot.named_frames
         ),
-        tuple(
-            PassiveEntry(axis.joint, axis.coordinate, axis.ratio, *astuple(axis.own))
-            for axis in robot.passive
-        ),
+        robot.passive,
         robot.ties,
         tuple(TreeCoupling(coupling.name, coupling.terms) for coupling in robot.couplings),
         robot.independent,
@@ -95,7 +98,7 @@ def follower_entries(system: System) -> tuple[FollowerEntry, ...]:
             one.name,
             one.unit,
             names.index(one.coordinate) if one.coordinate else None,
-            TreeCurve(one.curve.starts, one.curve.pieces),
+            one.curve,
         )
         for one in system.robot.followers
     )

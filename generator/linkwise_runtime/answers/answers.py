@@ -6,7 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..call_table import CALLS, PACKED
+from ..call import PACKED
+from ..call_table import CALLS
 from ..interface import Numbers, is_traced, namespace, side_by_side
 from ..robot_axes import axes_of
 from ..structure import Structure, passive_torques

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..interface import Namespace, Numbers
+from ..interface import Library, Namespace, Numbers
 from ..quantities import PARAMETERS
 from ..structure import Indices, Layout, Structure
 
@@ -33,7 +33,7 @@ class TorqueOfOne(Protocol):
         """Return the torque (n,) for motion and targets by name; None where the function has no answer."""
 
 
-class PackedEngine:
+class PackedEngine(Library):
     """Base of back ends: packed values (..., count) in the order of `Layout`, for motion (..., n)."""
 
     name: ClassVar[str]
@@ -54,11 +54,6 @@ class PackedEngine:
     """True if the back end has regressors, which come from the rule of rigid links."""
     one_sample: OneSample | None = None
     """Functions for one sample; None without any."""
-
-    @property
-    def fuses(self) -> bool:
-        """True if a compiler makes one loop of many operations, which a matrix product would split."""
-        raise NotImplementedError
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return c2, c1, g, tau and h1, (..., count) each."""
@@ -86,37 +81,6 @@ class PackedEngine:
 
     def read_beside_motion(self) -> Iterable[object]:
         """Return the arrays or tensors, beside the motion, that results depend on."""
-        raise NotImplementedError
-
-    def constant(self, values: Any, like: Numbers) -> Numbers:
-        """Return a table of numbers, to compute with `like`."""
-        raise NotImplementedError
-
-    def index(self, values: Any, like: Numbers) -> Numbers:
-        """Return a table of positions, to index `like` with."""
-        raise NotImplementedError
-
-    def weights(self, name: str, value: object, like: Numbers) -> Numbers:
-        """Return real numbers, from anything array-like, with the kind and dtype of `like`.
-
-        Raises TypeError or ValueError, which names the argument.
-        """
-        raise NotImplementedError
-
-    def zeros(self, like: Numbers, count: int) -> Numbers:
-        """Return zeros of shape (..., count) for `like` of shape (..., m)."""
-        raise NotImplementedError
-
-    def concatenate(self, parts: Iterable[Numbers]) -> Numbers:
-        """Return the parts joined along the last axis."""
-        raise NotImplementedError
-
-    def few(self, samples: int, links: int) -> bool:
-        """Return whether spatial matrices are faster for so many samples of a robot of so many links."""
-        raise NotImplementedError
-
-    def chunk(self, motion: Sequence[Numbers], most: int) -> int | None:
-        """Return the number of samples to compute at once, if `most` fit in the cache; None for all."""
         raise NotImplementedError
 
 

@@ -1,9 +1,9 @@
 """Base of the back ends: answers made of their packed values, the tree's numbers, and the choice of a kernel.
 
 Kernels are straight closed forms, or the vectorised rule. Closed forms need the fewest additions and
-multiplications, one array operation each: thousands, whose calls cost more than their work unless the batch
-is large. The rule needs more of them in a hundred or so array operations, on spatial matrices for few
-samples, and with samples innermost for many. Which one is faster depends on the operations of the closed
+multiplications, one array operation each: hundreds to thousands, whose calls cost more than their work unless
+the batch is large. The rule needs more of them in a hundred or so array operations, on spatial matrices for
+few samples, and with samples innermost for many. Which one is faster depends on the operations of the closed
 forms and on the batch; `tests/benchmarks/kernel_crossing.py` measures it and prints the tables that the back
 ends keep.
 """

@@ -5,8 +5,9 @@ from operator import attrgetter
 from typing import Any, Generic, Protocol
 
 from ..call_table import CALLS
-from ..door import Door, accepted
+from ..door import Door
 from ..interface import Array, Library, Numbers
+from ..out_argument import accepted
 from .frame_answers import ALL, LINKS, FrameAnswers, frame_index, vectors_beside
 
 

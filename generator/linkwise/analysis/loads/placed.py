@@ -17,7 +17,7 @@ from linkwise.analysis.loads import FORCE, MOMENT, POINT, WORLD
 from linkwise.analysis.opened_robot import OpenedRobot, body_frame
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.package.manifest import RigidTree
+from linkwise.package.entries import RigidTree
 
 Pose = Callable[[TreeFrame, Array], Array]
 """Function that returns the homogeneous matrices (S, 4, 4) of a frame at q (S, n)."""

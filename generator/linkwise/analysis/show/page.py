@@ -26,7 +26,7 @@ from linkwise.analysis.show.page_curves import (
 from linkwise.arrays import Array
 from linkwise.escape import printable, script_data
 from linkwise.oracle.newton_euler import displacement
-from linkwise.package.manifest import BodyEntry
+from linkwise.package.entries import BodyEntry
 from linkwise.plotstyle import COLOURS, GRAVITY, ON_DARK
 from linkwise.render import render
 

@@ -1,12 +1,12 @@
 """Tables in C of a tree of rigid bodies, which loops read."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
 import sympy as sp
-from linkwise_runtime.structure import PassiveJoint, passive_sums
+from linkwise_runtime.structure import passive_sums
 
 from linkwise.dynamics.link_forms import lowering, parameter_names
 from linkwise.emit.c.sizes import EntryCounts, Span
@@ -172,9 +172,8 @@ def _bodies(system: RigidSystem) -> Iterator[str]:
 
 def _passive(system: RigidSystem) -> Iterator[str]:
     """Yield the passive properties of each coordinate's joints; nothing where no joint has any."""
-    joints = [PassiveJoint(a.joint, a.coordinate, a.ratio, **asdict(a.own)) for a in system.robot.passive]
-    if joints:
-        sums = passive_sums(joints, len(system.coordinates))
+    if passive := system.robot.passive:
+        sums = passive_sums(passive, len(system.coordinates))
         for k, own in enumerate(zip(*sums, strict=True), 1):
             yield f"{_row(own)}, /* {k}, {c_comment(system.coordinates[k - 1].name)} */"
 
