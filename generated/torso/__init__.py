@@ -86,9 +86,9 @@ def load(
 
     parameters: none here; generate with --parameters symbolic to keep them.
 
-    allow_unphysical: whether values of parameters are taken that no body has: there are none here.
+    allow_unphysical: whether values of parameters are taken that no body has; this robot has no parameters.
 
-    kernel: what numpy and torch compute by: "straight", closed forms, thousands of operations on arrays;
+    kernel: what numpy and torch compute by: "straight", closed forms, hundreds to thousands of operations on arrays;
     "rule", a hundred or so that serve all links at once; or "auto", what was measured to be quicker.
 
     bodies: masses, centres and inertias in place of the package's own, as `Bodies` says and `bodies()` has them, for

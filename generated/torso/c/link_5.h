@@ -6,7 +6,7 @@
 
    All vectors are in one common frame:
        axes    of the frame that joint 2 moves
-       origin  the link's centre of mass, moving with it; lengths are times the square root of its mass, 1.4 kg
+       origin  the link's centre of mass, moving with it; lengths are multiplied by the square root of its mass, 1.4 kg
 
    Entry e of sample b is at e * W + b. q3, qd3 and qdd3 are position, velocity and acceleration of joint 3. The other names
    are explained in numbers.h. In the comments beside outputs, c2(i, j, k) is a coefficient: the factor of joint k's
