@@ -1,4 +1,4 @@
-"""How a call of a robot is answered: its motion is read, a back end computes, the row of the table says how.
+"""Answering of calls: motion is read, a back end computes, and the row of the table says how.
 
 `Dynamics` lists the calls; each of them passes its arguments to `_call`, with the key of its row.
 """

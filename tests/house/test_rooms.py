@@ -52,6 +52,7 @@ RUNTIME = (
     "native",
     "lagrangians",
     "dynamics",
+    "robot_calls",
     "control",
     "motion",
     "constraints",

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from linkwise_runtime.version import VERSION
 
 from linkwise.dynamics.link_forms import LinkForms
+from linkwise.emit.derivation import Derivation
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.escape import python_literal
@@ -36,9 +37,10 @@ class FormFunction:
     groups: tuple[tuple[tuple[str, str], ...], ...]
 
 
-def closed_form_files(system: System, links: Sequence[LinkForms]) -> Iterator[tuple[str, str]]:
+def closed_form_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     """Yield paths inside the package and texts."""
-    for j, forms in enumerate(links):
+    system = derivation.system
+    for j, forms in enumerate(derivation.forms):
         view = {
             "number": j + 1,
             "version": VERSION,
@@ -48,7 +50,7 @@ def closed_form_files(system: System, links: Sequence[LinkForms]) -> Iterator[tu
             "functions": list(_functions(system, forms, j + 1)),
         }
         yield f"forms/link_{j + 1}.py", render("closed_forms/link.py.j2", view)
-    numbers = range(1, len(links) + 1)
+    numbers = range(1, len(derivation.forms) + 1)
     yield "forms/__init__.py", render("closed_forms/init.py.j2", {"version": VERSION, "numbers": numbers})
 
 

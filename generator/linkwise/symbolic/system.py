@@ -1,4 +1,4 @@
-"""What every description becomes: a system of coordinates, links and run-time parameters.
+"""Systems, one of which every description becomes: coordinates, links and run-time parameters.
 
 A rigid link and a link of hand-written energies are two types, and so are the systems made of them. Both
 systems have `name`, `coordinates`, `links`, `link_names`, `parameters`, `notes`, `request` and `path`.
