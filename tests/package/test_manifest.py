@@ -114,7 +114,7 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
     ),
     "frame on nothing": (
         lambda data: data["tree"]["frames"][0].update(joint=2),
-        "frame 0 of the tree is on a body that is not there",
+        "the joint of frame 0 of the tree is not there",
     ),
     "mirrored frame": (
         lambda data: data["tree"]["frames"][0].update(rotation=[[1, 0, 0], [0, 1, 0], [0, 0, -1]]),

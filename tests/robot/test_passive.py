@@ -56,7 +56,7 @@ def test_toml_says_it_in_the_joints_table(tmp_path: Path) -> None:
     own = 'stiffness = 3, rest = "pi/2", damping = 0.5, friction = 0.2, armature = 0.01'
     (found,) = read(tmp_path / "arm.toml", ARM.format(type="revolute", own=own))
     rest = pytest.approx(1.5707963267948966)
-    assert found == PassiveJoint("ab", 0, 1.0, 3.0, rest, 0.5, 0.2, 0.01)  # type: ignore[arg-type]
+    assert found == PassiveJoint("hinge", 0, 1.0, 3.0, rest, 0.5, 0.2, 0.01)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_what_no_joint_has_is_named(kind: str, own: str, message: str, tmp_path:
 def test_losses_below_zero_are_taken_where_they_are_allowed(tmp_path: Path) -> None:
     text = ARM.format(type="revolute", own="damping = -1")
     (found,) = read(tmp_path / "arm.toml", text, allow_unphysical=True)
-    assert found == PassiveJoint("ab", 0, 1.0, damping=-1.0)
+    assert found == PassiveJoint("hinge", 0, 1.0, damping=-1.0)
 
 
 def test_numbers_that_the_format_does_not_have_are_told_as_ignored(tmp_path: Path) -> None:

@@ -51,7 +51,9 @@ def closed_form_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
         }
         yield f"forms/link_{j + 1}.py", render("closed_forms/link.py.j2", view)
     numbers = range(1, len(derivation.forms) + 1)
-    yield "forms/__init__.py", render("closed_forms/init.py.j2", {"version": VERSION, "numbers": numbers})
+    by_rule = any(forms.frame for forms in derivation.forms)
+    view = {"version": VERSION, "numbers": numbers, "by_rule": by_rule}
+    yield "forms/__init__.py", render("closed_forms/init.py.j2", view)
 
 
 def _functions(system: System, forms: LinkForms, j: int) -> Iterator[FormFunction]:

@@ -60,7 +60,7 @@ def _check_frames(tree: RigidTree, links: Sequence[LinkEntry]) -> None:
     carriers: dict[str, int | None] = {}
     for index, frame in enumerate(tree.frames):
         if frame.joint is not None and not frame.joint < len(tree.bodies):
-            raise ValueError(f"frame {index} of the tree is on a body that is not there")
+            raise ValueError(f"the joint of frame {index} of the tree is not there")
         if frame.name in carriers:
             raise ValueError(f"tree.frames has {frame.name[:80]!a} twice")
         if not _is_rotation(frame.rotation):

@@ -171,7 +171,7 @@ def _step(
     u = state.height - _dot(state.gravity, p)
     spin = (0, 0, rate)
     if joint.kind == "revolute":
-        # s3 is the sine of joint 3 itself, s3_5 that of the joint before link 5 which follows it otherwise.
+        # sin3 is the sine of joint 3 itself, sin3_5 that of the joint before link 5 which follows it.
         turn = f"{joint.coordinate + 1}" if joint.ratio == 1.0 else f"{joint.coordinate + 1}_{label}"
         omega = _map(lambda a, b: a + b, _turned(twist, turn, angle, omega), spin)
         v = _turned(twist, turn, angle, v)
@@ -190,7 +190,7 @@ def _turned(namer: _Namer, label: str, angle: sp.Expr, a: Vec3) -> Vec3:
     """Return Rz(angle)ᵀ a."""
     if a[0] == 0 and a[1] == 0:
         return a
-    s, c = _Named(f"s{label}", real=True), _Named(f"c{label}", real=True)
+    s, c = _Named(f"sin{label}", real=True), _Named(f"cos{label}", real=True)
     if (s, sp.sin(angle)) not in namer.definitions:
         namer.definitions += [(s, sp.sin(angle)), (c, sp.cos(angle))]
     return c * a[0] + s * a[1], c * a[1] - s * a[0], a[2]
