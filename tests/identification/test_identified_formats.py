@@ -266,7 +266,7 @@ def test_a_robots_own_file_has_the_identified_bodies_and_is_else_as_it_was(name:
             torque = arm.model.inverse_dynamics(q, 0.0 * q, 0.0 * q)
         np.testing.assert_allclose(held, torque[few], atol=bound)
     if name != "arm.osim":
-        passive = {axis.joint: axis.own for axis in read_robot(tmp_path / "a/out" / name).passive}
+        passive = {axis.joint: axis for axis in read_robot(tmp_path / "a/out" / name).passive}
         found = [(passive[joint].damping, passive[joint].friction) for joint in arm.joints]
         np.testing.assert_allclose(found, RUBS, atol=2e-2)
     assert bool(warnings) == (name == "arm.toml")

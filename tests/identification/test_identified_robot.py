@@ -78,7 +78,7 @@ def test_the_users_own_file_is_written_back_with_other_numbers_alone(log: Path, 
     rubs = {joint: (own["viscous"], own["coulomb"]) for joint, own in record["joints"].items()}
     assert np.array(list(rubs.values())) == pytest.approx(FRICTION, abs=1e-2)
     for axis in read_robot(tmp_path / "out/arm.urdf").passive:
-        assert (axis.own.damping, axis.own.friction) == pytest.approx(rubs[axis.joint], abs=2e-3)
+        assert (axis.damping, axis.friction) == pytest.approx(rubs[axis.joint], abs=2e-3)
 
 
 def test_pinocchio_reads_the_identified_inertias_link_by_link_and_all_else_as_before(
@@ -125,7 +125,7 @@ def test_the_friction_of_a_joint_that_follows_counts_in_that_of_the_other(tmp_pa
     torque = arm.model.inverse_dynamics(q, qd, qdd) + arm.model.passive_torque(q, qd, qdd).total
     log = write_csv(tmp_path / "log.csv", np.column_stack([t, q, torque]), ("ab", "tau/ab"))
     identified(log, tmp_path / "arm.urdf", tmp_path / "out")
-    passive = {axis.joint: axis.own for axis in read_robot(tmp_path / "out/arm.urdf").passive}
+    passive = {axis.joint: axis for axis in read_robot(tmp_path / "out/arm.urdf").passive}
     assert list(passive) == ["ab"]
     assert (passive["ab"].damping, passive["ab"].friction) == pytest.approx((12, 2), rel=1e-3)
     assert b'<dynamics damping="0" friction="0"/>' in (tmp_path / "out/arm.urdf").read_bytes()

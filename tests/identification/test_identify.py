@@ -569,6 +569,6 @@ def test_springs_and_armatures_of_the_file_are_known_and_kept(tmp_path: Path) ->
     assert (alone.errors(alone.unseen)["bodies"] < 1e-2).all()
     manifest = Manifest.read(tmp_path / "arm")
     (tmp_path / "again.urdf").write_bytes(identified_robot(found, manifest, None)[0]["test.urdf"])
-    kept = {axis.joint: axis.own for axis in read_robot(tmp_path / "again.urdf").passive}
+    kept = {axis.joint: axis for axis in read_robot(tmp_path / "again.urdf").passive}
     assert kept["ab"].armature == 0.125
     assert (kept["bc"].stiffness, kept["bc"].rest) == (3.0, 0.25)

@@ -5,20 +5,18 @@ from collections.abc import Iterator
 from linkwise_runtime.version import VERSION
 
 from linkwise.dynamics.link_forms import lowering
-from linkwise.emit.derivation import Derivation
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.rigid_energy import rigid_energy
 from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.escape import python_literal
 from linkwise.render import render
-from linkwise.symbolic.system import EnergySystem
+from linkwise.symbolic.system import EnergySystem, System
 
 Lines = tuple[str, ...]
 
 
-def autograd_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
+def autograd_files(system: System, linear: frozenset[int]) -> Iterator[tuple[str, str]]:
     """Yield paths inside the package and texts."""
-    system, linear = derivation.system, derivation.linear
     for j, name in enumerate(system.link_names):
         view = {
             "number": j + 1,

@@ -1,26 +1,46 @@
-"""The registry of back ends: adding one adds an entry here, and its name to LOOPS if loops serve it."""
+"""The registry of back ends: adding one adds an entry here, and its name to LOOPS if loops serve it.
+
+`check` and the command line read entries too, and need not wait for SymPy: emitters are imported when they
+emit.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from linkwise.emit.autograd import autograd_files
-from linkwise.emit.c.loops import loop_files
-from linkwise.emit.c.sources import c_files
-from linkwise.emit.c.stack import too_large_for_loops, too_large_for_straight
-from linkwise.emit.closed_forms import closed_form_files
-from linkwise.emit.derivation import Derivation
-from linkwise.emit.formulas import formula_files, too_many_to_read
-from linkwise.emit.tree_file import tree_files
 from linkwise.errors import LinkwiseError
-from linkwise.package.entries import KernelKind
-from linkwise.symbolic.system import System
 
-Emitter = Callable[[Derivation], Iterator[tuple[str, str]]]
+if TYPE_CHECKING:
+    from linkwise.emit.derivation import Derivation
+    from linkwise.package.entries import KernelKind
+    from linkwise.symbolic.system import System
+
+Emitter = Callable[["Derivation"], Iterator[tuple[str, str]]]
 """Function that turns a derivation into files: paths inside the package and texts."""
 
 
 def _no_fault(_: System) -> str:
     return ""
+
+
+def _too_large_for_straight(system: System) -> str:
+    from linkwise.emit.c.stack import too_large_for_straight
+
+    return too_large_for_straight(system)
+
+
+def _too_many_to_read(system: System) -> str:
+    from linkwise.emit.formulas import too_many_to_read
+
+    return too_many_to_read(system)
+
+
+def _too_large_for_loops(system: System) -> str:
+    from linkwise.emit.c.stack import too_large_for_loops
+
+    return too_large_for_loops(system)
 
 
 @dataclass(frozen=True)
@@ -65,13 +85,53 @@ class BackendFiles:
     """True if a robot that cannot have it goes without it, unless it was asked for by name."""
 
 
+def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.closed_forms import closed_form_files
+
+    return closed_form_files(d.system, d.forms)
+
+
+def _tree(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.tree_file import tree_text
+    from linkwise.symbolic.definition import rigid_tree
+
+    if (tree := rigid_tree(d.system)) is not None:
+        yield "tree.py", tree_text(tree, d.system.link_names, [s.name for s in d.system.parameters])
+
+
+def _energies(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.autograd import autograd_files
+
+    return autograd_files(d.system, d.linear)
+
+
+def _c(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.c.shared_headers import with_headers
+    from linkwise.emit.c.sources import c_files
+
+    return with_headers(c_files(d))
+
+
+def _loops(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.c.loops import loop_files
+    from linkwise.emit.c.shared_headers import with_headers
+
+    return with_headers(loop_files(d))
+
+
+def _formulas(d: Derivation) -> Iterator[tuple[str, str]]:
+    from linkwise.emit.formulas import formula_files
+
+    return formula_files(d)
+
+
 BACKENDS: dict[str, BackendFiles] = {
     backend.name: backend
     for backend in (
         BackendFiles(
             "numpy",
             "closed forms, or the vectorised rule, on NumPy arrays",
-            emits=(closed_form_files, tree_files),
+            emits=(_forms, _tree),
             loading=Loading(
                 "arrays.numpy_backend",
                 "NumpyBackend(ROBOT, LINKS, values, RULE, kernel, bodies)",
@@ -85,7 +145,7 @@ BACKENDS: dict[str, BackendFiles] = {
         BackendFiles(
             "torch",
             "closed forms, or the vectorised rule, on torch tensors",
-            emits=(closed_form_files, tree_files),
+            emits=(_forms, _tree),
             loading=Loading(
                 "arrays.torch_backend",
                 "TorchBackend(ROBOT, LINKS, values, RULE, kernel, bodies)",
@@ -99,7 +159,7 @@ BACKENDS: dict[str, BackendFiles] = {
         BackendFiles(
             "autograd",
             "each link's Lagrangian, differentiated by torch",
-            emits=(autograd_files, tree_files),
+            emits=(_energies, _tree),
             loading=Loading(
                 "lagrangians.dynamics_module",
                 "backend_of_links(ROBOT, LAGRANGIANS, values, requires_grad, RULE)",
@@ -113,7 +173,7 @@ BACKENDS: dict[str, BackendFiles] = {
         BackendFiles(
             "native",
             "the C code, compiled by this system's compiler",
-            emits=(tree_files,),
+            emits=(_tree,),
             loading=Loading(
                 "native.backend",
                 'NativeBackend(ROBOT, Path(__file__).parent / "c", LINKS, values, RULE)',
@@ -127,14 +187,14 @@ BACKENDS: dict[str, BackendFiles] = {
         BackendFiles(
             "c",
             "closed forms in C99 and C++17, to compile into a program of your own",
-            emits=(c_files,),
-            fault=too_large_for_straight,
+            emits=(_c,),
+            fault=_too_large_for_straight,
         ),
         BackendFiles(
             "formulas",
             "closed forms to read, for small robots",
-            emits=(formula_files,),
-            fault=too_many_to_read,
+            emits=(_formulas,),
+            fault=_too_many_to_read,
             optional=True,
         ),
     )
@@ -144,15 +204,15 @@ BACKENDS: dict[str, BackendFiles] = {
 LOOPS: dict[str, BackendFiles] = {
     backend.name: backend
     for backend in (
-        replace(BACKENDS["numpy"], doc="the vectorised rule on NumPy arrays", emits=(tree_files,)),
-        replace(BACKENDS["torch"], doc="the vectorised rule on torch tensors", emits=(tree_files,)),
+        replace(BACKENDS["numpy"], doc="the vectorised rule on NumPy arrays", emits=(_tree,)),
+        replace(BACKENDS["torch"], doc="the vectorised rule on torch tensors", emits=(_tree,)),
         BACKENDS["autograd"],
         BACKENDS["native"],
         replace(
             BACKENDS["c"],
             doc="loops over links and joints in C99 and C++17, to compile into a program of your own",
-            emits=(loop_files,),
-            fault=too_large_for_loops,
+            emits=(_loops,),
+            fault=_too_large_for_loops,
         ),
     )
 }

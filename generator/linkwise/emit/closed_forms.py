@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from linkwise_runtime.version import VERSION
 
 from linkwise.dynamics.link_forms import LinkForms
-from linkwise.emit.derivation import Derivation
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.escape import python_literal
@@ -37,10 +36,9 @@ class FormFunction:
     groups: tuple[tuple[tuple[str, str], ...], ...]
 
 
-def closed_form_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
+def closed_form_files(system: System, links: Sequence[LinkForms]) -> Iterator[tuple[str, str]]:
     """Yield paths inside the package and texts."""
-    system = derivation.system
-    for j, forms in enumerate(derivation.forms):
+    for j, forms in enumerate(links):
         view = {
             "number": j + 1,
             "version": VERSION,
@@ -50,9 +48,8 @@ def closed_form_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
             "functions": list(_functions(system, forms, j + 1)),
         }
         yield f"forms/link_{j + 1}.py", render("closed_forms/link.py.j2", view)
-    numbers = range(1, len(derivation.forms) + 1)
-    by_rule = any(forms.frame for forms in derivation.forms)
-    view = {"version": VERSION, "numbers": numbers, "by_rule": by_rule}
+    numbers = range(1, len(links) + 1)
+    view = {"version": VERSION, "numbers": numbers, "by_rule": any(forms.frame for forms in links)}
     yield "forms/__init__.py", render("closed_forms/init.py.j2", view)
 
 

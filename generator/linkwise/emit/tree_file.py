@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from linkwise_runtime.rule.joint_tree import TreeCoupling, TreeCurve, TreeFrame, TreeTie
 from linkwise_runtime.version import VERSION
 
-from linkwise.emit.derivation import Derivation
 from linkwise.escape import python_literal
 from linkwise.package.entries import PLACE, BodyEntry, RigidTree
 from linkwise.package.formula_symbols import parameter_symbols
 from linkwise.render import render
-from linkwise.symbolic.definition import rigid_tree
 
 WORD = re.compile(r"\b([A-Za-z_]\w*)(\(?)")
 """Pattern of a name in a formula, and of the parenthesis after that of a function."""
@@ -25,13 +23,6 @@ class TreeText:
     name: str
     entries: tuple[str, ...]
     curve: TreeCurve | None = None
-
-
-def tree_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
-    """Yield the path inside the package and the text; nothing for energies that a user wrote."""
-    system = derivation.system
-    if (tree := rigid_tree(system)) is not None:
-        yield "tree.py", tree_text(tree, system.link_names, [symbol.name for symbol in system.parameters])
 
 
 def tree_text(tree: RigidTree, links: Sequence[str], parameters: Sequence[str]) -> str:

@@ -11,7 +11,6 @@ from linkwise.emit.c.loop_costs import decomposition_cost, gradient_cost, torque
 from linkwise.emit.c.prototypes import at_position, pointers, under_torque
 from linkwise.emit.c.robot_files import free, header_view, input_arrays, path_fields, rows_from_s, totals
 from linkwise.emit.c.robot_tables import path_spans, table_view
-from linkwise.emit.c.shared_headers import with_headers
 from linkwise.emit.c.sizes import Span, whole
 from linkwise.emit.c.stack import loops_stack, small_stack
 from linkwise.emit.derivation import Derivation
@@ -24,10 +23,6 @@ def loop_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
 
     Raises TypeError for what is not rigid bodies.
     """
-    return with_headers(_files(derivation))
-
-
-def _files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     system, name = derivation.system, derivation.package
     if not isinstance(system, RigidSystem):
         raise TypeError("a kernel in loops goes over rigid bodies")

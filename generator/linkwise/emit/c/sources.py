@@ -20,7 +20,6 @@ from linkwise.emit.c.form_function import (
 )
 from linkwise.emit.c.robot_files import costs, header_view, most_kept, robot_view
 from linkwise.emit.c.robot_tables import table_view
-from linkwise.emit.c.shared_headers import with_headers
 from linkwise.emit.c.sizes import link_spans
 from linkwise.emit.c.stack import small_stack, straight_stack
 from linkwise.emit.derivation import Derivation
@@ -31,10 +30,6 @@ from linkwise.symbolic.system import RigidSystem, System
 
 def c_files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     """Yield paths inside the package and texts."""
-    return with_headers(_files(derivation))
-
-
-def _files(derivation: Derivation) -> Iterator[tuple[str, str]]:
     system, name = derivation.system, derivation.package
     functions = []
     for number, forms in enumerate(derivation.forms, 1):
