@@ -49,13 +49,14 @@ demo-control: $(READY)
 # What compilers made of what, which later runs find again; Python's too, which every process that a test starts reads.
 KEPT = LINKWISE_TEST_CACHE=$(CURDIR)/.cache/tests TORCHINDUCTOR_CACHE_DIR=$(CURDIR)/.cache/inductor PYTHONDONTWRITEBYTECODE=
 
-# Three files of tests at a time, for two cores: some wait for a browser, a server or a process that ends.
+# Two files of tests at a time.
 test: $(READY)
-	$(KEPT) $(BIN)/python -m pytest --numprocesses 3 --dist loadfile -m "not ship"
+	$(KEPT) $(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not (ship or browser)"
 
-# What leaves the house, as others get it: pages, wheels, CMake's projects, exports, other processors and systems; minutes.
+# What leaves the house, as others get it: pages in a browser, wheels, CMake's projects, exports, other processors and
+# systems; minutes. Three files at a time for two cores, as some wait for the browser or for compilers.
 ship: $(READY)
-	$(KEPT) $(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m ship
+	$(KEPT) $(BIN)/python -m pytest --numprocesses 3 --dist loadfile -m "ship or browser"
 
 # What could be wrong without a test, or without `linkwise check`, noticing: hours. Without the latter, MINUTES=30 ends
 # earlier, and the next run goes on from there; ONLY="dynamics runtime/rule" takes rooms.
