@@ -71,9 +71,9 @@ NO_LIMITS = JointLimits((), (), (), ())
 
 @dataclass(frozen=True)
 class PassiveJoint:
-    """Passive properties of a joint, at the position p = ratio · q of a coordinate, in rad or m.
+    """Passive properties of a joint, at the position p = ratio q of a coordinate, in rad or m.
 
-    To move it takes stiffness (p − rest) + damping ṗ + friction sign(ṗ) + armature p̈, in N·m or N, beside
+    To move it takes stiffness (p - rest) + damping p' + friction sign(p') + armature p'', in N m or N, beside
     its links' share.
     """
 

@@ -65,7 +65,6 @@ main()
 """
 
 
-@pytest.mark.ship
 @pytest.mark.parametrize("system", ["windows", "macos"])
 def test_commands_work_there_and_say_what_stands_in_the_way(system: str, tmp_path: Path) -> None:
     parts = [urdf_text.joint("ab", "a", "b"), urdf_text.joint("bc", "b", "c")]
