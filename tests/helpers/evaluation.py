@@ -1,5 +1,6 @@
 """Value of graph nodes, computed node by node."""
 
+import math
 from collections.abc import Iterable, Mapping
 
 from linkwise.expression.expression_graph import FUNCTIONS, Graph, Node, reachable
@@ -27,4 +28,12 @@ def evaluate(graph: Graph, outputs: Iterable[Node], inputs: Mapping[str, float])
                 value[node] = value[a] * value[b]
             case "div":
                 value[node] = value[a] / value[b]
+            case "atan2":
+                value[node] = math.atan2(value[a], value[b])
+            case "lt":
+                value[node] = value[a] < value[b]
+            case "le":
+                value[node] = value[a] <= value[b]
+            case "select":
+                value[node] = value[b[0]] if value[a] else value[b[1]]
     return [value[node] for node in outputs]

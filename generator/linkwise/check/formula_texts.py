@@ -11,17 +11,21 @@ from linkwise_runtime.version import VERSION
 from linkwise.arrays import Array
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.subject import Subject
-from linkwise.emit.formula_page import Row, formula_page
+from linkwise.emit.formula_page import Line, formula_page
 from linkwise.oracle.formula_text import NUMPY, LatexReader, TextFormula, Unreadable, parameter_values
 from linkwise.oracle.reference import Reference
 from linkwise.package.formula_symbols import MOTION, motion_symbol, parameter_symbols
 from linkwise.package.manifest import Manifest
 
-# Coordinates have one digit, since robots of many coordinates have no formulas.
 PATTERNS = {
-    "txt": re.compile(r"^tau_(\d+)_(\d+) = (.*)$", re.MULTILINE),
-    "tex": re.compile(r"^\\\[ \\tau_\{(\d)(\d+)\} = (.*) \\\]$", re.MULTILINE),
+    "txt": re.compile(r"^(\w+) = (.*)$", re.MULTILINE),
+    "tex": re.compile(r"^\\\[ ([^=\n]*) = (.*) \\\]$", re.MULTILINE),
 }
+TORQUES = {
+    "txt": re.compile(r"tau_(\d+)_(\d+)"),
+    "tex": re.compile(r"\\tau_\{(\d+(?=,)|\d),?(\d+)\}"),
+}
+"""Patterns of symbols of τ_ij. In expanded LaTeX coordinates have one digit, as their number is small."""
 DIGITS = 1e-12
 """Rounding of numbers in these texts, to twelve digits; what cancelling leaves below it is left out."""
 
@@ -30,8 +34,10 @@ def check_formulas(name: str, ending: str, subject: Subject) -> Iterator[Result]
     """Yield the results of formulas.txt or formulas.tex; lines between the formulas count too."""
     manifest, rows = subject.manifest, subject.rows
     text = (subject.package.directory / f"formulas.{ending}").read_bytes().decode()
-    found = [(int(i) - 1, int(j) - 1, formula) for i, j, formula in PATTERNS[ending].findall(text)]
-    if [(i, j) for i, j, _ in found] != [(i, j) for i, j in rows.tau.tolist()]:
+    found = PATTERNS[ending].findall(text)
+    torques = [TORQUES[ending].fullmatch(symbol) for symbol, _ in found]
+    places = [(int(t[1]) - 1, int(t[2]) - 1) for t in torques if t]
+    if places != [(i, j) for i, j in rows.tau.tolist()]:
         yield Result(f"{name}: every tau_ij", False, None, "it lists other torques than the paths say")
         return
     if subject.as_generated:
@@ -39,16 +45,17 @@ def check_formulas(name: str, ending: str, subject: Subject) -> Iterator[Result]
     if not subject.has_numbers:
         yield skipped(f"{name}: not checked", "there is nothing to hold it against")
         return
-    yield _numbers(name, ending, [formula for *_, formula in found], subject)
+    yield _numbers(name, ending, found, subject)
 
 
-def _lines(name: str, manifest: Manifest, ending: str, text: str, found: Sequence[Row]) -> Result:
+def _lines(name: str, manifest: Manifest, ending: str, text: str, found: Sequence[Line]) -> Result:
     """Compare the text with the page that linkwise makes of the same formulas."""
     version = manifest.generator.get("linkwise")
     if version != VERSION:
         return skipped(name, f"those of linkwise {version}, which is not at hand to compare with")
     joints, links = ([part.name for part in parts] for parts in (manifest.joints, manifest.links))
-    page = formula_page(ending, found, joints, links, list(manifest.parameters)).split("\n")
+    method = manifest.request.get("derivation", "rule") if manifest.tree else None
+    page = formula_page(ending, found, joints, links, list(manifest.parameters), method).split("\n")
     lines = zip_longest(text.split("\n"), page)
     wrong = next((number for number, (line, own) in enumerate(lines, 1) if line != own), None)
     told = (
@@ -57,14 +64,13 @@ def _lines(name: str, manifest: Manifest, ending: str, text: str, found: Sequenc
     return Result(name, not wrong, None, told)
 
 
-def _numbers(name: str, ending: str, formulas: Sequence[str], subject: Subject) -> Result:
+def _numbers(name: str, ending: str, lines: Sequence[Line], subject: Subject) -> Result:
     """Compare the formulas' values with the reference; one that cannot be read as a formula fails."""
     reference = subject.reference
     names = _names(subject.parameters, reference)
     try:
-        tau = np.stack(
-            [_filled(_value(ending, formula, names, subject.manifest), reference) for formula in formulas], -1
-        )
+        values = _values(ending, lines, names, subject.manifest)
+        tau = np.stack([_filled(value, reference) for value in values], -1)
     except Unreadable as unread:
         return Result(f"{name}: can be read", False, None, f"it holds {unread}")
     at = (slice(None), *subject.rows.tau.T)
@@ -88,11 +94,21 @@ def _filled(value: Any, reference: Reference) -> Array:
     return np.broadcast_to(np.asarray(value, dtype=float), len(reference.states.q))
 
 
-def _value(ending: str, formula: str, names: Mapping[str, Any], manifest: Manifest) -> Any:
-    """Return a formula's value for given values of the symbols; raises Unreadable."""
-    if ending == "txt":
-        return TextFormula(formula).value(names)
-    return LatexReader(formula, _latex_symbols(manifest, names), NUMPY).value()
+def _values(
+    ending: str, lines: Sequence[Line], names: Mapping[str, Any], manifest: Manifest
+) -> Iterator[Any]:
+    """Yield the torques, which lines give one after the other; raises Unreadable."""
+    known = dict(names if ending == "txt" else _latex_symbols(manifest, names))
+    for symbol, formula in lines:
+        value = (
+            TextFormula(formula).value(known)
+            if ending == "txt"
+            else LatexReader(formula, known, NUMPY).value()
+        )
+        if TORQUES[ending].fullmatch(symbol):
+            yield value
+        else:
+            known[symbol] = value
 
 
 def _latex_symbols(manifest: Manifest, names: Mapping[str, Any]) -> dict[str, Any]:

@@ -25,16 +25,20 @@ def _no_fault(_: System) -> str:
     return ""
 
 
+def _always(_: System) -> bool:
+    return True
+
+
 def _too_large_for_straight(system: System) -> str:
     from linkwise.emit.c.stack import too_large_for_straight
 
     return too_large_for_straight(system)
 
 
-def _too_many_to_read(system: System) -> str:
-    from linkwise.emit.formulas import too_many_to_read
+def _are_short(system: System) -> bool:
+    from linkwise.emit.formulas import are_short
 
-    return too_many_to_read(system)
+    return are_short(system)
 
 
 def _too_large_for_loops(system: System) -> str:
@@ -81,8 +85,8 @@ class BackendFiles:
     """Other back ends that it requires."""
     fault: Callable[[System], str] = _no_fault
     """Function that returns why it cannot be had for a robot; empty if it can."""
-    optional: bool = False
-    """True if a robot that cannot have it goes without it, unless it was asked for by name."""
+    usual: Callable[[System], bool] = _always
+    """Function that returns whether a robot has it where no back end was asked for."""
 
 
 def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
@@ -102,7 +106,7 @@ def _tree(d: Derivation) -> Iterator[tuple[str, str]]:
 def _energies(d: Derivation) -> Iterator[tuple[str, str]]:
     from linkwise.emit.autograd import autograd_files
 
-    return autograd_files(d.system, d.linear)
+    return autograd_files(d.system, d.nonquadratic)
 
 
 def _c(d: Derivation) -> Iterator[tuple[str, str]]:
@@ -192,10 +196,9 @@ BACKENDS: dict[str, BackendFiles] = {
         ),
         BackendFiles(
             "formulas",
-            "closed forms to read, for small robots",
+            "closed forms to read; of small robots, expanded",
             emits=(_formulas,),
-            fault=_too_many_to_read,
-            optional=True,
+            usual=_are_short,
         ),
     )
 }
@@ -227,7 +230,7 @@ def backends_of(kernel: KernelKind) -> dict[str, BackendFiles]:
 def usual_backends(system: System, kernel: KernelKind) -> tuple[str, ...]:
     """Return the names of the back ends that a robot's package has where none was asked for."""
     there = backends_of(kernel).values()
-    return tuple(one.name for one in there if not (one.optional and one.fault(system)))
+    return tuple(one.name for one in there if one.usual(system))
 
 
 def chosen_backends(names: Iterable[str], kernel: KernelKind = "straight") -> tuple[BackendFiles, ...]:

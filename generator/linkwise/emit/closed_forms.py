@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from linkwise_runtime.version import VERSION
 
 from linkwise.dynamics.link_forms import LinkForms
+from linkwise.emit.legend import names_told
 from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.escape import python_literal
@@ -49,7 +50,8 @@ def closed_form_files(system: System, links: Sequence[LinkForms]) -> Iterator[tu
         }
         yield f"forms/link_{j + 1}.py", render("closed_forms/link.py.j2", view)
     numbers = range(1, len(links) + 1)
-    view = {"version": VERSION, "numbers": numbers, "by_rule": any(forms.frame for forms in links)}
+    legend = names_told(any(forms.frame for forms in links))
+    view = {"version": VERSION, "numbers": numbers, "legend": legend}
     yield "forms/__init__.py", render("closed_forms/init.py.j2", view)
 
 
@@ -58,14 +60,17 @@ def _functions(system: System, forms: LinkForms, j: int) -> Iterator[FormFunctio
     whole = [groups[name] for name in ("c2", "c1", "g", "tau", "h1") if groups[name]]
     doc = "Return c2 (for i <= k: it is symmetric), c1, g and tau"
     if groups["h1"]:
-        doc += ", and h1, c1's part by energy terms linear in qd"
+        doc += ", and h1 = 2 c1 - d(tau)/d(qd)"
     yield _function(system, forms, "decomposition", doc, whole)
     yield _function(system, forms, "torque", "Return tau", [groups["torque"]])
     yield _function(system, forms, "position_gradient", "Return c0 = d(tau)/d(q)", [groups["c0"]])
     if forms.energy:
-        energies = [(f"{kind}({j})", node) for kind, node in zip("KP", forms.energy, strict=True)]
-        doc = "Return kinetic energy K and potential energy P in J"
+        energies = [(f"{'KPR'[at]}({j})", node) for at, node in forms.energy.items()]
+        doc = "Return kinetic energy K and potential energy P in J, and R in W: d(K + P)/dt = tau . qd + R"
         yield _function(system, forms, "energy", doc, [energies], MOTION[:2])
+        shares = [(f"{name}, {i + 1}", node) for (i, name), node in forms.shares.items()]
+        doc = "Return the shares with names of their own, which sum to g, name by name"
+        yield _function(system, forms, "named_shares", doc, [shares], MOTION[:2])
 
 
 def labelled(forms: LinkForms, j: int) -> dict[str, Rows]:
@@ -83,7 +88,7 @@ def labelled(forms: LinkForms, j: int) -> dict[str, Rows]:
         "g": pairs("g", forms.gravity),
         "tau": pairs("tau", forms.decomposed_torque),
         "torque": pairs("tau", forms.torque),
-        "h1": triples("h1", forms.velocity_linear),
+        "h1": triples("h1", forms.velocity_excess),
         "c0": triples("c0", forms.position_gradient),
     }
 

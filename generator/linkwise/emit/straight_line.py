@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from linkwise.dynamics.link_forms import parameter_names
 from linkwise.emit.printer import ATOM, Printer, Text
 from linkwise.escape import python_literal
-from linkwise.expression.expression_graph import Entry, Graph, Node, operands, reachable
+from linkwise.expression.expression_graph import CONDITIONS, Entry, Graph, Node, operands, reachable
 from linkwise.symbolic.system import System
 
 MAX_WIDTH = 88
@@ -82,7 +82,9 @@ class _Writer:
             return
         self.texts[node] = self._short(entry)
         self.latest[node] = max((self.latest[o] for o in operands(entry)), default=0)
-        if entry[0] not in ("const", "neg") and (self.uses[node] > 1 or node in self.graph.names):
+        if entry[0] not in ("const", "neg", *CONDITIONS) and (
+            self.uses[node] > 1 or node in self.graph.names
+        ):
             self._assign(node)
 
     def _short(self, entry: Entry) -> Text:

@@ -4,12 +4,15 @@ from collections import Counter
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
-from linkwise.expression.expression_graph import Graph, Node, reachable
+from linkwise.expression.expression_graph import CONDITIONS, Graph, Node, reachable
 
 
 @dataclass(frozen=True)
 class OperationCount:
-    """Operations of some outputs; every shared expression counts once."""
+    """Operations of some outputs; every shared expression counts once.
+
+    Comparisons, and choices by them, count as functions.
+    """
 
     additions: int
     multiplications: int
@@ -34,7 +37,8 @@ def count_operations(graph: Graph, outputs: Iterable[Node], given: Container[Nod
     """Return the operations that `outputs` take from what is `given`; a sign in front of a value is free."""
     needed = reachable(graph, outputs, given)
     ops = Counter(graph.nodes[node][0] for node in needed if node not in given)
-    return OperationCount(ops["add"] + ops["sub"], ops["mul"], ops["div"], ops["call"])
+    functions = sum(ops[op] for op in ("call", "atan2", "select", *CONDITIONS))
+    return OperationCount(ops["add"] + ops["sub"], ops["mul"], ops["div"], functions)
 
 
 def in_words(count: OperationCount) -> str:

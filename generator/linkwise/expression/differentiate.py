@@ -3,11 +3,14 @@
 from collections.abc import Mapping
 
 from linkwise.expression.expression import Expression
-from linkwise.expression.expression_graph import Graph, Node, reachable
+from linkwise.expression.expression_graph import CONDITIONS, Graph, Node, operands, reachable
 
 
 def derivative(output: Expression, symbol: Expression) -> Expression:
-    """Return ∂output/∂symbol by the chain rule in forward order; shared parts are differentiated once."""
+    """Return ∂output/∂symbol by the chain rule in forward order; shared parts are differentiated once.
+
+    Where expressions change at a condition, the derivative is that of the side on which they are evaluated.
+    """
     graph, tangent = output.graph, {symbol.node: Expression(output.graph, output.graph.one)}
     for node in reachable(graph, [output.node]):
         op, a, b = graph.nodes[node]
@@ -15,7 +18,13 @@ def derivative(output: Expression, symbol: Expression) -> Expression:
         if op == "call":
             if b in tangent:
                 tangent[node] = _call_tangent(a, Expression(graph, node), Expression(graph, b), tangent[b])
-        elif op not in ("const", "symbol") and (a in tangent or b in tangent):
+        elif op == "select":
+            sides = [tangent.get(side) for side in b]
+            if any(side is not None for side in sides):
+                zero = Expression(graph, graph.zero)
+                then, other = (zero if side is None else side for side in sides)
+                tangent[node] = then.where(Expression(graph, a), other)
+        elif any(part in tangent for part in operands(graph.nodes[node])) and op not in CONDITIONS:
             tangent[node] = _tangent(graph, node, tangent.get(a), tangent.get(b))
     return tangent.get(output.node, Expression(graph, graph.zero))
 
@@ -23,6 +32,10 @@ def derivative(output: Expression, symbol: Expression) -> Expression:
 def _tangent(graph: Graph, node: Node, da: Expression | None, db: Expression | None) -> Expression:
     """Return the derivative of a node of arithmetic from those of its operands; None stands for zeros."""
     op, a, b = graph.nodes[node]
+    if op == "atan2":
+        y, x = Expression(graph, a), Expression(graph, b)
+        zero = Expression(graph, graph.zero)
+        return (x * (da or zero) - y * (db or zero)) / (x * x + y * y)
     if db is None and da is not None:
         if op in ("add", "sub"):
             return da
@@ -70,7 +83,19 @@ def _call_tangent(function: str, f: Expression, a: Expression, da: Expression) -
             return da / a
         case "sqrt":
             return da / (2.0 * f)
+        case "abs":
+            return sign(a) * da
     raise ValueError(f"no derivative is known for {function}")
+
+
+def sign(a: Expression) -> Expression:
+    """Return 1, −1 or 0, as a is above, below or zero."""
+    graph = a.graph
+    above, below = (
+        Expression(graph, graph.lt(graph.zero, a.node)),
+        Expression(graph, graph.lt(a.node, graph.zero)),
+    )
+    return a.number(1.0).where(above, a.number(-1.0).where(below, a.number(0.0)))
 
 
 def substitute(output: Expression, values: Mapping[Expression, Expression]) -> Expression:
@@ -87,6 +112,8 @@ def substitute(output: Expression, values: Mapping[Expression, Expression]) -> E
             new[node] = g.neg(new[a])
         elif op == "call":
             new[node] = g.call(a, new[b])
+        elif op == "select":
+            new[node] = g.select(new[a], new[b[0]], new[b[1]])
         else:
             new[node] = getattr(g, op)(new[a], new[b])
     return Expression(g, new[output.node])

@@ -55,6 +55,10 @@ class Expression:
         """Return function(self), one of `expression_graph.FUNCTIONS`."""
         return Expression(self.graph, self.graph.call(function, self.node))
 
+    def where(self, condition: "Expression", other: "Expression") -> "Expression":
+        """Return the expression where a condition is true, and `other` where it is not."""
+        return Expression(self.graph, self.graph.select(condition.node, self.node, other.node))
+
     def named(self, name: str) -> "Expression":
         """Suggest the variable that holds the expression in emitted code, and return the expression."""
         self.graph.name(self.node, name)

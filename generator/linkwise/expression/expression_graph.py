@@ -1,13 +1,16 @@
 """A hash-consed expression graph: equal expressions are one node.
 
-A node is an index into `Graph.nodes`; an entry is `(op, a, b)`. Operands of `add`, `sub`, `mul`, `div` and
-`neg` are nodes; a `const` holds its value, a `symbol` its name, a `call` its function's name and argument.
+A node is an index into `Graph.nodes`; an entry is `(op, a, b)`. Operands of `add`, `sub`, `mul`, `div`, `neg`
+and `atan2` are nodes, and those of the conditions `lt` and `le`, a < b and a ≤ b, which are true or false; a
+`select` holds a condition, and a pair of nodes, one where it is true and one where not. A `const` holds its
+value, a `symbol` its name, a `call` its function's name and argument.
 Construction folds constants, drops zeros and ones, and pulls signs outward, so that x − y and y − x, or
 (−x)·y and x·y, share their work. A number stands for the decimal that it prints as: 0.6 · 0.125 folds to
 0.075, not to 0.07499999999999998, and what is emitted is short wherever the robot's numbers are.
 """
 
 import math
+import operator
 from collections.abc import Callable, Container, Iterable
 from decimal import Context, Decimal
 from typing import Any
@@ -31,10 +34,15 @@ FUNCTIONS: dict[str, Callable[[float], float]] = {
     "exp": math.exp,
     "log": math.log,
     "sqrt": math.sqrt,
+    "abs": abs,
 }
 
 
 ARITHMETIC = frozenset({"add", "sub", "mul", "div"})
+"""Operations that count as arithmetic."""
+CONDITIONS = frozenset({"lt", "le"})
+"""Operations on two nodes that are true or false."""
+PAIRS = ARITHMETIC | CONDITIONS | {"atan2"}
 """Operations on two nodes."""
 
 
@@ -194,7 +202,36 @@ class Graph:
                 return self.call("cos", self.nodes[a][1])
             if function == "sin":
                 return self.neg(self.call("sin", self.nodes[a][1]))
+            if function == "abs":
+                return self.call("abs", self.nodes[a][1])
         return self._node("call", function, a)
+
+    def atan2(self, y: Node, x: Node) -> Node:
+        """Return the angle of the point (x, y)."""
+        known = self.value(y), self.value(x)
+        if known[0] is not None and known[1] is not None:
+            return self.const(math.atan2(known[0], known[1]))
+        return self._node("atan2", y, x)
+
+    def lt(self, a: Node, b: Node) -> Node:
+        """Return whether a < b; of numbers, 1 or 0."""
+        return self._condition("lt", a, b, operator.lt)
+
+    def le(self, a: Node, b: Node) -> Node:
+        """Return whether a ≤ b; of numbers, 1 or 0."""
+        return self._condition("le", a, b, operator.le)
+
+    def _condition(self, op: str, a: Node, b: Node, holds: Callable[[float, float], bool]) -> Node:
+        known = self.value(a), self.value(b)
+        if known[0] is not None and known[1] is not None:
+            return self.one if holds(known[0], known[1]) else self.zero
+        return self._node(op, a, b)
+
+    def select(self, condition: Node, then: Node, other: Node) -> Node:
+        """Return `then` where the condition is true, and `other` where it is not."""
+        if condition in (self.one, self.zero):
+            return then if condition == self.one else other
+        return then if then == other else self._node("select", condition, (then, other))
 
     def power(self, a: Node, exponent: int) -> Node:
         """Return a**exponent for a whole exponent, by repeated squaring."""
@@ -219,10 +256,12 @@ class Graph:
 def operands(entry: Entry) -> tuple[Node, ...]:
     """Return the nodes that an entry is computed from."""
     op, a, b = entry
-    if op in ARITHMETIC:
+    if op in PAIRS:
         return (a, b)
     if op == "neg":
         return (a,)
+    if op == "select":
+        return (a, *b)
     return (b,) if op == "call" else ()
 
 

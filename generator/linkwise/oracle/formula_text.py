@@ -3,7 +3,7 @@
 import ast
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -56,7 +56,7 @@ class LatexReader:
             result = result * self._power()
 
     def _ends(self) -> bool:
-        return bool(re.match(r"[+\-})\]]|\\right|$", self._text[self._at :]))
+        return bool(re.match(r"[+\-})\],&<]|\\right|\\leq|\\\\|$", self._text[self._at :]))
 
     def _power(self) -> Any:
         base = self._base()
@@ -73,11 +73,15 @@ class LatexReader:
             return self._closed(self._sum(), r"\right)")
         if self._taken(r"\left|"):
             return np.abs(self._closed(self._group(), r"\right|"))
+        if self._taken(r"\begin{cases}"):
+            return self._cases()
         function = self._matched(self.FUNCTION)
         if function:
             name = function[1] or function[2]
             if name not in self._functions:
                 raise Unreadable(name)
+            if name == "atan2":
+                return self._angle()
             exponent = self._group() if self._taken("^") else 1
             return np.power(self._functions[name](self._group()), exponent)
         number = self._matched(self.NUMBER)
@@ -87,6 +91,22 @@ class LatexReader:
             if self._taken(symbol):
                 return value
         raise self._lost()
+
+    def _cases(self) -> Any:
+        """Return one of two values, which stand with their conditions after \\begin{cases}."""
+        then = self._closed(self._closed(self._sum(), "&"), r"\text{if}\:")
+        left = self._sum()
+        strict = self._taken("<")
+        right = self._sum() if strict else self._closed(None, r"\leq") or self._sum()
+        self._closed(None, r"\\")
+        other = self._closed(self._closed(self._sum(), r"& \text{otherwise}"), r"\end{cases}")
+        holds = left < right if strict else left <= right
+        return self._functions["where"](holds, then, other)
+
+    def _angle(self) -> Any:
+        self._closed(None, r"{\left(")
+        y, x = self._closed(self._sum(), ","), self._closed(self._sum(), r"\right)}")
+        return self._functions["atan2"](y, x)
 
     def _group(self) -> Any:
         if not self._taken("{"):
@@ -128,8 +148,22 @@ NAMES = (
     *("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
     *("exp", "log", "sqrt", "sign", "Abs"),
 )
-NUMPY: Functions = {name: getattr(np, NUMPY_NAMES.get(name, name)) for name in NAMES}
+CHOICES = {"Max": operator.gt, "Min": operator.lt}
+"""Functions of several arguments, and how one of them is to stand to all others."""
+NUMPY: Functions = {
+    **{name: getattr(np, NUMPY_NAMES.get(name, name)) for name in NAMES},
+    "atan2": np.arctan2,
+    "where": np.where,
+}
 """Functions of formulas, for arrays of NumPy."""
+DEFINED = {"log": 1.0, "sqrt": 1.0, "asin": 0.0, "acos": 0.0}
+"""Functions that not every number has, and a number with a value and a slope."""
+COMPARED: dict[type[ast.AST], Callable[..., Any]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+}
 
 HELD = re.compile('[ -"$-~]*')
 """Characters of formulas. Python would leave out what follows #, and read some letters as others."""
@@ -162,6 +196,13 @@ class TextFormula:
         known = {**CONSTANTS, **names}
         return sum(sign * _value(term, known, functions) for sign, term in self._terms)
 
+    def functions(self) -> set[str]:
+        """Return the names of the functions that it calls."""
+        nodes = (node for _, term in self._terms for node in ast.walk(term))
+        return {
+            node.func.id for node in nodes if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+        }
+
     def names(self) -> set[str]:
         """Return the names that its value depends on; parameters may be called like functions."""
         nodes = [node for _, term in self._terms for node in ast.walk(term)]
@@ -192,7 +233,13 @@ def parameter_values(values: Mapping[str, Any]) -> dict[str, Any]:
 def torch_functions() -> Functions:
     """Return the functions of formulas for tensors; raises LinkwiseError without torch."""
     torch = extra("torch")
-    return {name: getattr(torch, name.lower()) for name in NAMES}
+
+    def where(condition: Any, then: Any, other: Any) -> Any:
+        sides = (torch.as_tensor(side, dtype=torch.float64) for side in (then, other))
+        return torch.where(condition, *sides)
+
+    named = {name: getattr(torch, name.lower()) for name in NAMES}
+    return named | {"where": where, "atan2": torch.atan2}
 
 
 def _value(node: ast.AST, names: Mapping[str, Any], functions: Functions) -> Any:
@@ -204,8 +251,11 @@ def _value(node: ast.AST, names: Mapping[str, Any], functions: Functions) -> Any
     for above in reversed(spine):
         if type(above.op) not in OPERATORS:
             raise _unreadable(above)
+        kind = type(above.op)
         try:
-            value = OPERATORS[type(above.op)](value, _value(above.right, names, functions))
+            value = functions.get(kind.__name__, OPERATORS[kind])(
+                value, _value(above.right, names, functions)
+            )
         except ArithmeticError as error:  # of plain numbers
             raise _unreadable(above) from error
     return value
@@ -224,7 +274,66 @@ def _operand(node: ast.AST, names: Mapping[str, Any], functions: Functions) -> A
             return OPERATORS[type(op)](_value(operand, names, functions))
         case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in functions:
             return functions[name](_value(argument, names, functions))
+        case ast.Call(func=ast.Name(id="atan2"), args=[y, x], keywords=[]):
+            return functions["atan2"](*(_value(one, names, functions) for one in (y, x)))
+        case ast.Call(func=ast.Name(id="Max" | "Min" as name), args=[one, *others], keywords=[]):
+            best = _value(one, names, functions)
+            for other in (_value(other, names, functions) for other in others):
+                best = functions["where"](CHOICES[name](best, other), best, other)
+            return best
+        case ast.Call(func=ast.Name(id="Piecewise"), args=pieces, keywords=[]):
+            return _piece(node, pieces, names, functions)
     raise _unreadable(node)
+
+
+def _piece(node: ast.AST, pieces: Sequence[ast.AST], names: Mapping[str, Any], functions: Functions) -> Any:
+    """Return the value of the first piece whose condition is true, of those that sympy.Piecewise shows."""
+    match pieces:
+        case [ast.Tuple(elts=[value, condition]), *others]:
+            holds = _condition(condition, names, functions)
+            if isinstance(holds, bool):
+                chosen = value if holds else None
+                return _value(chosen, names, functions) if chosen else _piece(node, others, names, functions)
+            then = _value(value, names, _guarded(functions, holds))
+            other = _piece(node, others, names, _guarded(functions, ~holds))
+            return functions["where"](holds, then, other)
+    raise _unreadable(node)
+
+
+def _condition(node: ast.AST, names: Mapping[str, Any], functions: Functions) -> Any:
+    match node:
+        case ast.Constant(value=bool() as known):
+            return known
+        case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in COMPARED:
+            return COMPARED[type(op)](_value(left, names, functions), _value(right, names, functions))
+        case ast.BinOp(left=left, op=ast.BitAnd() | ast.BitOr() as op, right=right):
+            sides = (_condition(side, names, functions) for side in (left, right))
+            return (operator.and_ if isinstance(op, ast.BitAnd) else operator.or_)(*sides)
+        case ast.Call(func=ast.Name(id="Eq" | "Ne" as name), args=[left, right], keywords=[]):
+            one, other = (_value(side, names, functions) for side in (left, right))
+            equal = (one <= other) & (other <= one)
+            return equal if name == "Eq" else ~equal
+    raise _unreadable(node)
+
+
+def _guarded(functions: Functions, holds: Any) -> Functions:
+    """Return functions whose arguments are harmless where a condition does not hold.
+
+    Both sides are computed everywhere.
+    """
+
+    def guarded(function: Callable[..., Any], at: int, instead: float) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            given = list(arguments)
+            given[at] = functions["where"](holds, given[at], instead)
+            return function(*given)
+
+        return call
+
+    div = guarded(functions.get("Div", operator.truediv), 1, 1.0)
+    power = guarded(functions.get("Pow", operator.pow), 0, 1.0)
+    defined = {name: guarded(functions[name], 0, instead) for name, instead in DEFINED.items()}
+    return {**functions, **defined, "Div": div, "Pow": power}
 
 
 def _unreadable(node: ast.AST) -> Unreadable:

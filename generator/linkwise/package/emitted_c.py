@@ -14,7 +14,22 @@ from typing import NamedTuple
 
 ORDINARY = "arithmetic, sines and the like, and names"
 FUNCTIONS = frozenset(
-    ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "sign")
+    (
+        "sin",
+        "cos",
+        "tan",
+        "asin",
+        "acos",
+        "atan",
+        "sinh",
+        "cosh",
+        "tanh",
+        "exp",
+        "log",
+        "sqrt",
+        "abs",
+        "atan2",
+    )
 )
 """Functions of closed forms; C has fabs in place of abs."""
 SPLICED = re.compile(r"\?\?|\\[ \t\f\v\r]*\n|\r(?!\n)|[^\t\n\r -~]")

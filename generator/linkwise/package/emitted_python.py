@@ -49,6 +49,7 @@ ARITHMETIC = Grammar(
         "math: inf;typing: Any;collections.abc: Mapping;RUN.interface: ClosedForms"
         ";RUN.lagrangians.energy_interface: Parameters Values"
         ";RUN.lagrangians.partial_lagrangian: PartialLagrangian RigidLagrangian kinetic_energy"
+        ";RUN.lagrangians.written_lagrangian: WrittenLagrangian"
         ";RUN.lagrangians.frame_motion: GROUND Axes JointCurve along_z potential_at velocity_at"
         ";RUN.lagrangians.lanes: carried"
         ";RUN.file_joints: FileJoint;RUN.parameter_values: ParametricBody"
@@ -64,7 +65,7 @@ ARITHMETIC = Grammar(
             *("turn", "slide", "slope", "Lagrangian"),
         )
     ),
-    nodes=_kinds(*PLAIN, ast.ClassDef, ast.Lambda, ast.Slice),
+    nodes=_kinds(*PLAIN, ast.ClassDef, ast.Lambda, ast.Slice, ast.Compare) | {ast.Lt, ast.LtE},
 )
 """Grammar of closed forms, energies, names and the tree."""
 LOADING = Grammar(
@@ -95,6 +96,8 @@ OWN_C = "Path(__file__).parent / 'c'"
 """Expression for the folder of the C that it compiles."""
 MAKING = ("_MAKERS[backend]", "(made.face or Dynamics)", "made.face or Dynamics")
 """Further expressions that it calls: each of them is named in it."""
+OF_LIBRARY = FUNCTIONS | {"where", "full_like"}
+"""Functions of NumPy and torch that formulas call."""
 BUILTINS = frozenset(dir(builtins))
 OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.BitOr)
 """Operators of numbers, and of types."""
@@ -208,7 +211,7 @@ def _attribute(node: ast.Attribute, grammar: Grammar, known: ModuleNames) -> str
     if isinstance(node.ctx, ast.Store):
         return "changes a part of what there is"
     of_library = isinstance(node.value, ast.Name) and node.value.id in ("xp", "torch", "np")
-    return "" if node.attr in (FUNCTIONS if of_library else grammar.attributes) else f"asks for .{node.attr}"
+    return "" if node.attr in (OF_LIBRARY if of_library else grammar.attributes) else f"asks for .{node.attr}"
 
 
 def _arithmetic(node: ast.BinOp, grammar: Grammar, known: ModuleNames) -> str:

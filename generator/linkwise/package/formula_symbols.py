@@ -1,7 +1,7 @@
 """Symbols of the quantities in printed formulas, as plain text and as LaTeX, no two alike."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from keyword import kwlist
 
@@ -30,6 +30,12 @@ class FormulaSymbol:
 def motion_symbol(kind: str, k: int) -> FormulaSymbol:
     """Return the symbol of q_k, qd_k or qdd_k, k counted from 1."""
     return FormulaSymbol(f"{kind}_{k}", f"{MOTION[kind]}_{{{k}}}")
+
+
+def step_latex(name: str, taken: Collection[str]) -> str:
+    """Return the LaTeX of an intermediate value, by its name in the text."""
+    latex = latex_symbol(name)
+    return r"\mathrm{{{}}}".format(name.replace("_", r"\_")) if latex in taken else latex
 
 
 def parameter_symbols(names: Sequence[str]) -> list[FormulaSymbol]:
