@@ -46,8 +46,8 @@ ROBOT = Structure(
         (0, 1, 2, 5),
         (0, 1, 2, 5, 6),
     ),
-    # Links whose energy has terms linear in the velocities.
-    linear=(),
+    # Links with terms that are not quadratic in the velocities.
+    nonquadratic=(),
     # Run-time parameters and the values they have unless `load` is given others.
     parameters={
     },

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from linkwise.pipeline import generate, read_system
     from linkwise.robot import Coordinate, Options, read_robot
     from linkwise.study import ProcessPool, RayCluster, StudyOutcome, run_study
+    from linkwise.symbolic.moving_bodies import Particle, RigidBody
     from linkwise.symbolic.system import LinkEnergy, System
     from linkwise.symbolic.user_energies import energy_system
 
@@ -47,11 +48,13 @@ __all__ = [
     "Load",
     "Lowpass",
     "Options",
+    "Particle",
     "Payload",
     "ProcessPool",
     "Processing",
     "RayCluster",
     "Reading",
+    "RigidBody",
     "StudyOutcome",
     "System",
     "WhileColumn",
@@ -70,6 +73,7 @@ __all__ = [
 
 _ROOM_OF = {
     "Analysis": "analysis",
+    "RigidBody": "symbolic.moving_bodies",
     "Contact": "analysis",
     "Contacts": "analysis",
     "Coordinate": "robot",
@@ -80,6 +84,7 @@ _ROOM_OF = {
     "Load": "analysis",
     "Lowpass": "analysis",
     "Options": "robot",
+    "Particle": "symbolic.moving_bodies",
     "Payload": "analysis",
     "ProcessPool": "study",
     "Processing": "analysis",

@@ -31,8 +31,8 @@ from linkwise.package.entries import KernelKind
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, read_robot, told_name
 from linkwise.robot.robot import Robot
+from linkwise.symbolic.energy_file import read_energies
 from linkwise.symbolic.system import System, rigid_system
-from linkwise.symbolic.user_energies import read_energies
 
 PYTHON = ".py"
 

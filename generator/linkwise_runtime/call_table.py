@@ -42,7 +42,12 @@ def _by_order(
     return (
         Quantity(name, (*IJK, *extra), unit[0], meaning, (ORDER, "acceleration")),
         Quantity(name, (*IJK, *extra), unit[1], meaning, (ORDER, "velocity")),
-        Quantity(gravity[0], (*IJK[:2], *extra), gravity[1], "the share of gravity and other potentials"),
+        Quantity(
+            gravity[0],
+            (*IJK[:2], *extra),
+            gravity[1],
+            "the share of gravity, or of all that has a name of its own",
+        ),
     )
 
 
@@ -114,6 +119,13 @@ DYNAMICS = (
         call="propagation",
         chosen={"convention": "gradient"},
         c="gradient_propagation",
+    ),
+    Call(
+        "named_shares",
+        QD,
+        _one(
+            "named_shares", "joint link share", TORQUE, "torque on the joint, through the link, by its name"
+        ),
     ),
     Call(
         "position_gradient",
@@ -273,6 +285,7 @@ MOTIONS = (
             "rtol": 1e-9,
             "atol": 1e-12,
             "constraints": None,
+            "inputs": None,
         },
         own="passive",
         ties="kept",

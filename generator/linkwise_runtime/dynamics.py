@@ -12,7 +12,7 @@ are built on request. The arguments and the answer of each call are a row of `ca
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, Literal, overload
+from typing import Any, Literal, Self, cast, overload
 
 from numpy.typing import ArrayLike
 
@@ -75,6 +75,22 @@ class Dynamics(RobotCalls):
     def parameters(self) -> Mapping[str, Any]:
         """Values of the run-time parameters by name."""
         return self.backend.parameters
+
+    @property
+    def share_names(self) -> tuple[str, ...]:
+        """Names of the shares that `named_shares` returns."""
+        return self.structure.share_names
+
+    def at(self, **values: Any) -> Self:
+        """Return the robot at a time, or with inputs, given by their names: robot.at(t=0.2, F=force).
+
+        Each is one number, or for numpy, torch and autograd an array (...) of one for each sample. Other
+        run-time parameters may be named too. Raises as the package's `load` does.
+        """
+        backend, parameters, *others = self._asked
+        robot = cast(Self, self._load(backend, {**parameters, **values}, *others))
+        robot.backend.threads_set = self.backend.threads_set
+        return robot
 
     @cached_property
     def kinematics(self) -> Kinematics[Any]:
@@ -229,6 +245,15 @@ class Dynamics(RobotCalls):
         answer = self._call(key, (q, qd, qdd), out)
         return answer
 
+    def named_shares(self, q: Array, qd: Array, out: Array | None = None) -> Array:
+        """Return the shares of tau_ij that are not of motion, by their names, shape (..., n, N, M).
+
+        They sum to g_ij, and stand in the order of `share_names`: gravity of rigid links, and of links that
+        were written by hand each potential, dissipation and force, and what an imposed motion asks for.
+        """
+        shares: Array = self._call("named_shares", (q, qd), out)
+        return shares
+
     def position_gradient(self, q: Array, qd: Array, qdd: Array, out: Array | None = None) -> Array:
         """Return c0_ijk = d(tau_ij)/d(q_k), the partial stiffness, shape (..., n, N, n)."""
         c0: Array = self._call("position_gradient", (q, qd, qdd), out)
@@ -328,7 +353,10 @@ class Dynamics(RobotCalls):
         return coriolis
 
     def gravity_torque(self, q: Array, by_link: bool = False, out: Array | None = None) -> Array:
-        """Return g_i = sum_j g_ij, torque of gravity and other potentials, (..., n); by link (..., n, N)."""
+        """Return g_i = sum_j g_ij at rest, (..., n); by link (..., n, N).
+
+        It is the torque of gravity, or of all shares with names of links that were written by hand.
+        """
         gravity: Array = self._call("gravity_torque_by_link" if by_link else "gravity_torque", (q,), out)
         return gravity
 
@@ -359,8 +387,9 @@ class Dynamics(RobotCalls):
     def energy(self, q: Array, qd: Array, out: Sequence[Array] | None = None) -> Energy[Array]:
         """Return the kinetic and potential energy of each link in J, (..., N) each.
 
-        The potential energy of rigid links is zero at the world's origin; hand-written energies are as they
-        were written.
+        The potential energy of rigid links is zero at the world's origin. Of links that were written by hand
+        the kinetic energy is that of the terms of degree two in the velocities, and of those of degree d it
+        has d - 1 times as much: their sum is what only torques and shares without potential change.
         """
         answer: Energy[Array] = self._call("energy", (q, qd), out)
         return answer
@@ -379,8 +408,8 @@ class Dynamics(RobotCalls):
 
         By link, the shape is (..., n, N, n, n). sum_kl Gamma_ikl qd_k qd_l is the velocity force: Gamma_ikk
         qd_k^2 comes from joint k's motion alone, (Gamma_ikl + Gamma_ilk) qd_k qd_l from the motions of k and
-        l together. Symmetric in k and l. Terms of energies linear in the velocities, as on a moving base, are
-        not part of it.
+        l together. Symmetric in k and l. Shares with names are not part of it. Raises ValueError for links
+        with kinetic energies of degree three or more in the velocities.
         """
         symbols: Array = self._call("christoffel_by_link" if by_link else "christoffel", (q,), out)
         return symbols
@@ -464,6 +493,7 @@ class Dynamics(RobotCalls):
         rtol: float = 1e-9,
         atol: float = 1e-12,
         constraints: Any = None,
+        inputs: Mapping[str, Any] | None = None,
     ) -> Trajectory[Array]:
         """Return the motion of the robot from q and qd on, (..., n), at the instants `time`, (T,), in s.
 
@@ -478,12 +508,14 @@ class Dynamics(RobotCalls):
         constraints: as in `induced_accelerations`; q is closed first, and q and qd may be (..., m), of the
         independent joints alone, as `Constraints.closed` accepts them. Independent joints are integrated; the
         others are closed by Newton's method at each evaluation and after each step, and follow with G yd
+        inputs: of links that were written by hand, by name: numbers, (...), or functions of (t, q, qd); those
+        that are left out keep the values that the robot has, and its time is that of the motion
 
         The answer's energy_drift is the energy that the integration added or lost. Raises ValueError where
         the motion is no longer finite, and as forward_dynamics and `Constraints` do; ImportError without
         SciPy, for its methods.
         """
-        given = Simulated(q, qd, time, tau, loads, passive, step, method, rtol, atol, constraints)
+        given = Simulated(q, qd, time, tau, loads, passive, step, method, rtol, atol, constraints, inputs)
         trajectory: Trajectory[Array] = simulate_motion(self, given)
         return trajectory
 
@@ -511,7 +543,7 @@ class Dynamics(RobotCalls):
         """Return the changes of tau_ij with the motion of k: c2_ijk, 2 c1_ijk - h1_ijk and c0_ijk.
 
         Each has the shape (..., n, N, n): d(tau_ij) = sum_k c2_ijk d(qdd_k) + (2 c1_ijk - h1_ijk) d(qd_k) +
-        c0_ijk d(q_k), where h1 is the part of c1 that comes from energies linear in the velocities.
+        c0_ijk d(q_k), where h1 is not zero for links with terms that are not quadratic in the velocities.
         """
         answer: NaturalImpedance[Array] = self._call("natural_impedance", (q, qd, qdd), out)
         return answer

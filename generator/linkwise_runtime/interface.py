@@ -157,7 +157,7 @@ class ClosedForms(Protocol):
     """Number of operations of each function on arrays, sines and the like included."""
 
     def decomposition(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> tuple[Entries, ...]:
-        """Return (c2, c1, g, tau), and h1 after them where energy has terms linear in the velocities."""
+        """Return (c2, c1, g, tau), and h1 after them where terms are not quadratic in the velocities."""
 
     def torque(self, xp: Any, q: Any, qd: Any, qdd: Any, p: Mapping[str, Any]) -> Entries:
         """Return tau_ij, in the order of i."""
@@ -170,7 +170,10 @@ class EnergyForms(ClosedForms, Protocol):
     """Closed forms of a link given by its energies; for rigid links the rule has the energies."""
 
     def energy(self, xp: Any, q: Any, qd: Any, p: Mapping[str, Any]) -> Entries:
-        """Return the kinetic and potential energy in J."""
+        """Return the kinetic and potential energy in J, and in W the power that is not the joints'."""
+
+    def named_shares(self, xp: Any, q: Any, qd: Any, p: Mapping[str, Any]) -> Entries:
+        """Return the shares that are not of motion, name by name, in the order of i."""
 
 
 NUMPY = cast(Namespace, np)

@@ -103,7 +103,7 @@ def _before(
 
 def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict[str, NamedAxis]:
     """Return the axes by the names that quantities have for them."""
-    axes = axes_of(robot.joint_names, robot.joint_units, robot.link_names)
+    axes = axes_of(robot.joint_names, robot.joint_units, robot.link_names, robot.share_names)
     if key.startswith("kinematics.poses"):
         axes["frame"] = NamedAxis("frame", robot.kinematics.frames)
     if ties:

@@ -25,7 +25,7 @@ class Coefficients(NamedTuple, Generic[Array]):
     velocity: Array
     """c1 (..., n, N, n): coefficients of velocities."""
     gravity: Array
-    """g (..., n, N): torque of gravity and other potentials."""
+    """g (..., n, N): torque of gravity, or of all shares with names (`Dynamics.named_shares`)."""
 
 
 class Propagation(NamedTuple, Generic[Array]):
@@ -90,8 +90,8 @@ class Energy(NamedTuple, Generic[Array]):
 class Power(NamedTuple, Generic[Array]):
     """Power P_ij = tau_ij qd_i in W that joint i sends into link j, by the motion of k and its order.
 
-    The energy of a link gains what is sent into it: sum_i P_ij = d(K_j + P_j)/dt. Where K has terms linear in
-    the velocities or free of them, as on a moving base, qd . dK/dqd - K stands in its place.
+    The energy of a link gains what is sent into it: sum_i P_ij = d(K_j + P_j)/dt, but for what dissipation,
+    forces and imposed motions of links that were written by hand take.
     """
 
     acceleration: Array
@@ -145,11 +145,11 @@ class Packed(NamedTuple, Generic[Array]):
     velocity: Array
     """c1 of the closing convention."""
     gravity: Array
-    """g, the torque of gravity and other potentials."""
+    """g, the torque of gravity, or of all shares with names."""
     torque: Array
     """tau, the partial torques."""
-    velocity_linear: Array
-    """h1: the part of c1 from energy terms linear in the velocities; a robot of rigid links has none."""
+    velocity_excess: Array
+    """h1 = 2 c1 - d(tau)/d(qd), of links with terms that are not quadratic in the velocities."""
 
 
 class Contact(NamedTuple):
@@ -207,7 +207,7 @@ class InducedAccelerations(NamedTuple, Generic[Array]):
     velocity: Array
     """Shares of velocity forces (..., r, N, n): on link j, by the velocity of s (closing convention)."""
     gravity: Array
-    """Shares of gravity (..., r, N): by the weight of link j, and its other potentials."""
+    """Shares of gravity (..., r, N): by the weight of link j, or all of its shares with names."""
     passive: Array
     """Shares of spring, damping and friction of joint i (..., r, 3, n); zeros where `passive` is False."""
     loads: Array

@@ -40,7 +40,9 @@ class NamedAxis(NamedTuple):
     """Units of the places that the entries stand for, such as rad and m for joints; empty without places."""
 
 
-def axes_of(joints: Sequence[str], units: Sequence[str], links: Sequence[str]) -> dict[str, NamedAxis]:
+def axes_of(
+    joints: Sequence[str], units: Sequence[str], links: Sequence[str], shares: Sequence[str]
+) -> dict[str, NamedAxis]:
     """Return the axes of a robot's answers, by the names that `Quantity` has for them."""
     along = tuple(joints), tuple(units)
     return {
@@ -54,6 +56,7 @@ def axes_of(joints: Sequence[str], units: Sequence[str], links: Sequence[str]) -
         "world": NamedAxis("world", (*MOVES, "1"), HOMOGENEOUS),
         "own": NamedAxis("own", (*MOVES, "origin"), HOMOGENEOUS),
         "source": NamedAxis("source", LOSSES),
+        "share": NamedAxis("share", tuple(shares)),
     }
 
 

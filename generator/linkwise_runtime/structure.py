@@ -23,6 +23,10 @@ from .parameter_values import ParametricBody, checked_values
 from .qpos_motion import Qpos
 
 Indices = NDArray[np.intp]
+GRAVITY = "gravity"
+"""Name of the one share of rigid links that is not of motion."""
+IMPOSED_MOTION = "imposed motion"
+"""Name of the share of a kinetic energy that coordinates alone do not explain, as on a base that is moved."""
 
 
 class Sizes(NamedTuple):
@@ -46,8 +50,8 @@ class Layout(NamedTuple):
     """g: (i, j)."""
     torque: Indices
     """tau: (i, j)."""
-    velocity_linear: Indices
-    """h1: (i, j, k) of the links in `Structure.linear`."""
+    velocity_excess: Indices
+    """h1: (i, j, k) of the links in `Structure.nonquadratic`."""
 
 
 class JointLimits(NamedTuple):
@@ -148,8 +152,8 @@ class Structure:
     link_names: tuple[str, ...]
     paths: tuple[tuple[int, ...], ...]
     """Coordinates that move each link, ascending, counted from 0; tau_ij is zero off this path."""
-    linear: tuple[int, ...]
-    """Links whose energy has terms linear in the velocities, as on a moving base."""
+    nonquadratic: tuple[int, ...]
+    """Links with terms that are not quadratic in the velocities, whose d(tau)/d(qd) is not 2 c1."""
     parameters: Mapping[str, float]
     """Run-time parameters and their default values."""
     bodies: tuple[ParametricBody, ...] = ()
@@ -162,6 +166,14 @@ class Structure:
     """Joints of the file, in the order of their coordinates; empty where each coordinate is one joint."""
     pinocchio_order: tuple[int, ...] = ()
     """Indices of these joints in the order in which Pinocchio has them."""
+    shares: tuple[tuple[str, ...], ...] = ()
+    """Names of the shares of each link that are not of motion, where links were written by hand."""
+    degrees: tuple[int, ...] = ()
+    """Highest powers of the velocities in the kinetic energies of such links."""
+    time: str = ""
+    """Name of the parameter that is time; empty where nothing depends on it."""
+    inputs: tuple[str, ...] = ()
+    """Names of the parameters that are given from outside, sample by sample."""
 
     @cached_property
     def n(self) -> int:
@@ -179,11 +191,30 @@ class Structure:
         pairs = [[(i, j, k) for i in path for k in path] for j, path in enumerate(self.paths)]
         every = [row for rows in pairs for row in rows]
         upper = [(i, j, k) for i, j, k in every if i <= k]
-        linear = [row for j in self.linear for row in pairs[j]]
+        uneven = [row for j in self.nonquadratic for row in pairs[j]]
         single = [(i, j) for j, path in enumerate(self.paths) for i in path]
         return Layout(
-            _table(upper, 3), _table(every, 3), _table(single, 2), _table(single, 2), _table(linear, 3)
+            _table(upper, 3), _table(every, 3), _table(single, 2), _table(single, 2), _table(uneven, 3)
         )
+
+    @cached_property
+    def share_names(self) -> tuple[str, ...]:
+        """Names of the shares that are not of motion: gravity, or those of links written by hand."""
+        if not self.shares:
+            return (GRAVITY,)
+        return tuple(dict.fromkeys(name for names in self.shares for name in names))
+
+    @cached_property
+    def share_rows(self) -> Indices:
+        """Indices (i, j, m) of packed shares with names, m that of the name: link by link, then m, then i."""
+        names = self.share_names
+        rows = [
+            (i, j, names.index(name))
+            for j, (path, own) in enumerate(zip(self.paths, self.shares, strict=True))
+            for name in own
+            for i in path
+        ]
+        return _table(rows, 3)
 
     @cached_property
     def sizes(self) -> Sizes:
@@ -221,7 +252,9 @@ class Structure:
             self,
             link_names=self.link_names[link : link + 1],
             paths=self.paths[link : link + 1],
-            linear=(0,) if link in self.linear else (),
+            nonquadratic=(0,) if link in self.nonquadratic else (),
+            shares=self.shares[link : link + 1],
+            degrees=self.degrees[link : link + 1],
             parameters={},
             bodies=(),
             passive=(),

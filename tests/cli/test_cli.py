@@ -244,13 +244,13 @@ BAD_FILES = {
         '<robot name="r"><link name="a"><inertial><mass value="heavy"/></inertial></link></robot>',
         "link 'a': <mass value='heavy'> needs 1 number",
     ),
-    "cubic.py": (
+    "steep.py": (
         "from linkwise import *\nx = Coordinate('x')\ncoordinates = [x]\n"
-        "links = [LinkEnergy('a', x.qd**3, 0)]\n",
-        "link 'a': its energies have degree 3 in the velocities",
+        "links = [LinkEnergy('a', x.qd**13, 0)]\n",
+        "link 'a': its kinetic energy has degree 13 in the velocities",
     ),
     "crash.py": ("1 / 0", "running the file failed in line 1: ZeroDivisionError"),
-    "nothing.py": ("", "the file must define 'coordinates'"),
+    "nothing.py": ("", "the file must define 'links', a list of linkwise.LinkEnergy"),
     "picture.png": ("", "unknown kind of file '.png'"),
 }
 

@@ -116,7 +116,7 @@ def test_one_by_one_it_says_what_numpy_says(
         exact = tuple(a.astype(float) for a in states)
         packed = model.packed(*exact)
         for field, value in library.decomposition(*states).items():
-            expected = getattr(packed, {"linear": "velocity_linear"}.get(field, field))
+            expected = getattr(packed, {"linear": "velocity_excess"}.get(field, field))
             assert relative_error(value, expected) <= near, (field, count)
         assert relative_error(library.torque(*states), packed.torque) <= near
         slopes = model.position_gradient(*exact)

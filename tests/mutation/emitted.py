@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.urdf_text import chain, joint, link, mimic, robot
 from linkwise import Options, check_package, generate, read_system, write_package
-from linkwise.emit.formulas import too_many_to_read
+from linkwise.emit.formulas import are_short
 from mutation.mutants import Mutant, Rules, mutants
 
 DATA = Path(__file__).parents[1] / "data"
@@ -60,7 +60,7 @@ def package(name: str, folder: Path) -> Path:
         spec = folder / "every_joint.urdf"
         spec.write_text(EVERY_JOINT)
     system = read_system(spec, Options(**options))
-    backends = [one for one in BACKENDS if one != "formulas" or not too_many_to_read(system)]
+    backends = [one for one in BACKENDS if one != "formulas" or are_short(system)]
     write_package(generate(system, backends, name), folder / name)
     return folder / name
 

@@ -134,7 +134,7 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
     ),
     "neither bodies nor energies": (lambda data: data.update(tree=None), "there must be either a tree or"),
     "energies of other links": (
-        lambda data: data.update(tree=None, energies=[]),
+        lambda data: data.update(tree=None, energies={"links": [], "time": "", "inputs": []}),
         "energies is not of the links, one for each",
     ),
     "formula of nothing": (
@@ -269,8 +269,8 @@ def test_every_entry_is_held_by_name(package: Path) -> None:
 
 def as_energies(data: Any) -> None:
     """A manifest of energies that a user wrote in place of bodies."""
-    rows = [{"link": link["name"], "kinetic": "0", "potential": "0"} for link in data["links"]]
-    data.update(tree=None, energies=rows)
+    rows = [{"link": link["name"], "kinetic": "0", "degree": 2, "shares": []} for link in data["links"]]
+    data.update(tree=None, energies={"links": rows, "time": "", "inputs": []})
 
 
 SLIPS: dict[str, tuple[Callable[[Any], object], str]] = {

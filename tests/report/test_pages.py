@@ -33,7 +33,8 @@ from linkwise.report import (
     terms_report,
 )
 from linkwise.robot import Coordinate, Options, read_robot
-from linkwise.symbolic.system import EnergySystem, LinkEnergy, System, rigid_system
+from linkwise.symbolic.system import LinkEnergy, System, rigid_system
+from linkwise.symbolic.user_energies import energy_system
 from markdown_it import MarkdownIt
 
 DERIVED = (DerivationTime(2, None, 0.25, 0.125),)
@@ -96,7 +97,7 @@ def test_measured_seconds_are_held_against_the_terms() -> None:
 
 def test_an_arm_whose_first_joint_moves_no_inertia_is_refused() -> None:
     a = Coordinate("a")
-    spring = EnergySystem("spring", (a,), (LinkEnergy("coil", sp.S.Zero, a.q**2),))
+    spring = energy_system("spring", (a,), (LinkEnergy("coil", sp.S.Zero, a.q**2),))
     with pytest.raises(LinkwiseError, match="no term of τ_1 contains q̈_1"):
         study("spring", spring, 1, 1, 1, 100, silent)
 

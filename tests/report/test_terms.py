@@ -25,7 +25,8 @@ from linkwise.report import (
 from linkwise.report.laurent import Laurent, exponents
 from linkwise.robot import Options, read_robot
 from linkwise.robot.robot import Coordinate
-from linkwise.symbolic.system import EnergySystem, LinkEnergy, System, rigid_system
+from linkwise.symbolic.system import LinkEnergy, System, rigid_system
+from linkwise.symbolic.user_energies import energy_system
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 from sympy.simplify.fu import TR8
 
@@ -53,7 +54,7 @@ def spring_pendulum() -> System:
         LinkEnergy("bob", kinetic + w * a.qd * sp.sin(2 * a.q), -m * g * length * sp.cos(a.q)),
     )
     values = dict.fromkeys((m, c, k, length, w, g), 1.0)
-    return EnergySystem("spring_pendulum", (x, a), links, values)
+    return energy_system("spring_pendulum", (x, a), links, values, symbolic=True)
 
 
 def geared(ratio: float) -> System:
@@ -178,7 +179,8 @@ def test_an_angle_offset_leaves_no_spurious_terms() -> None:
     a, m = Coordinate("a"), sp.Symbol("m", real=True)
     sine, cosine = sp.sin(a.q + 0.3), sp.cos(a.q + 0.3)
     arm = LinkEnergy("arm", m * (sine**2 + cosine**2) * a.qd**2 / 2, m * cosine)
-    report = terms_report(EnergySystem("offset", (a,), (arm,), {m: 1.0}), TermQuery(), 100, False, silent)
+    system = energy_system("offset", (a,), (arm,), {m: 1.0}, symbolic=True)
+    report = terms_report(system, TermQuery(), 100, False, silent)
     # m q̈, and cos 0.3 and sin 0.3 times one wave each.
     assert report.rows[0].count.total == 3
 
@@ -210,7 +212,8 @@ def test_a_robot_whose_first_link_exceeds_the_budget_is_refused() -> None:
 )
 def test_an_energy_without_terms_is_refused_by_name(energy: sp.Expr, complaint: str) -> None:
     a = Coordinate("a")
-    system = EnergySystem("odd", (a,), (LinkEnergy("arm", a.qd**2, energy * a.q),))
+    values = dict.fromkeys(energy.free_symbols - {a.q}, 1.0)
+    system = energy_system("odd", (a,), (LinkEnergy("arm", a.qd**2, energy * a.q),), values, symbolic=True)
     with pytest.raises(LinkwiseError, match=f"link 'arm': .*{complaint}"):
         terms_report(system, TermQuery(), 10**6, False, silent)
 
@@ -247,7 +250,7 @@ def test_a_part_costs_what_its_product_costs(order: int, coordinate: int, operat
     m, k = sp.symbols("m k", real=True)
     energy = LinkEnergy("arm", m * a.qd**2 / 2 + a.qd * b.qd, k * sp.sin(a.q))
     tail = LinkEnergy("tail", c.qd**2, sp.S.Zero)
-    system = EnergySystem("odd", (a, b, c), (energy, tail), {m: 1.0, k: 1.0})
+    system = energy_system("odd", (a, b, c), (energy, tail), {m: 1.0, k: 1.0}, symbolic=True)
     (cost,) = terms_report(system, TermQuery(0, 0, coordinate, order), 100, False, silent).operations
     part = cost.rows[0].part
     assert (part and part.shared) == operations
@@ -269,7 +272,8 @@ def test_a_gear_of_a_fraction_has_the_terms_of_any_other() -> None:
 
 def test_a_parameter_named_like_a_coordinate_is_not_a_motion() -> None:
     x, mass = Coordinate("x", "m"), sp.Symbol("x", real=True)
-    system = EnergySystem("slide", (x,), (LinkEnergy("cart", mass * x.qd**2 / 2, x.q**2),), {mass: 1.0})
+    cart = LinkEnergy("cart", mass * x.qd**2 / 2, x.q**2)
+    system = energy_system("slide", (x,), (cart,), {mass: 1.0}, symbolic=True)
     (row, _) = terms_report(system, TermQuery(), 100, False, silent).rows
     assert (row.count.total, row.kept) == (2, 1)
 

@@ -310,9 +310,9 @@ def test_a_field_that_a_robot_has_none_of_is_empty_but_an_array(
 ) -> None:
     part = np.ones((*batch, 3), dtype)
     answer = package_of("planar3").load(backend).packed(part, part, part)
-    assert tuple(answer.velocity_linear.shape) == (*batch, 0)
-    assert str(answer.velocity_linear.dtype).removeprefix("torch.") == dtype
-    assert torch.is_tensor(answer.velocity_linear) == (backend in ("torch", "autograd"))
+    assert tuple(answer.velocity_excess.shape) == (*batch, 0)
+    assert str(answer.velocity_excess.dtype).removeprefix("torch.") == dtype
+    assert torch.is_tensor(answer.velocity_excess) == (backend in ("torch", "autograd"))
 
 
 REST = np.zeros(3), np.zeros(3)

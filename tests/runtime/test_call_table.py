@@ -157,7 +157,7 @@ def shape_of(
     robot: Any, row: Call, quantity: Quantity, batch: tuple[int, ...], loads: int
 ) -> tuple[int, ...]:
     """Return the shape of a quantity by the axes that the row has for it."""
-    axes = axes_of(robot.joint_names, robot.joint_units, robot.link_names)
+    axes = axes_of(robot.joint_names, robot.joint_units, robot.link_names, robot.share_names)
     sizes = dict(zip(PACKED, robot.structure.sizes, strict=True)) | {"part": PARTS, "load": loads}
     if row.rigid:
         ties = robot.constraints if row.ties == "kept" else None

@@ -102,7 +102,7 @@ def calls(package: Any, robot: Any, times: Any) -> Iterator[tuple[str, tuple[Any
         "power",
     ):
         yield name, (q, qd, qdd), {}
-    for name in ("coefficients", "coefficient_regressors", "energy", "coriolis_matrix"):
+    for name in ("coefficients", "coefficient_regressors", "energy", "coriolis_matrix", "named_shares"):
         yield name, (q, qd), {}
     for by_link in (False, True):
         yield "mass_matrix", (q,), {"by_link": by_link}

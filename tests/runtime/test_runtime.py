@@ -34,7 +34,7 @@ FORK = Structure(
     joint_units=("rad", "rad", "m"),
     link_names=("stem", "left", "right"),
     paths=((0,), (0, 1), (0, 2)),
-    linear=(2,),
+    nonquadratic=(2,),
     parameters={"m": 0.5},
 )
 ALLOWED = {"numpy", "torch"} | sys.stdlib_module_names
@@ -44,9 +44,9 @@ def test_packed_values_are_listed_link_by_link_along_their_paths() -> None:
     assert (FORK.n, FORK.N) == (3, 3)
     assert FORK.layout.torque.tolist() == [[0, 0], [0, 1], [1, 1], [0, 2], [2, 2]]
     assert FORK.layout.acceleration[1:4].tolist() == [[0, 1, 0], [0, 1, 1], [1, 1, 1]]
-    assert FORK.layout.velocity_linear.tolist() == [[0, 2, 0], [0, 2, 2], [2, 2, 0], [2, 2, 2]]
+    assert FORK.layout.velocity_excess.tolist() == [[0, 2, 0], [0, 2, 2], [2, 2, 0], [2, 2, 2]]
     assert tuple(FORK.sizes) == (7, 9, 5, 5, 4)
-    assert replace(FORK, linear=()).sizes.h1 == 0
+    assert replace(FORK, nonquadratic=()).sizes.h1 == 0
 
 
 def test_given_parameters_replace_built_in_ones_by_name() -> None:
@@ -236,7 +236,7 @@ def test_what_a_link_hands_on_is_worked_out_once_for_all_that_it_carries() -> No
     q, qd = torch.tensor([0.3, 0.1]), torch.tensor([2.0, 0.5])
     kinds = (First, Second, Third)
     tripod = replace(
-        FORK, joint_names=FORK.joint_names[:2], paths=tuple(kind.path for kind in kinds), linear=()
+        FORK, joint_names=FORK.joint_names[:2], paths=tuple(kind.path for kind in kinds), nonquadratic=()
     )
     c2, c1, *_ = backend_of_links(tripod, kinds, {}).decomposition(q, qd, qd)
     assert calls == [(5,)]
@@ -256,7 +256,7 @@ def test_an_energy_off_its_path_is_refused() -> None:
         def kinetic(self, q: Any, qd: Any, p: Any) -> Any:
             return qd[0] ** 2
 
-    alone = replace(FORK, link_names=("stray",), paths=((1,),), linear=())
+    alone = replace(FORK, link_names=("stray",), paths=((1,),), nonquadratic=())
     with pytest.raises(ValueError, match=r"asks for coordinate 0, which is not on its path \(1,\)"):
         backend_of_links(alone, [Stray], {}).torque(*torch.zeros(3, 3))
 

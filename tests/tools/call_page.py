@@ -69,7 +69,7 @@ def signature(row: Call) -> str:
 def axes() -> dict[str, NamedAxis]:
     """Axes of a robot that has joints, and rows of constraints, of both kinds."""
     kinds = ("rad", "m")
-    found = axes_of(kinds, kinds, ["link"]) | tied_axes(kinds, kinds, kinds, kinds)
+    found = axes_of(kinds, kinds, ["link"], ["share"]) | tied_axes(kinds, kinds, kinds, kinds)
     return found | {"frame": NamedAxis("frame", ()), "load": NamedAxis("load", ())}
 
 

@@ -22,7 +22,7 @@ static const int path_start[] = {0, 1, 3, 6};
 #endif
 #if PART(ONE_SAMPLE) || PART(BLOCKS) || PART(POSITION_GRADIENT)
 /* Which links have h1. */
-static const char linear[] = {0, 0, 0};
+static const char nonquadratic[] = {0, 0, 0};
 #endif
 
 /* What functions are given, and how that is handed on, of row s too; and the same of what a decomposition writes. */

@@ -4,12 +4,12 @@ In link_3.py, w3, v3, a3 and u3 belong to link 3 (its angular velocity, its orig
 per mass of its origin), in the link's own axes; q[3] and qd[3] to joint 4, as tensors are counted from 0. `constants`
 are what the link owns: load("autograd", requires_grad=...) makes nn.Parameters of them.
 
-What may be changed: the methods `kinetic` and `potential` of link_k.py, to try another energy on one link.
+What may be changed: the methods of link_k.py, to try another energy on one link.
 
-- Kinetic energy holds terms of degree two in the velocities and, where the class says `linear = True`, of degree
-  one; what doesn't depend on velocities belongs to the potential.
-- Both depend on the coordinates in `path` only.
+- Kinetic energy holds terms of degree two in the velocities; what doesn't depend on velocities belongs to the
+  potential.
 - `twist` and `height` serve the links further out too: a change there is a change of all of them.
+- All depend on the coordinates in `path` only.
 
 The autograd back end alone follows: closed forms and C were derived from the energies as generated, and stay as they
 are. `linkwise check` then names the changed file under `hashes` and fails, as the package is no longer what its

@@ -25,7 +25,6 @@ class Lagrangian(RigidLagrangian):
     """L = K - P of link 1, in J."""
 
     path = (0,)
-    linear = False
     constants = {
         "mass": 0.6,  # in kg
         "com": (0.125, 0.0, 0.0),  # centre of mass in m

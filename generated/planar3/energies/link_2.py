@@ -26,7 +26,6 @@ class Lagrangian(RigidLagrangian):
     """L = K - P of link 2, in J."""
 
     path = (0, 1)
-    linear = False
     parent = link_1.Lagrangian
     constants = {
         "mass": 0.6,  # in kg

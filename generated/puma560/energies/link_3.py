@@ -26,7 +26,6 @@ class Lagrangian(RigidLagrangian):
     """L = K - P of link 3, in J."""
 
     path = (0, 1, 2)
-    linear = False
     parent = link_2.Lagrangian
     constants = {
         "mass": 4.8,  # in kg

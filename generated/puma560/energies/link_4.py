@@ -26,7 +26,6 @@ class Lagrangian(RigidLagrangian):
     """L = K - P of link 4, in J."""
 
     path = (0, 1, 2, 3)
-    linear = False
     parent = link_3.Lagrangian
     constants = {
         "mass": 0.82,  # in kg

@@ -26,7 +26,6 @@ class Lagrangian(RigidLagrangian):
     """L = K - P of link 5, in J."""
 
     path = (0, 1, 2, 3, 4)
-    linear = False
     parent = link_4.Lagrangian
     constants = {
         "mass": 0.34,  # in kg

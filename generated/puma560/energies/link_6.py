@@ -26,7 +26,6 @@ class Lagrangian(RigidLagrangian):
     """L = K - P of link 6, in J."""
 
     path = (0, 1, 2, 3, 4, 5)
-    linear = False
     parent = link_5.Lagrangian
     constants = {
         "mass": 0.09,  # in kg

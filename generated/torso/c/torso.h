@@ -15,7 +15,7 @@
    i, k in       rad, rad   what it is
    c2(i, j, k)   kg m^2     mass matrix of link j
    c1(i, j, k)   kg m^2/s   velocity coefficients, 1/2 d(tau)/d(qd)
-   g(i, j)       N m        torque at rest: gravity
+   g(i, j)       N m        what has a name of its own: gravity
    tau(i, j)     N m        the sum above
    c0(i, j, k)   N m/rad    position gradient, d(tau(i, j))/d(q_k)
 

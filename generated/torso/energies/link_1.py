@@ -35,7 +35,6 @@ class Lagrangian(RigidLagrangian):
     """L = K - P of link 1, in J."""
 
     path = (0, 1, 2)
-    linear = False
     constants = {
         "mass": 12.5,  # in kg
         "com": (0.21, 0.012, 0.003),  # centre of mass in m

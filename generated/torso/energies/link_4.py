@@ -26,7 +26,6 @@ class Lagrangian(RigidLagrangian):
     """L = K - P of link 4, in J."""
 
     path = (0, 1, 2, 5)
-    linear = False
     parent = link_1.Lagrangian
     constants = {
         "mass": 2.1,  # in kg

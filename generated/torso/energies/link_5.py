@@ -26,7 +26,6 @@ class Lagrangian(RigidLagrangian):
     """L = K - P of link 5, in J."""
 
     path = (0, 1, 2, 5, 6)
-    linear = False
     parent = link_4.Lagrangian
     constants = {
         "mass": 1.4,  # in kg

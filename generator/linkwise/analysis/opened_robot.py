@@ -28,7 +28,7 @@ from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.entries import BodyEntry
 from linkwise.package.load import Package, open_package
 from linkwise.package.manifest import FILE
-from linkwise.package.potential_word import potential_word
+from linkwise.package.share_word import share_word
 
 
 def load_unit(unit: str) -> str:
@@ -68,7 +68,7 @@ class OpenedRobot:
     @property
     def potential(self) -> str:
         """Name of the shares g_ij."""
-        return potential_word(self.package.manifest.tree is not None)
+        return share_word(self.package.module.ROBOT.share_names)
 
     @property
     def followers(self) -> tuple[FollowingJoint, ...]:
@@ -195,6 +195,7 @@ def load_robot(directory: Path, backend: str | None = None) -> OpenedRobot:
     """
     package = open_package(directory)
     manifest = package.manifest
+    refuse_varying(package)
     chosen, model = _load(package, package.fastest_first if backend is None else (backend,))
     tree = manifest.tree
     tied = ConstrainedModel.of(model, tree) if tree is not None and tree.tied else None
@@ -213,6 +214,17 @@ def load_robot(directory: Path, backend: str | None = None) -> OpenedRobot:
         tree.passive if tree is not None else (),
         constrained=tied,
     )
+
+
+def refuse_varying(package: Package) -> None:
+    """Raise LinkwiseError for a robot that depends on time or inputs, which logs are not read for."""
+    energies = package.manifest.energies
+    varying = [] if energies is None else [*filter(None, (energies.time, *energies.inputs))]
+    if varying:
+        raise LinkwiseError(
+            f"{package.directory}: its torques depend on {listed(varying)}, beside its joints' motion, and "
+            "logs are not read for that; ask for them in Python, sample by sample, with robot.at(...)"
+        )
 
 
 def _up(gravity: Sequence[float] | None) -> tuple[float, float, float]:

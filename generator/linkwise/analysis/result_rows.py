@@ -93,7 +93,7 @@ class ResultRows:
         components = {
             row: unit.partition("/")[0] for p in points for row, unit in zip(p.rows, p.units, strict=True)
         }
-        axes = axes_of(robot.joints, robot.units, robot.links) | {
+        axes = axes_of(robot.joints, robot.units, robot.links, ()) | {
             "load": NamedAxis("load", tuple(borne.name for borne in loads)),
             "constraint": NamedAxis("constraint", rows, bases),
             "contact": NamedAxis("contact", contacts),

@@ -16,7 +16,7 @@ SHARED void API(dense_torque_one)(INPUTS, int summed, real *torque);
 
 /* No link of rigid bodies has h1. */
 #if PART(ONE_SAMPLE) || PART(BLOCKS) || PART(POSITION_GRADIENT)
-static const char linear[LINKS] = {0};
+static const char nonquadratic[LINKS] = {0};
 #endif
 
 #if PART(ONE_SAMPLE)

@@ -66,7 +66,7 @@ def subjects(package: Package, samples: int) -> Iterator[Subject]:
     """Yield a package for the parameters as generated and, if there are any, for other values too."""
     manifest = package.manifest
     (loaded, missing), values = _load(package), dict(manifest.parameters)
-    rows = IndexRows.of_paths([link.path for link in manifest.links], package.module.ROBOT.linear)
+    rows = IndexRows.of_paths([link.path for link in manifest.links], package.module.ROBOT.nonquadratic)
     compiled, headers = None, []
     if f"c/{manifest.name}.h" in manifest.files:
         compiled, result = compile_c(manifest, package.directory, rows)

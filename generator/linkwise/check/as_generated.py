@@ -141,8 +141,8 @@ def _made_otherwise(package: Package) -> Iterator[str]:
     """Yield those of __init__.py, names.py and tree.py that differ from the texts given by the manifest.
 
     The manifest has neither the docstring's lines on the meaning of parameters, which may be any, nor the
-    expressions of bodies and the links with terms linear in the velocities, which are checked by their
-    values.
+    expressions of bodies and the links with terms that are not quadratic in the velocities, which are checked
+    by their values.
     """
     directory, manifest, robot = package.directory, package.manifest, package.module.ROBOT
     chosen = [backend for name, backend in backends_of(manifest.kernel).items() if name in package.backends]
@@ -165,8 +165,8 @@ def _made_otherwise(package: Package) -> Iterator[str]:
     ]
     links = {link.name: link.path for link in manifest.links}
     passive = manifest.tree.passive if manifest.tree else ()
-    numbers = links, robot.linear, manifest.parameters, bodies, passive
-    names = names_text(manifest.name, manifest.joints, *numbers, manifest.file_joints)
+    numbers = links, robot.nonquadratic, manifest.parameters, bodies, passive
+    names = names_text(manifest.name, manifest.joints, *numbers, manifest.file_joints, manifest.energies)
     if written("names.py", names) != found:
         yield "names.py"
     if "tree.py" in manifest.files and manifest.tree is not None:

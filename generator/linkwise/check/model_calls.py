@@ -79,6 +79,8 @@ def _calls(checked: Named) -> Iterator[Entries]:
     coefficients = model.coefficients(q, qd)
     for what, value in zip(("c2", "c1", "g"), coefficients, strict=True):
         yield dense(what, value, reference)
+    if "shares" in values:
+        yield dense("shares", model.named_shares(q, qd), reference)
     most = [np.abs(x) for x in (q, qd, qdd)]
     slopes = {"closing": values["c1"], "gradient": 2 * values["c1"] - values["h1"]}
     calls: Any = model

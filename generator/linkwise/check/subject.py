@@ -20,7 +20,7 @@ from linkwise.check.frame_checks import FrameReference, frame_reference
 from linkwise.check.parametric_tree import tree_with
 from linkwise.check.regressor_checks import regressor_reference
 from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion
-from linkwise.oracle.energies import TextLagrangian, energy_reference, states_of_energies
+from linkwise.oracle.energies import TextTerms, energy_reference, states_of_energies
 from linkwise.oracle.loop_reference import LoopReference, loop_reference
 from linkwise.oracle.magnitudes import Magnitudes
 from linkwise.oracle.newton_euler import NewtonEuler
@@ -183,15 +183,19 @@ class Subject:
             states = random_states(manifest.joints, samples, rest=rest)
             recursion, magnitudes = NewtonEuler(manifest, self.tree), Magnitudes(manifest, self.tree)
             return body_reference(recursion, magnitudes, states), len(states.q)
-        if manifest.energies is not None and find_spec("torch"):
-            noises = (None, 1, 2, 3)
+        written = manifest.energies
+        if written is not None and find_spec("torch"):
+            joints = [joint.name for joint in manifest.joints]
             exact, *noisy = (
-                [TextLagrangian(energy, self.parameters, noise) for energy in manifest.energies]
-                for noise in noises
+                [TextTerms(one, joints, written.time, self.parameters, noise) for one in written.links]
+                for noise in (None, 1, 2, 3)
             )
-            found = states_of_energies(exact, manifest.joints, self.count[0])
+            names = self.package.module.ROBOT.share_names
+            found = states_of_energies(exact, names, manifest.joints, self.count[0])
             defined = len(found.states.q) > 0
-            return energy_reference(exact, noisy, found.states) if defined else None, found.tried
+            return energy_reference(exact, noisy, names, found.states) if defined else None, found.tried
+        if self.package.module.ROBOT.nonquadratic:
+            return None, 0  # differences tell apart what is quadratic in the velocities alone
         return self._own_reference()
 
     def _own_reference(self) -> tuple[Reference | None, int]:

@@ -3,12 +3,15 @@
 from operator import itemgetter
 from typing import Literal
 
-from linkwise.dynamics.euler_lagrange import euler_lagrange
+from linkwise_runtime.structure import GRAVITY, IMPOSED_MOTION
+
+from linkwise.dynamics.euler_lagrange import ShareTerms, euler_lagrange
 from linkwise.dynamics.frame_search import MAX_AXES, FrameSearch
 from linkwise.dynamics.link_forms import LinkForms, lowering
 from linkwise.errors import within
 from linkwise.expression.expression import Expression
 from linkwise.progress import Progress, silent
+from linkwise.robot.robot import Scalar
 from linkwise.symbolic.link_energy import lineage, link_energies
 from linkwise.symbolic.system import EnergySystem, System, refuse_curves
 
@@ -34,14 +37,32 @@ def link_forms(system: System, link: int, method: Method = "rule") -> LinkForms:
 def _energy_forms(system: System, link: int) -> LinkForms:
     """Return the closed forms of a link by Euler-Lagrange on the expression graph."""
     lower, x = lowering(system)
+
+    def node(expr: Scalar) -> Expression:
+        return Expression(lower.graph, lower(expr))
+
+    if isinstance(system, EnergySystem):
+        terms = system.links[link]
+        shares = (
+            ShareTerms(
+                share.name,
+                node(share.potential),
+                node(share.motion),
+                node(share.dissipation),
+                {i: node(q) for i, q in share.forces.items()},
+                share.name == IMPOSED_MOTION,
+            )
+            for share in terms.shares
+        )
+        time = None if system.time is None else node(system.time)
+        return euler_lagrange(node(terms.kinetic), shares, system.path(link), x, True, terms.degree, time)
     energies = link_energies(system)
     for carrier in lineage(energies, link):
         lower.define(carrier.twist.definitions)
         lower.define(carrier.height.definitions)
-    energy = energies[link]
-    kinetic, potential = (Expression(lower.graph, lower(e)) for e in (energy.kinetic, energy.potential))
-    by_hand = isinstance(system, EnergySystem)
-    return euler_lagrange(kinetic, potential, system.path(link), x, by_hand)
+    energy, nothing = energies[link], node(0.0)
+    weight = ShareTerms(GRAVITY, node(energy.potential), nothing, nothing)
+    return euler_lagrange(node(energy.kinetic), [weight], system.path(link), x, False)
 
 
 def derive(system: System, progress: Progress = silent, method: Method = "rule") -> tuple[LinkForms, ...]:

@@ -13,7 +13,7 @@ from linkwise.expression.expression_graph import Graph, Node
 from linkwise.expression.from_sympy import Lowering
 from linkwise.symbolic.system import System
 
-Key = TypeVar("Key", int, tuple[int, int])
+Key = TypeVar("Key", int, tuple[int, int], tuple[int, str])
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,13 @@ class LinkForms:
     frame: the common frame of its vectors in words, axes and origin; empty for hand-written energies
     acceleration: c2_ijk for i ≤ k, link j's mass matrix M^j, which is symmetric
     velocity: c1_ijk, of the closing convention
-    velocity_linear: the part ∂h1/∂q̇ of c1 that stems from energy terms linear in q̇, zero where they have no
-    force; empty where the energy has no such terms
-    gravity: g_ij
+    velocity_excess: h1_ijk = 2 c1_ijk − ∂τ_ij/∂q̇_k; empty where that is zero, as for energies quadratic in q̇
+    gravity: g_ij, the sum of all shares that have names of their own
     torque: τ_ij
     decomposed_torque: τ_ij where the coefficients are computed too, the same value in the cheaper of two ways
     position_gradient: c0_ijk = ∂τ_ij/∂q_k
-    energy: kinetic and potential energy of a link whose energies were written by hand
+    shares: by joint i and name, those shares of a link that was written by hand
+    energy: K, P and the power R of such a link: d(K + P)/dt = Σ_i τ_ij q̇_i + R
     """
 
     graph: Graph
@@ -53,15 +53,17 @@ class LinkForms:
     torque: dict[int, Node]
     decomposed_torque: dict[int, Node]
     position_gradient: dict[tuple[int, int], Node]
-    velocity_linear: dict[tuple[int, int], Node] = field(default_factory=dict)
-    energy: tuple[Node, ...] = ()
+    velocity_excess: dict[tuple[int, int], Node] = field(default_factory=dict)
+    shares: dict[tuple[int, str], Node] = field(default_factory=dict)
+    energy: dict[int, Node] = field(default_factory=dict)
 
     def decomposition(self) -> Iterator[Node]:
-        """Yield every output of the full decomposition, in the packed order: c2, c1, g, τ."""
+        """Yield every output of the full decomposition, in the packed order: c2, c1, g, τ, h1."""
         yield from self.acceleration.values()
         yield from self.velocity.values()
         yield from self.gravity.values()
         yield from self.decomposed_torque.values()
+        yield from self.velocity_excess.values()
 
     @property
     def decomposition_cost(self) -> int:

@@ -115,7 +115,6 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
     rigid = isinstance(system, RigidSystem)
     yield "__init__.py", init_text(derivation.package, loadable, parameters, about, rigid, derivation.kernel)
     links = {name: system.path(j) for j, name in enumerate(system.link_names)}
-    linear = derivation.linear
     tree = rigid_tree(system)
     passive = tree.passive if tree else ()
     yield (
@@ -124,11 +123,12 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
             derivation.package,
             joint_entries(system),
             links,
-            linear,
+            derivation.nonquadratic,
             parameters,
             bodies,
             passive,
             file_joint_entries(system),
+            energies(system),
         ),
     )
     yield "py.typed", ""

@@ -24,9 +24,9 @@ class Derivation:
     """True if the package carries a copy of what it imports of linkwise_runtime."""
 
     @property
-    def linear(self) -> frozenset[int]:
-        """Links whose energy has terms linear in the velocities."""
-        return frozenset(j for j, forms in enumerate(self.forms) if forms.velocity_linear)
+    def nonquadratic(self) -> frozenset[int]:
+        """Links with terms that are not quadratic in the velocities, whose ∂τ/∂q̇ is not 2 c1."""
+        return frozenset(j for j, forms in enumerate(self.forms) if forms.velocity_excess)
 
     @property
     def kernel(self) -> KernelKind:

@@ -5,13 +5,14 @@ They are made only of what a manifest has too, so `linkwise check` makes them ag
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from linkwise_runtime.structure import JointLimits, PassiveJoint
 from linkwise_runtime.version import VERSION
 
 from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.escape import python_docstring, python_literal
-from linkwise.package.entries import FileJointEntry, JointEntry, KernelKind
+from linkwise.package.entries import EnergiesEntry, FileJointEntry, JointEntry, KernelKind
 from linkwise.render import render
 
 LINE = 100
@@ -101,11 +102,12 @@ def names_text(
     package: str,
     joints: Sequence[JointEntry],
     links: Mapping[str, Sequence[int]],
-    linear: Iterable[int],
+    nonquadratic: Iterable[int],
     parameters: Mapping[str, float],
     bodies: Sequence[BodyText],
     passive: Sequence[PassiveJoint],
     file_joints: Sequence[FileJointEntry],
+    energies: EnergiesEntry | None,
 ) -> str:
     """Return names.py: the joints, the links, and what depends on parameters.
 
@@ -121,7 +123,8 @@ def names_text(
         "limits": [(what, _limit_text(what, joints)) for what in JointLimits._fields],
         "links": [python_literal(name) for name in links],
         "paths": [repr(tuple(path)) for path in links.values()],
-        "linear": repr(tuple(sorted(linear))),
+        "nonquadratic": repr(tuple(sorted(nonquadratic))),
+        "written": None if energies is None else _written_texts(energies),
         "parameters": [(python_literal(name), repr(value)) for name, value in parameters.items()],
         "bodies": bodies,
         "passive": [_passive_text(entry) for entry in passive],
@@ -130,6 +133,20 @@ def names_text(
         "calls_numpy": any("np." in value for body in bodies for value in body.values),
     }
     return render("package/names.py.j2", view)
+
+
+def _written_texts(energies: EnergiesEntry) -> dict[str, Any]:
+    """Return the texts of what links that were written by hand have beside paths."""
+    return {
+        "shares": [_names_text([share.name for share in link.shares]) for link in energies.links],
+        "degrees": repr(tuple(link.degree for link in energies.links)),
+        "time": python_literal(energies.time) if energies.time else "",
+        "inputs": _names_text(energies.inputs) if energies.inputs else "",
+    }
+
+
+def _names_text(names: Sequence[str]) -> str:
+    return f"({', '.join(map(python_literal, names))}{',' if len(names) == 1 else ''})"
 
 
 def _limit_text(what: str, joints: Iterable[JointEntry]) -> str:

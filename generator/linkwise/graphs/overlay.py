@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from linkwise.package.potential_word import potential_word
+from linkwise.package.share_word import share_word
 
 if TYPE_CHECKING:
     from linkwise_runtime.lagrangians.graph_calls import TorqueGraph
@@ -71,7 +71,7 @@ def overlay(robot: Any, joint: int, link: int | None, parts: Sequence[TorqueGrap
         joint,
         tuple(robot.link_names) if link is None else (robot.link_names[link],),
         link,
-        potential_word(robot.backend.tree is not None),
+        share_word(robot.structure.share_names),
         tuple(parts),
         nodes,
         {key: tuple(numbers) for key, numbers in users.items()},

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.structure import IMPOSED_MOTION
 
 from linkwise.arrays import Array
 from linkwise.extras import extra
@@ -14,46 +15,65 @@ from linkwise.oracle.reference import TOLERANCE, Reference, link_sizes
 from linkwise.oracle.states import Found, States, states_where
 from linkwise.package.entries import EnergyEntry, JointEntry
 
+PIECES = {"Piecewise", "Max", "Min", "Abs", "sign"}
+"""Functions in pieces."""
 NOISE = 1e-9
 """Relative error of each operation of a noisy Lagrangian: what it changes, rounding changes too."""
 
 
-class TextLagrangian:
-    """Lagrangian L(q, qd) of one link, for q and qd of shape (n,); raises Unreadable for no formula.
+class TextTerms:
+    """Terms of one link, for q and qd of shape (n,); raises Unreadable for no formula.
 
     noise: a seed for errors of up to NOISE in each operation, the same ones in each call; None for none
     """
 
     def __init__(
-        self, energies: EnergyEntry, parameters: Mapping[str, float], noise: int | None = None
+        self,
+        entry: EnergyEntry,
+        joints: Sequence[str],
+        time: str,
+        parameters: Mapping[str, float],
+        noise: int | None = None,
     ) -> None:
         torch = extra("torch")
-        self._kinetic, self._potential = TextFormula(energies.kinetic), TextFormula(energies.potential)
         self._noise = noise
+        self.kinetic = TextFormula(entry.kinetic)
+        self.shares = [
+            (
+                share.name,
+                TextFormula(share.potential),
+                TextFormula(share.motion),
+                TextFormula(share.dissipation),
+                {joints.index(joint): TextFormula(force) for joint, force in share.forces.items()},
+            )
+            for share in entry.shares
+        ]
         self._parameters = {
             name: torch.tensor(value, dtype=torch.float64)
             for name, value in parameter_values(parameters).items()
         }
+        symbols = dict(zip(parameters, parameter_values(parameters), strict=True))
+        self._time = symbols.get(time, "")
+        self.now = self._parameters.get(self._time, torch.zeros((), dtype=torch.float64))
 
-    def __call__(self, q: Any, qd: Any) -> Any:
-        """Return the value in J, without an axis."""
-        kinetic, potential = self.energies(q, qd)
-        return kinetic - potential
+    @property
+    def has_pieces(self) -> bool:
+        """True if a formula changes at conditions."""
+        shares = (part for _, *parts, forces in self.shares for part in (*parts, *forces.values()))
+        return any(PIECES & formula.functions() for formula in (self.kinetic, *shares))
 
-    def energies(self, q: Any, qd: Any) -> tuple[Any, Any]:
-        """Return kinetic and potential energy in J, without an axis."""
+    def value(self, formula: TextFormula, q: Any, qd: Any, time: Any) -> Any:
+        """Return the value of one of the formulas, without an axis."""
         names, functions = dict(self._parameters), dict(torch_functions())
+        if self._time:
+            names[self._time] = time
         for kind, motion in (("q", q), ("qd", qd)):
             names |= {f"{kind}_{k}": motion[k - 1] for k in range(1, len(motion) + 1)}
         if self._noise is not None:
             errors = _errors(self._noise)
             names = {name: _Noisy(value, errors) for name, value in names.items()}
             functions = {name: _noisy(function, errors) for name, function in functions.items()}
-        energies = (formula.value(names, functions) for formula in (self._kinetic, self._potential))
-        kinetic, potential = (
-            q.new_zeros(()) + _plain(one) for one in energies
-        )  # a constant is a tensor, too
-        return kinetic, potential
+        return q.new_zeros(()) + _plain(formula.value(names, functions))  # a constant is a tensor, too
 
 
 def _errors(seed: int) -> Iterator[float]:
@@ -107,90 +127,204 @@ class _Noisy:
     def __pos__(self) -> "_Noisy":
         return self
 
+    def __lt__(self, other: Any) -> Any:
+        return self.value < _plain(other)
 
-def _noisy(function: Callable[[Any], Any], errors: Iterator[float]) -> Callable[[Any], Any]:
-    return lambda argument: _Noisy(function(_plain(argument)) * next(errors), errors)
+    def __le__(self, other: Any) -> Any:
+        return self.value <= _plain(other)
+
+    def __gt__(self, other: Any) -> Any:
+        return self.value > _plain(other)
+
+    def __ge__(self, other: Any) -> Any:
+        return self.value >= _plain(other)
+
+
+def _noisy(function: Callable[..., Any], errors: Iterator[float]) -> Callable[..., Any]:
+    return lambda *given: _Noisy(function(*map(_plain, given)) * next(errors), errors)
 
 
 def _plain(value: Any) -> Any:
     return value.value if isinstance(value, _Noisy) else value
 
 
-NAMES = ("tau", "c2", "c1", "g", "c0", "h1")
-
-Lagrangians = Sequence[TextLagrangian]
+NAMES = ("tau", "c2", "c1", "g", "c0", "h1", "shares")
+POINTS = 8
+"""Gauss's points for c1: exact for kinetic energies of degree 16."""
+Terms = Sequence[TextTerms]
+CORNER, JUMP = 1e-7, 1e-3
+"""Distance of the two sides of a state, and by how much of a link's torques they differ at a corner."""
 GREATEST = 1e75
 """Largest number to compute with: products of four, as in solutions, do not overflow; masses exceed its
 inverse."""
 
 
-def energy_reference(exact: Lagrangians, noisy: Sequence[Lagrangians], states: States) -> Reference:
-    """Return the quantities of Lagrangians; `noisy` are the same but for errors of NOISE in each operation.
+def energy_reference(exact: Terms, noisy: Sequence[Terms], names: Sequence[str], states: States) -> Reference:
+    """Return the quantities of links by their terms; `noisy` are the same but for errors in each operation.
 
-    What these change, rounding of that size changes too: it measures the numbers that each value is summed
-    from, whatever cancels among them.
+    What these errors, of NOISE, change, rounding of that size changes too: it measures the numbers that each
+    value is summed from, whatever cancels among them.
+
+    names: of the shares, in the order of their axis
     """
-    values, energies, power = _values(exact, states)
+    resting = States(states.q, 0.0 * states.qd, 0.0 * states.qdd)
+    values, energies, power = _values(exact, names, states)
+    still, _, _ = _values(exact, names, resting)
     scales, sizes = link_sizes(values, states), np.abs(energies)
-    for lagrangians in noisy:
-        changed, other, _ = _values(lagrangians, states)
+    for terms in noisy:
+        changed, other, _ = _values(terms, names, states)
         scales = {
             what: np.maximum(scale, np.abs(changed[what] - values[what]) / NOISE)
             for what, scale in scales.items()
         }
         sizes = np.maximum(sizes, np.abs(other - energies) / NOISE)
-    pairs = zip(("kinetic", "potential"), zip(energies, sizes, strict=True), strict=True)
-    return Reference("energies differentiated", TOLERANCE, states, values, scales, dict(pairs), power)
+    pairs = zip(("kinetic", "potential"), zip(energies[:2], sizes[:2], strict=True), strict=True)
+    return Reference(
+        "energies differentiated",
+        TOLERANCE,
+        states,
+        values,
+        scales,
+        dict(pairs),
+        power,
+        {what: (still[what], np.maximum(scales[what], np.abs(still[what]))) for what in ("c2", "g")},
+        (energies[2], sizes[2]),
+    )
 
 
-def states_of_energies(lagrangians: Lagrangians, joints: Sequence[JointEntry], samples: int) -> Found:
+def states_of_energies(
+    terms: Terms, names: Sequence[str], joints: Sequence[JointEntry], samples: int
+) -> Found:
     """Return states at which the energies and every quantity are numbers that can be computed with."""
 
     def defined(states: States) -> Any:
-        values, energies, _ = _values(lagrangians, states)
+        values, energies, _ = _values(terms, names, states)
         mass = np.abs(np.einsum("sii->si", values["c2"].sum(2)))
         parts = (*energies, *values.values(), 1.0 / np.where(mass > 0.0, mass, 1.0))
-        return np.all([(np.abs(part) < GREATEST).reshape(len(part), -1).all(1) for part in parts], axis=0)
+        found = np.all([(np.abs(part) < GREATEST).reshape(len(part), -1).all(1) for part in parts], axis=0)
+        return found & ~_at_a_corner(terms, names, states) if any(one.has_pieces for one in terms) else found
 
     return states_where(defined, joints, samples)
 
 
-def _values(lagrangians: Lagrangians, states: States) -> tuple[dict[str, Array], Array, Array]:
-    """Return quantities, energies (2, samples, N): K and P, and rates of `energy_integral` (samples, N)."""
+def _at_a_corner(terms: Terms, names: Sequence[str], states: States) -> Any:
+    """Return at which states a quantity is another on either side: there it has no one value."""
+    sides = []
+    for step in (-CORNER, CORNER):
+        values, _, _ = _values(terms, names, States(states.q + step, states.qd + step, states.qdd))
+        sides.append(values)
+    sizes = link_sizes(sides[0], states)
+    apart = [np.abs(sides[1][what] - below) > JUMP * sizes[what] for what, below in sides[0].items()]
+    return np.any([one.reshape(len(one), -1).any(1) for one in apart], axis=0)
+
+
+def _values(terms: Terms, names: Sequence[str], states: States) -> tuple[dict[str, Array], Array, Array]:
+    """Return quantities, energies K, P and L (3, samples, N), and the power of the torques (samples, N)."""
     torch = extra("torch")
     motion = [torch.from_numpy(m) for m in states.motion]
-    rows = [[part.numpy() for part in torch.func.vmap(_Link(one))(*motion)] for one in lagrangians]
-    energies = [torch.func.vmap(one.energies)(*motion[:2]) for one in lagrangians]
-    *quantities, rates = zip(*rows, strict=True)
+    rows = [[part.numpy() for part in torch.func.vmap(_Link(one, names))(*motion)] for one in terms]
+    *quantities, kinetic, potential, lagrangian, power = zip(*rows, strict=True)
     values = {name: np.stack(parts, 2) for name, parts in zip(NAMES, quantities, strict=True)}
-    kinds = [np.stack([one.numpy() for one in kind], 1) for kind in zip(*energies, strict=True)]
-    return values, np.stack(kinds), np.stack(rates, 1)
+    kinds = (kinetic, potential, lagrangian)
+    return values, np.stack([np.stack(kind, 1) for kind in kinds]), np.stack(power, 1)
 
 
 class _Link:
-    """Quantities of one link, in the order tau, c2, c1, g, c0, h1, rate, for one sample."""
+    """Quantities of one link in the order of NAMES, then K, P, L and power, for one sample.
 
-    def __init__(self, lagrangian: Any) -> None:
-        self.func, self.lagrangian = extra("torch").func, lagrangian
+    With E = qd . dK/dqd - K + P, the torques' power is dE/dt, time itself held fixed, and what dissipation,
+    forces and imposed motions take.
+    """
+
+    def __init__(self, terms: TextTerms, names: Sequence[str]) -> None:
+        self.func, self.terms, self._names = extra("torch").func, terms, names
 
     def __call__(self, q: Any, qd: Any, qdd: Any) -> tuple[Any, ...]:
-        rest = 0.0 * qd
-        stiffness, slope = self.func.jacrev(self.torque, (0, 1))(q, qd, qdd)
-        h1 = self.func.jacrev(self.torque, 1)(q, rest, rest)
-        c2 = self.func.jacrev(self.momentum, 1)(q, qd)
-        g = self.torque(q, rest, rest)
-        along, across = self.func.grad(self.energy_integral, (0, 1))(q, qd)
-        rate = (along * qd + across * qdd).sum()
-        return self.torque(q, qd, qdd), c2, 0.5 * (slope + h1), g, stiffness, h1, rate
+        func, time = self.func, self.terms.now
+        stiffness, slope = func.jacrev(self.torque, (0, 1))(q, qd, qdd)
+        c2 = func.jacrev(self.momentum, 1)(q, qd, time)
+        points, weights = np.polynomial.legendre.leggauss(POINTS)
+        c1 = sum(
+            w / 2.0 * func.jacrev(lambda v: self.velocity_force(q, v))((x + 1.0) / 2.0 * qd)
+            for x, w in zip(points, weights, strict=True)
+        )
+        by_name = {share[0]: self.share(share, q, qd) for share in self.terms.shares}
+        zero = q.new_zeros(q.shape)
+        columns = [by_name.get(name, zero)[:, None] for name in self._names]
+        shares = extra("torch").cat([q.new_zeros((len(q), 0)), *columns], -1)
+        along, across = func.grad(self.energy, (0, 1))(q, qd, time)
+        lost = sum((self.lost(share, q, qd) for share in self.terms.shares), zero)
+        power = (along * qd + across * qdd + lost * qd).sum()
+        kinetic = self.stored_kinetic(q, qd, time)
+        return (
+            self.torque(q, qd, qdd),
+            c2,
+            c1,
+            sum(by_name.values(), zero),
+            stiffness,
+            2.0 * c1 - slope,
+            shares,
+            kinetic,
+            self.potential(q, time),
+            self.lagrangian(q, qd),
+            power,
+        )
 
-    def energy_integral(self, q: Any, qd: Any) -> Any:
-        """Return qd . dL/dqd - L, whose rate is the torques' power: K + P where K is quadratic in qd."""
-        return (qd * self.momentum(q, qd)).sum() - self.lagrangian(q, qd)
+    def kinetic(self, q: Any, qd: Any, time: Any) -> Any:
+        return self.terms.value(self.terms.kinetic, q, qd, time)
 
-    def momentum(self, q: Any, qd: Any) -> Any:
-        return self.func.grad(self.lagrangian, 1)(q, qd)
+    def potential(self, q: Any, time: Any) -> Any:
+        rest = 0.0 * q
+        found = (self.terms.value(share[1], q, rest, time) for share in self.terms.shares)
+        return sum(found, q.new_zeros(()))
+
+    def lagrangian(self, q: Any, qd: Any) -> Any:
+        time = self.terms.now
+        motions = (self.terms.value(share[2], q, qd, time) for share in self.terms.shares)
+        return sum(motions, self.kinetic(q, qd, time)) - self.potential(q, time)
+
+    def stored_kinetic(self, q: Any, qd: Any, time: Any) -> Any:
+        return (qd * self.momentum(q, qd, time)).sum() - self.kinetic(q, qd, time)
+
+    def energy(self, q: Any, qd: Any, time: Any) -> Any:
+        return self.stored_kinetic(q, qd, time) + self.potential(q, time)
+
+    def momentum(self, q: Any, qd: Any, time: Any) -> Any:
+        return self.func.grad(self.kinetic, 1)(q, qd, time)
+
+    def velocity_force(self, q: Any, qd: Any) -> Any:
+        """Return h = sum_s dp/dq_s qd_s - dK/dq."""
+        along = self.func.jacrev(self.momentum, 0)(q, qd, self.terms.now)
+        return along @ qd - self.func.grad(self.kinetic, 0)(q, qd, self.terms.now)
 
     def torque(self, q: Any, qd: Any, qdd: Any) -> Any:
-        """Return d/dt ∂L/∂q̇, by the chain rule, less ∂L/∂q."""
-        along, mass = self.func.jacrev(self.momentum, (0, 1))(q, qd)
-        return along @ qd + mass @ qdd - self.func.grad(self.lagrangian, 0)(q, qd)
+        mass = self.func.jacrev(self.momentum, 1)(q, qd, self.terms.now)
+        shares = (self.share(share, q, qd) for share in self.terms.shares)
+        return mass @ qdd + self.velocity_force(q, qd) + sum(shares, 0.0 * q)
+
+    def share(self, share: Any, q: Any, qd: Any) -> Any:
+        rest, time = 0.0 * qd, self.terms.now
+        slope = self.func.grad(lambda x: self.terms.value(share[1], x, rest, time))(q)
+        return slope + self.lost(share, q, qd)
+
+    def lost(self, share: Any, q: Any, qd: Any) -> Any:
+        """Return a share but for the slope of its potential."""
+        name, _, motion, dissipation, forces = share
+        func, now = self.func, self.terms.now
+
+        def term(x: Any, v: Any, time: Any) -> Any:
+            return self.terms.value(motion, x, v, time)
+
+        def momentum(x: Any, v: Any, time: Any) -> Any:
+            return func.grad(term, 1)(x, v, time)
+
+        along, change = func.jacrev(momentum, (0, 2))(q, qd, now)
+        found = along @ qd + change - func.grad(term, 0)(q, qd, now)
+        if name == IMPOSED_MOTION:
+            found = found + func.jacrev(self.momentum, 2)(q, qd, now)
+        found = found + func.grad(lambda v: self.terms.value(dissipation, q, v, now))(qd)
+        for joint, force in forces.items():
+            unit = q.new_zeros(q.shape)
+            unit[joint] = 1.0
+            found = found - unit * self.terms.value(force, q, qd, now)
+        return found

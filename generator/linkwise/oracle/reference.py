@@ -35,7 +35,9 @@ class Reference:
 
     values, scales: by quantity, tau, c2, c1, g, c0 and h1, alike in shape
     energies: kinetic and potential ones (samples, N), and their scales, by name; empty where there are none
-    power: d/dt of each link's energy, (samples, N)
+    power: of the joints' torques on each link, by its energies, (samples, N)
+    resting: c2 and g at rest, and their scales, where velocities change them
+    written: Lagrangians of links that were written by hand (samples, N), and their scales
     """
 
     name: str
@@ -45,12 +47,18 @@ class Reference:
     scales: Mapping[str, Array]
     energies: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     power: Array | None = None
+    resting: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    written: tuple[Array, Array] | None = None
+
+    def at_rest(self, what: str) -> tuple[Array, Array]:
+        """Return c2 or g at rest, and their scales."""
+        return self.resting.get(what) or (self.values[what], self.scales[what])
 
     @property
     def lagrangian(self) -> tuple[Array, Array] | None:
-        """Kinetic less potential energies (samples, N), and their scales likewise; None without energies."""
-        if not self.energies:
-            return None
+        """Lagrangians (samples, N), and their scales likewise; None without energies."""
+        if self.written is not None or not self.energies:
+            return self.written
         (kinetic, size), (potential, other) = self.energies.values()
         return kinetic - potential, size + other
 
@@ -98,7 +106,7 @@ def link_sizes(values: Mapping[str, Array], states: States) -> dict[str, Array]:
     times as much is taken, for what is differentiated twice: of log cosh 5q, say, only 1 − tanh² is left.
     """
     _, qd, qdd = (np.abs(x).max(initial=1e-300) for x in states.motion)
-    over = {"tau": 1.0, "g": 1.0, "c2": qdd, "c1": qd, "h1": qd, "c0": 1.0}
+    over = {"tau": 1.0, "g": 1.0, "shares": 1.0, "c2": qdd, "c1": qd, "h1": qd, "c0": 1.0}
     parts = [np.abs(value) * over[what] for what, value in values.items()]
     link = np.max([part.max(axis=(1, *range(3, part.ndim)), initial=1e-300) for part in parts], axis=0)
     return {

@@ -67,7 +67,8 @@ def _there(manifest: Manifest, module: ModuleType) -> Iterator[tuple[str, Any]]:
         yield "request.backends", {*module.BACKENDS, *_not_loaded(request["backends"], module)}
     if "parameters" in request:
         wanted = request["parameters"]
-        yield "request.parameters", "symbolic" if robot.parameters and wanted == "numeric" else wanted
+        named = set(robot.parameters) - {robot.time, *robot.inputs}
+        yield "request.parameters", "symbolic" if named and wanted == "numeric" else wanted
     if "vendor_runtime" in request:
         yield "request.vendor_runtime", manifest.runtime.vendored
 

@@ -137,9 +137,36 @@ class RigidTree:
 
 
 @dataclass(frozen=True)
+class ShareEntry:
+    """Terms of a share with a name, as text, "0" for none; see `linkwise.symbolic.system.Share`.
+
+    forces: by the names of joints
+    """
+
+    name: str
+    potential: str
+    motion: str
+    dissipation: str
+    forces: Mapping[str, str]
+
+
+@dataclass(frozen=True)
 class EnergyEntry:
-    """Energies in J that a user wrote for a link: text in q_k and qd_k, k from 1, and parameters' symbols."""
+    """Terms that a user wrote for a link: text in q_k and qd_k, k from 1, and parameters' symbols.
+
+    degree: of the kinetic energy in the velocities
+    """
 
     link: str
     kinetic: str
-    potential: str
+    degree: int
+    shares: tuple[ShareEntry, ...]
+
+
+@dataclass(frozen=True)
+class EnergiesEntry:
+    """Terms that a user wrote for all links; which of the parameters are time, empty for none, and inputs."""
+
+    links: tuple[EnergyEntry, ...]
+    time: str
+    inputs: tuple[str, ...]

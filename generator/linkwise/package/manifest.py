@@ -15,7 +15,7 @@ from linkwise.package.checked_tree import check_curve, check_tree
 from linkwise.package.decode import decode, parse_json, require
 from linkwise.package.entries import (
     CodeSize,
-    EnergyEntry,
+    EnergiesEntry,
     FileJointEntry,
     FollowerEntry,
     JointEntry,
@@ -73,7 +73,7 @@ class Manifest:
     code_size: CodeSize | None
     parameters: Mapping[str, float]
     tree: RigidTree | None
-    energies: tuple[EnergyEntry, ...] | None
+    energies: EnergiesEntry | None
     files: Mapping[str, str]
 
     def __post_init__(self) -> None:
@@ -105,7 +105,7 @@ class Manifest:
             raise ValueError("there must be either a tree or energies")
         if self.tree is not None:
             check_tree(self.tree, self.joints, self.links)
-        if self.energies is not None and [e.link for e in self.energies] != names["links"]:
+        if self.energies is not None and [e.link for e in self.energies.links] != names["links"]:
             raise ValueError("energies is not of the links, one for each, in their order")
 
     def text(self) -> str:

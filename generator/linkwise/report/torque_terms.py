@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from linkwise.errors import LinkwiseError
-from linkwise.package.potential_word import potential_word
+from linkwise.package.share_word import share_word
 from linkwise.progress import Progress
 from linkwise.report.expanded_torques import form_of, link_torques
 from linkwise.report.laurent import BudgetExceededError
@@ -66,6 +66,7 @@ def terms_report(
 
     With `partial` the links that fit are reported, if at least one of them was requested.
     """
+    _refuse_forces(system)
     wanted = len(system.links) if query.link is None else query.link + 1
     rows, counted = _rows(system, query, wanted, budget, progress)
     if counted < wanted and not (partial and rows):
@@ -79,7 +80,7 @@ def terms_report(
         system.name,
         query,
         form_of(system),
-        potential_word(not isinstance(system, EnergySystem)),
+        share_word(system.share_names),
         tuple(c.name for c in system.coordinates),
         system.link_names,
         counted,
@@ -89,6 +90,19 @@ def terms_report(
         tuple(cost for cost in costs if query.link in (None, cost.link)),
         {i: total_cost(costs, i, query) for i in joints if query.link is None},
     )
+
+
+def _refuse_forces(system: System) -> None:
+    """Raise LinkwiseError for links whose torques are not those of a Lagrangian alone."""
+    if not isinstance(system, EnergySystem):
+        return
+    for link in system.links:
+        if not link.has_lagrangian or system.time is not None:
+            what = "explicit time" if link.has_lagrangian else "dissipation or forces"
+            raise LinkwiseError(
+                f"{system.name}: link {link.name!r} has {what}, and terms are counted of energies alone; "
+                "leave that out to count the others"
+            )
 
 
 def _rows(

@@ -10,11 +10,13 @@ from sympy.printing.str import StrPrinter
 
 from linkwise.package.entries import (
     BodyEntry,
+    EnergiesEntry,
     EnergyEntry,
     FileJointEntry,
     FollowerEntry,
     JointEntry,
     RigidTree,
+    ShareEntry,
 )
 from linkwise.package.formula_symbols import motion_symbol, parameter_symbols
 from linkwise.robot.robot import Robot, Scalar, Vec3
@@ -121,12 +123,31 @@ def in_radians(system: System) -> tuple[str, ...]:
     )
 
 
-def energies(system: System) -> tuple[EnergyEntry, ...] | None:
-    """Return the energies that a user wrote; None for rigid bodies."""
+def energies(system: System) -> EnergiesEntry | None:
+    """Return the terms that a user wrote; None for rigid bodies."""
     if not isinstance(system, EnergySystem):
         return None
-    text = _texts(system)
-    return tuple(EnergyEntry(link.name, text(link.kinetic), text(link.potential)) for link in system.links)
+    text, joints = _texts(system), [c.name for c in system.coordinates]
+    links = tuple(
+        EnergyEntry(
+            link.name,
+            text(link.kinetic),
+            link.degree,
+            tuple(
+                ShareEntry(
+                    share.name,
+                    text(share.potential),
+                    text(share.motion),
+                    text(share.dissipation),
+                    {joints[i]: text(q) for i, q in share.forces.items()},
+                )
+                for share in link.shares
+            ),
+        )
+        for link in system.links
+    )
+    time = "" if system.time is None else system.time.name
+    return EnergiesEntry(links, time, tuple(symbol.name for symbol in system.inputs))
 
 
 def _places(robot: Robot) -> Iterator[tuple[str, Scalar]]:

@@ -93,7 +93,10 @@ def link_energies(system: System) -> tuple[StepwiseEnergy, ...]:
     """
     refuse_curves(system)
     if isinstance(system, EnergySystem):
-        return tuple(StepwiseEnergy(link.name, link.kinetic, link.potential) for link in system.links)
+        return tuple(
+            StepwiseEnergy(link.name, sp.Add(link.kinetic, *link.motions), link.potential)
+            for link in system.links
+        )
     robot = system.robot
     states: dict[int, _FrameState] = {}
     position: dict[int, int] = {}

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 
 import sympy as sp
 from linkwise_runtime.html_tables import joint_table, page_part, table
+from linkwise_runtime.structure import GRAVITY
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.notes import Note
@@ -32,13 +33,86 @@ class RigidLink:
     inertia: Mat3
 
 
+Named: TypeAlias = Mapping[str, sp.Expr]
+"""Expressions by the names that their shares of a torque have."""
+Forces: TypeAlias = Mapping[Any, Any]
+"""Generalised forces Q_i by coordinate, its symbol or its name; or such mappings by the names of shares."""
+
+POTENTIAL, DISSIPATION, FORCE = "potential", "dissipation", "force"
+"""Names of shares to which the user gives none."""
+
+
 @dataclass(frozen=True)
 class LinkEnergy:
-    """Kinetic and potential energy of one link in J, as a user writes them; L_j = kinetic − potential."""
+    """Energies and forces of one link, a body or a subsystem, as written; L_j = kinetic − potential.
+
+        τ_ij = d/dt ∂L_j/∂q̇_i − ∂L_j/∂q_i + ∂D_j/∂q̇_i − Q_ij
+
+    kinetic: in J, a polynomial in the velocities
+    potential: P in J, linear in the velocities at most, as a magnet's; one, or several by name
+    dissipation: Rayleigh's D in W, of which ∂D/∂q̇_i is what the joint gives; one, or several by name
+    forces: generalised forces Q_i in N m or N, by coordinate, with its symbol or its name; or such mappings
+    by name
+
+    Each name is a share of its own in every torque. What has none is called potential, dissipation or force.
+    """
+
+    name: str
+    kinetic: sp.Expr = sp.S.Zero
+    potential: sp.Expr | Named = sp.S.Zero
+    dissipation: sp.Expr | Named = sp.S.Zero
+    forces: Forces = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share of a link's torques that has a name of its own.
+
+    s_i = d/dt ∂ℓ/∂q̇_i − ∂ℓ/∂q_i + ∂D/∂q̇_i − Q_i      with ℓ = motion − potential
+    """
+
+    name: str
+    potential: sp.Expr = sp.S.Zero
+    """P in J, without velocities: what is stored."""
+    motion: sp.Expr = sp.S.Zero
+    """Terms of the Lagrangian in J linear in the velocities, or of an imposed motion; they store nothing."""
+    dissipation: sp.Expr = sp.S.Zero
+    forces: Mapping[int, sp.Expr] = field(default_factory=dict)
+
+    def parts(self) -> tuple[sp.Expr, ...]:
+        """Return all expressions."""
+        return self.potential, self.motion, self.dissipation, *self.forces.values()
+
+
+@dataclass(frozen=True)
+class LinkTerms:
+    """Terms of one link, sorted: kinetic energy of degree two and more in the velocities, and shares."""
 
     name: str
     kinetic: sp.Expr
-    potential: sp.Expr
+    degree: int
+    """Highest power of velocities in the kinetic energy."""
+    shares: tuple[Share, ...]
+
+    @property
+    def potential(self) -> sp.Expr:
+        """Potential energy in J, of all shares."""
+        return sp.Add(*(share.potential for share in self.shares))
+
+    @property
+    def motions(self) -> tuple[sp.Expr, ...]:
+        """Terms of the Lagrangian, beside these two energies, of all shares."""
+        return tuple(share.motion for share in self.shares)
+
+    @property
+    def has_lagrangian(self) -> bool:
+        """True if nothing is dissipated or given: all torques are those of a Lagrangian."""
+        return not any(share.dissipation != 0 or share.forces for share in self.shares)
+
+    def symbols(self) -> set[sp.Symbol]:
+        """Return the symbols of all expressions."""
+        parts = (part for share in self.shares for part in share.parts())
+        return set(self.kinetic.free_symbols).union(*(part.free_symbols for part in parts))
 
 
 @dataclass(frozen=True)
@@ -78,6 +152,11 @@ class RigidSystem:
         return {sp.Symbol(p.name, real=True): p.value for p in self.robot.parameters}
 
     @property
+    def share_names(self) -> tuple[str, ...]:
+        """Name of the one share that is not of motion."""
+        return (GRAVITY,)
+
+    @property
     def curved(self) -> bool:
         """True if a joint follows a curve of its coordinate."""
         return any(link.joint.curve for link in self.robot.links)
@@ -98,11 +177,21 @@ class EnergySystem:
 
     name: str
     coordinates: tuple[Coordinate, ...]
-    links: tuple[LinkEnergy, ...]
+    links: tuple[LinkTerms, ...]
     parameters: Mapping[sp.Symbol, float] = field(default_factory=dict)
+    """Run-time parameters and their values, time and inputs among them, whose value is that of none given."""
     notes: tuple[Note, ...] = ()
     request: Mapping[str, Any] = field(default_factory=dict, compare=False)
     """Source that it was read from, and the options, as manifests keep them."""
+    time: sp.Symbol | None = None
+    """Time among the parameters; None where nothing depends on it."""
+    inputs: tuple[sp.Symbol, ...] = ()
+    """Inputs among the parameters."""
+
+    @property
+    def share_names(self) -> tuple[str, ...]:
+        """Names of the shares of torques, in the order of their first link."""
+        return tuple(dict.fromkeys(share.name for link in self.links for share in link.shares))
 
     def _repr_html_(self) -> str:
         """Return the HTML that a notebook shows: coordinates, and links with the coordinates moving them."""
@@ -118,10 +207,10 @@ class EnergySystem:
         return tuple(link.name for link in self.links)
 
     def path(self, link: int) -> tuple[int, ...]:
-        """Return path(j): the coordinates that the energy of link `link` depends on, in ascending order."""
-        energy = self.links[link]
-        used = energy.kinetic.free_symbols | energy.potential.free_symbols
-        return tuple(k for k, c in enumerate(self.coordinates) if used & {c.q, c.qd})
+        """Return path(j): the coordinates that link `link` depends on, in ascending order."""
+        terms = self.links[link]
+        used, loaded = terms.symbols(), {i for share in terms.shares for i in share.forces}
+        return tuple(k for k, c in enumerate(self.coordinates) if k in loaded or used & {c.q, c.qd})
 
 
 System: TypeAlias = RigidSystem | EnergySystem

@@ -1,11 +1,8 @@
 """Systems whose link energies a user writes in SymPy."""
 
-import runpy
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
 from sys import float_info
-from traceback import walk_tb
 from typing import Any
 
 import sympy as sp
@@ -14,86 +11,65 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.escape import short
 from linkwise.robot.coordinates import check_joints
 from linkwise.robot.robot import Coordinate, unusable
-from linkwise.symbolic.passed_over import refuse_passed_over
-from linkwise.symbolic.system import EnergySystem, LinkEnergy
-
-MOST_EXPANDED = 50
-"""Largest power of velocities that is multiplied out: a larger one may never finish."""
+from linkwise.symbolic.energy_terms import GivenTerms, sorted_terms, symbols_of, written_terms
+from linkwise.symbolic.moving_bodies import BODIES, Particle, RigidBody
+from linkwise.symbolic.system import EnergySystem, LinkEnergy, LinkTerms
+from linkwise.symbolic.written_motion import WrittenMotion
 
 
 def energy_system(
     name: str,
-    coordinates: Iterable[Coordinate],
-    links: Iterable[LinkEnergy],
+    coordinates: Iterable[Coordinate] | Mapping[sp.Expr, str],
+    links: Iterable[LinkEnergy | Particle | RigidBody],
     parameters: Mapping[sp.Symbol, float] | None = None,
     symbolic: bool = False,
+    time: sp.Symbol | None = None,
+    inputs: Iterable[sp.Expr] = (),
 ) -> EnergySystem:
-    """Return the system of link energies, checked: every symbol known, degree at most 2 in the velocities.
+    """Return the system of links that a user wrote, checked: every symbol known, every expression usable.
 
-    `parameters` gives each other symbol its value; they become numbers unless `symbolic`, and
-    those that no energy has are left out. Velocity terms of the potential count as kinetic, terms of the
-    kinetic energy without velocities as potential.
+    coordinates: `Coordinate` of each, whose symbols energies use; or functions of time, as of
+    sympy.physics.mechanics.dynamicsymbols, with their units, {theta: "rad"}
+    parameters: the value of each other symbol; they become numbers unless `symbolic`, and those that no
+    expression has are left out
+    time: the symbol of time, where expressions depend on it; that of coordinates given as functions is known
+    inputs: symbols or functions of what is given from outside, which forces and dissipation may depend on
 
-    Raises LinkwiseError naming the link, and for more coordinates than can be generated.
+    Time and inputs are run-time parameters, with the value 0 unless another is given. Raises LinkwiseError
+    naming the link, and for more coordinates than can be generated.
     """
-    coordinates, links = tuple(coordinates), tuple(links)
-    check_joints(len(coordinates), "leave some out")
-    _check_names(name, coordinates, links)
-    values = _values(parameters or {}, coordinates)
-    checked = []
+    motion = WrittenMotion(_listed(coordinates), time, _listed(inputs))
+    links = tuple(links)
+    check_joints(len(motion.coordinates), "leave some out")
+    _check_names(name, motion.coordinates, links)
+    values = _values(parameters or {}, motion)
+    checked, used = [], set[sp.Symbol]()
     for link in links:
         with within(f"link {link.name!r}"):
-            checked.append(_checked(link, coordinates, values, symbolic))
-    used = set().union(*(link.kinetic.free_symbols | link.potential.free_symbols for link in checked))
-    kept = {symbol: value for symbol, value in values.items() if symbol in used}
+            written = link.energies(motion.rate) if isinstance(link, BODIES) else link
+            terms = written_terms(written, motion)
+            found = _checked(link.name, terms, motion, values, symbolic)
+            used |= symbols_of(terms.all())
+            checked.append(found)
+    kept = {symbol: value for symbol, value in values.items() if symbolic and symbol in used}
+    varying = {symbol: value for symbol, value in motion.varying.items() if symbol in used}
     request = {"parameters": "symbolic" if symbolic else "numeric"}
-    return EnergySystem(name, coordinates, tuple(checked), kept if symbolic else {}, request=request)
-
-
-def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
-    """Return the system of a Python file that defines `coordinates`, `links`, and optionally other names.
-
-    The file is run; the other names are `parameters` and `name`. Raises LinkwiseError as `energy_system`
-    does, and for a name that nobody reads.
-    """
-    try:
-        scope: dict[str, Any] = runpy.run_path(str(path))
-    except LinkwiseError:
-        raise
-    except (Exception, SystemExit) as error:  # the user's own code may raise anything
-        raise LinkwiseError(f"running the file failed{_said(error, str(path))}") from error
-    refuse_passed_over(path.read_bytes(), scope)
-    for required, kind in (("coordinates", Coordinate), ("links", LinkEnergy)):
-        items = scope.get(required)
-        if not isinstance(items, (list, tuple)) or not all(isinstance(item, kind) for item in items):
-            raise LinkwiseError(f"the file must define {required!r}, a list of linkwise.{kind.__name__}")
-    return energy_system(
-        scope.get("name", path.stem),
-        scope["coordinates"],
-        scope["links"],
-        scope.get("parameters"),
-        symbolic,
+    return EnergySystem(
+        name,
+        motion.coordinates,
+        tuple(checked),
+        kept | varying,
+        request=request,
+        time=motion.time if motion.time in varying else None,
+        inputs=tuple(symbol for symbol in motion.inputs if symbol in varying),
     )
 
 
-def _said(error: BaseException, path: str) -> str:
-    """Return in words the last line of the user's file that an error passed through, and the error."""
-    said = _text_of(error)
-    lines = [at for frame, at in walk_tb(error.__traceback__) if frame.f_code.co_filename == path]
-    if isinstance(error, SyntaxError) and error.filename == path:
-        lines, said = [error.lineno] if error.lineno else [], error.msg
-    place = f" in line {lines[-1]}" if lines else ""
-    return f"{place}: {type(error).__name__}{': ' if said else ''}{said}"
+def _listed(given: Iterable[Any]) -> Any:
+    return given if isinstance(given, Mapping) else list(given)
 
 
-def _text_of(error: BaseException) -> str:
-    try:
-        return str(error)
-    except Exception:  # the user's own class may raise here, too
-        return ""
-
-
-def _check_names(name: str, coordinates: tuple[Coordinate, ...], links: tuple[LinkEnergy, ...]) -> None:
+def _check_names(name: str, coordinates: tuple[Coordinate, ...], links: tuple[Any, ...]) -> None:
     if not isinstance(name, str):
         raise LinkwiseError(f"the robot's name is {name!r}; give a string")
     if not coordinates or not links:
@@ -115,13 +91,11 @@ def _check_names(name: str, coordinates: tuple[Coordinate, ...], links: tuple[Li
             )
 
 
-def _values(
-    parameters: Mapping[sp.Symbol, float], coordinates: tuple[Coordinate, ...]
-) -> dict[sp.Symbol, float]:
+def _values(parameters: Mapping[sp.Symbol, float], motion: WrittenMotion) -> dict[sp.Symbol, float]:
     """Return the parameters with float values; one symbol a name, as generated code knows names only."""
     if not isinstance(parameters, Mapping) or not all(isinstance(s, sp.Symbol) for s in parameters):
         raise LinkwiseError("`parameters` must be a dictionary of SymPy symbols and their values")
-    for name, count in Counter(symbol.name for symbol in parameters).items():
+    for name, count in Counter(symbol.name for symbol in (*parameters, *motion.varying)).items():
         if count > 1:
             raise LinkwiseError(
                 f"{count} different parameters are called {name}, told apart by their assumptions only; "
@@ -129,7 +103,7 @@ def _values(
             )
     values = {}
     for symbol, value in parameters.items():
-        if symbol in {s for c in coordinates for s in (c.q, c.qd)}:
+        if symbol in {*motion.positions, *motion.velocities}:
             raise LinkwiseError(f"{symbol} is both a coordinate and a parameter; rename one")
         if isinstance(value, (str, bytes, bool)):
             raise LinkwiseError(f"parameter {symbol} is {short(repr(value))}; give a number, without quotes")
@@ -143,52 +117,31 @@ def _values(
 
 
 def _checked(
-    link: LinkEnergy,
-    coordinates: tuple[Coordinate, ...],
-    values: dict[sp.Symbol, float],
-    symbolic: bool,
-) -> LinkEnergy:
-    kinetic = _whole(_expression("kinetic", link.kinetic))
-    potential = _whole(_expression("potential", link.potential))
-    velocities = [c.qd for c in coordinates]
-    known = {c.q for c in coordinates} | set(velocities) | set(values)
-    for symbol in sorted((kinetic.free_symbols | potential.free_symbols) - known, key=str):
-        if symbol.name in {parameter.name for parameter in values}:
+    name: str, terms: GivenTerms, motion: WrittenMotion, values: dict[sp.Symbol, float], symbolic: bool
+) -> LinkTerms:
+    terms = terms.mapped(_whole)
+    known = {*motion.known(), *values}
+    for symbol in sorted(symbols_of(terms.all()) - known, key=str):
+        if symbol.name in {parameter.name for parameter in (*values, *motion.varying)}:
             raise LinkwiseError(
-                f"the symbol {symbol} is not the one among `parameters`: their assumptions differ; "
-                "make it once and use it everywhere"
+                f"the symbol {symbol} is not the one among `parameters`, `time` and `inputs`: their "
+                "assumptions differ; make it once and use it everywhere"
             )
         raise LinkwiseError(
             f"the symbol {symbol} is neither a coordinate (use its .q and .qd) nor among `parameters`; "
             "add it there"
         )
     numbers = {symbol: sp.Float(value, 17) for symbol, value in values.items()}
-    plain = _whole(kinetic.xreplace(numbers)), _whole(potential.xreplace(numbers))
-    _check_real(kinetic, potential, *plain)
+    plain = terms.mapped(lambda expr: _whole(expr.xreplace(numbers)))
+    _check_real(*(expr for _, expr in (*terms.all(), *plain.all())))
     if symbolic:
-        _check_exponents(kinetic.atoms(sp.Pow) | potential.atoms(sp.Pow), set(values))
-    else:
-        kinetic, potential = plain
-    _check_degree(kinetic - potential, velocities)
-    if not (kinetic - potential).free_symbols & (known - set(values)):
-        raise LinkwiseError("its energies depend on no coordinate; leave the link out")
-    rest = dict.fromkeys(velocities, sp.S.Zero)
-    moving = potential.free_symbols & set(velocities) or kinetic.subs(rest) != 0
-    if moving:
-        lagrangian = kinetic - potential
-        potential = -lagrangian.subs(rest)
-        kinetic = lagrangian + potential
-    return LinkEnergy(link.name, kinetic, potential)
-
-
-def _expression(what: str, energy: object) -> sp.Expr:
-    try:
-        expression = sp.sympify(energy, strict=True)
-    except sp.SympifyError:
-        expression = None
-    if not isinstance(expression, sp.Expr):
-        raise LinkwiseError(f"its {what} energy is {energy!r}; give a SymPy expression, 0 for none")
-    return expression
+        _check_exponents((power for _, expr in terms.all() for power in expr.atoms(sp.Pow)), set(values))
+    chosen = terms if symbolic else plain
+    if not symbols_of(chosen.all()) & {*motion.positions, *motion.velocities} and not any(
+        chosen.forces.values()
+    ):
+        raise LinkwiseError("it depends on no coordinate; leave the link out")
+    return sorted_terms(name, chosen, motion, numbers)
 
 
 def _whole(energy: sp.Expr) -> sp.Expr:
@@ -237,19 +190,3 @@ def _numbers(expr: sp.Basic) -> Iterator[sp.Expr]:
     else:
         for part in expr.args:
             yield from _numbers(part)
-
-
-def _check_degree(lagrangian: sp.Expr, velocities: list[sp.Symbol]) -> None:
-    powers = [power.exp for power in lagrangian.atoms(sp.Pow) if power.base.free_symbols & set(velocities)]
-    degree = max((exponent for exponent in powers if exponent.is_Integer), default=0)
-    try:
-        if degree <= MOST_EXPANDED:
-            degree = sp.Poly(lagrangian, *velocities, domain="EX").total_degree()
-    except sp.PolynomialError:
-        raise LinkwiseError(
-            "its energies are not polynomials in the velocities; use terms up to degree 2"
-        ) from None
-    if degree > 2:
-        raise LinkwiseError(
-            f"its energies have degree {degree} in the velocities; this method takes terms up to degree 2"
-        )

@@ -27,7 +27,7 @@ def answer_shapes(structure: Structure, frames: int = 0) -> dict[str, Shapes]:
 
     frames: the number of frames, where it is known
     """
-    axes = axes_of(structure.joint_names, structure.joint_units, structure.link_names)
+    axes = axes_of(structure.joint_names, structure.joint_units, structure.link_names, structure.share_names)
     sizes = {axis: len(named.names) for axis, named in axes.items()}
     sizes |= dict(zip(PACKED, structure.sizes, strict=True)) | ({"frame": frames} if frames else {})
     return {
@@ -98,6 +98,13 @@ class Answers:
         c2, c1, _, _, h1 = self.packed(q, qd, qdd)
         (stiffness,) = self.position_gradient(q, qd, qdd)
         return self._tables.spread(c2, "acceleration"), self._slopes(c1, h1), stiffness
+
+    def named_shares(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
+        """Return the shares that are not of motion by name, (..., n, N, M)."""
+        if not self._structure.shares:
+            (gravity,) = self.gravity_torque_by_link(q)
+            return (gravity[..., None],)
+        return (self._tables.spread(self._engine.named_shares(q, qd), "shares"),)
 
     def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return c0, (..., n, N, n)."""
@@ -197,10 +204,7 @@ class Answers:
         return self._christoffel(q, lambda c1: self._tables.matrices(c1, "velocity"))
 
     def christoffel_by_link(self, q: Numbers) -> Sequence[Numbers]:
-        """Return Gamma_ijkl = c1_ijk at qd = e_l less c1_ijk at rest, (..., n, N, n, n).
-
-        c1 at rest comes from terms of energies linear in qd.
-        """
+        """Return Gamma_ijkl = c1_ijk at qd = e_l, (..., n, N, n, n)."""
         return self._christoffel(q, lambda c1: self._tables.spread(c1, "velocity"))
 
     def check_regresses(self) -> None:
@@ -214,7 +218,7 @@ class Answers:
     def _slopes(self, c1: Numbers, h1: Numbers) -> Numbers:
         """Return d(tau_ij)/d(qd_k) = 2 c1 - h1, (..., n, N, n)."""
         slopes = 2.0 * self._tables.spread(c1, "velocity")
-        return slopes - self._tables.spread(h1, "velocity_linear") if self._structure.linear else slopes
+        return slopes - self._tables.spread(h1, "velocity_excess") if self._structure.nonquadratic else slopes
 
     def _propagated(
         self, c2: Numbers, velocity: Numbers, g: Numbers, qd: Numbers, qdd: Numbers
@@ -223,6 +227,11 @@ class Answers:
         return acceleration, velocity * qd[..., None, None, :], self._tables.spread(g, "gravity")
 
     def _christoffel(self, q: Numbers, made: Callable[[Numbers], Numbers]) -> Sequence[Numbers]:
+        if max(self._structure.degrees, default=2) > 2:
+            raise ValueError(
+                f"velocity forces of {self._structure.name} have more than two velocities at once, and no "
+                "Christoffel symbols; coefficients has c1"
+            )
         n, batch, each = self._structure.n, q.shape[:-1], max(1, sum(self._structure.sizes))
         units = self._engine.constant(np.eye(n), q)
         if is_traced(q):
@@ -245,11 +254,7 @@ class Answers:
     def _of_units(self, q: Numbers, units: Numbers, made: Callable[[Numbers], Numbers]) -> Numbers:
         """Return what `made` makes of c1 at unit velocities e_l, for samples (..., n); l is the last axis."""
         rates = units.reshape(len(units), *[1] * (q.ndim - 1), units.shape[-1]) + 0.0 * q
-        values = self.packed(q + 0.0 * rates, rates, 0.0 * rates)[1]
-        if self._structure.linear:
-            rest = self._rest(q)
-            values = values - self.packed(q, rest, rest)[1]
-        symbols = made(values)
+        symbols = made(self.packed(q + 0.0 * rates, rates, 0.0 * rates)[1])
         for axis in range(symbols.ndim - 1):  # vmap knows no moveaxis
             symbols = namespace(q).swapaxes(symbols, axis, axis + 1)
         return symbols

@@ -71,6 +71,14 @@ class PackedEngine(Library):
         """Return the kinetic and potential energies of the links in J, (..., N) each."""
         raise NotImplementedError
 
+    def power_beside(self, q: Numbers, qd: Numbers) -> Numbers:
+        """Return R_j, the power that links written by hand get otherwise than from joints, in W, (..., N)."""
+        raise NotImplementedError
+
+    def named_shares(self, q: Numbers, qd: Numbers) -> Numbers:
+        """Return shares of links written by hand, (..., count), in the order of `Structure.share_rows`."""
+        raise NotImplementedError
+
     def regressor(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """Return the rows of 10 of tau, flat: (..., 10 count)."""
         raise NotImplementedError
@@ -104,13 +112,17 @@ class PackedTables:
         structure = engine.structure
         self._engine, self._layout, self._n = engine, structure.layout, structure.n
         over = (structure.n, structure.N)
+        self._rows: dict[str, Indices] = structure.layout._asdict()
         self._shapes = {
             "acceleration": (*over, structure.n),
             "velocity": (*over, structure.n),
-            "velocity_linear": (*over, structure.n),
+            "velocity_excess": (*over, structure.n),
             "gravity": over,
             "torque": over,
         }
+        if structure.shares:
+            self._shapes["shares"] = (*over, len(structure.share_names))
+            self._rows["shares"] = structure.share_rows
         self._places: dict[object, Numbers] = {}
         self._sums: dict[object, SumTable] = {}
         for like in engine.examples:
@@ -187,7 +199,7 @@ class PackedTables:
 
     def _positions(self, field: str) -> Indices:
         """Return for each entry of the dense tensor its packed position, or that of the zero behind."""
-        rows: Indices = getattr(self._layout, field)
+        rows = self._rows[field]
         positions = np.full(self._shapes[field], len(rows), dtype=np.intp)
         positions[tuple(rows.T)] = np.arange(len(rows))
         if field == "acceleration":

@@ -8,6 +8,7 @@ forms and on the batch; `tests/benchmarks/kernel_crossing.py` measures it and pr
 ends keep.
 """
 
+import copy
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
@@ -147,6 +148,18 @@ class ArrayBackend(PackedEngine):
     def module(self, robot: object, call: str, fixed: Mapping[str, object]) -> object:
         """Return one call of a robot on this back end as a torch module; raise TypeError if it has none."""
         raise TypeError(f"{self.name} has no torch modules; load torch or autograd")
+
+    def separate(self) -> "ArrayBackend":
+        """Return a copy whose parameters may be set by `set_parameters`, while this one keeps its own."""
+        made = copy.copy(self)
+        for kept in ("answers", "frames", "on_torch"):
+            vars(made).pop(kept, None)
+        made.parameters = dict(self.parameters)
+        return made
+
+    def set_parameters(self, values: Mapping[str, object]) -> None:
+        """Give run-time parameters of a separate copy these values."""
+        raise NotImplementedError
 
     def tree_numbers(self, own: tuple[TreeArrays, Numbers], q: Numbers) -> TreeArrays:
         """Return the tree's numbers for the parameters and the bodies; see `given_numbers`."""

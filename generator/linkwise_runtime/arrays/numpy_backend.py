@@ -113,7 +113,7 @@ class NumpyBackend(ArrayBackend):
             return [*rule.decomposition(self, (q, qd, qdd), p, self._bodies(q)), self.zeros(q, 0)]
         packed = [_Columns(q, size) for size in self.structure.sizes]
         for link in self.links:
-            # A link without energy terms linear in the velocities has no h1.
+            # A link of what is quadratic in the velocities has no h1.
             for columns, entries in zip(packed, link.decomposition(np, q, qd, qdd, p), strict=False):
                 columns.fill(entries)
         return [columns.array() for columns in packed]
@@ -138,16 +138,41 @@ class NumpyBackend(ArrayBackend):
             columns.fill(link.position_gradient(np, q, qd, qdd, p))
         return columns.array()
 
+    def separate(self) -> ArrayBackend:
+        """Return a copy whose parameters may be set."""
+        made = cast(NumpyBackend, super().separate())
+        made._numbers = dict(self._numbers)
+        made.parameters = made._numbers
+        return made
+
+    def set_parameters(self, values: Mapping[str, object]) -> None:
+        """Give run-time parameters of a separate copy these values."""
+        self._numbers.update({name: np.asarray(value, dtype=float) for name, value in values.items()})
+
     def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
         """Return the kinetic and potential energies of the links in J, (..., N) each."""
-        p = self._values(q)
         if self.rule:
-            return self.rule.energies(self, (q, qd), p, self._bodies(q))
-        columns = _Columns(q, 2 * self.structure.N)
+            return self.rule.energies(self, (q, qd), self._values(q), self._bodies(q))
+        values = self._energy_columns(q, qd)
+        return values[..., 0::3], values[..., 1::3]
+
+    def power_beside(self, q: Numbers, qd: Numbers) -> Numbers:
+        """Return R_j, the power that links written by hand get otherwise than from joints, in W, (..., N)."""
+        return self._energy_columns(q, qd)[..., 2::3]
+
+    def named_shares(self, q: Numbers, qd: Numbers) -> Numbers:
+        """Return shares of links written by hand, (..., count), in the order of `Structure.share_rows`."""
+        columns, p = _Columns(q, len(self.structure.share_rows)), self._values(q)
+        for link in cast("Sequence[EnergyForms]", self.links):
+            columns.fill(link.named_shares(np, q, qd, p))
+        return columns.array()
+
+    def _energy_columns(self, q: Numbers, qd: Numbers) -> Numbers:
+        """Return K, P and R of the links, one after the other, (..., 3 N)."""
+        columns, p = _Columns(q, 3 * self.structure.N), self._values(q)
         for link in cast("Sequence[EnergyForms]", self.links):
             columns.fill(link.energy(np, q, qd, p))
-        both = columns.array()
-        return both[..., 0::2], both[..., 1::2]
+        return columns.array()
 
     def regressor(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """Return the rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""

@@ -113,8 +113,8 @@ class TorchBackend(ArrayBackend):
             return [*rule.decomposition(self, (q, qd, qdd), p, self._bodies(q)), self.zeros(q, 0)]
         groups: list[list[Numbers]] = [[] for _ in self.structure.sizes]
         for link in self.links:
-            # Link by link, so that the memory of one link's values is used for the next's. A link without
-            # energy terms linear in the velocities has no h1.
+            # Link by link, so that the memory of one link's values is used for the next's. A link of what is
+            # quadratic in the velocities has no h1.
             for group, entries in zip(groups, link.decomposition(torch, q, qd, qdd, p), strict=False):
                 group.append(_stacked(q, entries))
         return [self.concatenate(group) if group else self.zeros(q, 0) for group in groups]
@@ -135,14 +135,32 @@ class TorchBackend(ArrayBackend):
             _stacked(q, link.position_gradient(torch, q, qd, qdd, p)) for link in self.links
         )
 
+    def set_parameters(self, values: Mapping[str, object]) -> None:
+        """Give run-time parameters of a separate copy these values."""
+        tensors = {name: torch.as_tensor(value, dtype=torch.float64) for name, value in values.items()}
+        cast("dict[str, Tensor]", self.parameters).update(tensors)
+
     def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
         """Return the kinetic and potential energies of the links in J, (..., N) each."""
-        p = self._values(q)
         if self.rule:
-            return self.rule.energies(self, (q, qd), p, self._bodies(q))
-        links = cast("Sequence[EnergyForms]", self.links)
-        both = self.concatenate(_stacked(q, link.energy(torch, q, qd, p)) for link in links)
-        return both[..., 0::2], both[..., 1::2]
+            return self.rule.energies(self, (q, qd), self._values(q), self._bodies(q))
+        values = self._energy_columns(q, qd)
+        return values[..., 0::3], values[..., 1::3]
+
+    def power_beside(self, q: Numbers, qd: Numbers) -> Numbers:
+        """Return R_j, the power that links written by hand get otherwise than from joints, in W, (..., N)."""
+        return self._energy_columns(q, qd)[..., 2::3]
+
+    def named_shares(self, q: Numbers, qd: Numbers) -> Numbers:
+        """Return shares of links written by hand, (..., count), in the order of `Structure.share_rows`."""
+        p, links = self._values(q), cast("Sequence[EnergyForms]", self.links)
+        entries = [value for link in links for value in link.named_shares(torch, q, qd, p)]
+        return _stacked(q, tuple(entries)) if entries else self.zeros(q, 0)
+
+    def _energy_columns(self, q: Numbers, qd: Numbers) -> Numbers:
+        """Return K, P and R of the links, one after the other, (..., 3 N)."""
+        p, links = self._values(q), cast("Sequence[EnergyForms]", self.links)
+        return self.concatenate(_stacked(q, link.energy(torch, q, qd, p)) for link in links)
 
     def regressor(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """Return the rows of 10 of tau in the order of `Layout.torque`, flat: (..., 10 count)."""

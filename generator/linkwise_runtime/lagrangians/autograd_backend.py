@@ -12,15 +12,9 @@ from ..interface import Numbers
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import TreeArrays
 from ..structure import Structure
+from . import functional_sweeps, sweeps, written_sweeps
 from .energy_interface import Energies, Parameters, numbers_of, transformed
-from .functional_sweeps import (
-    decomposition_functional,
-    energies,
-    position_gradient_functional,
-    torque_functional,
-)
 from .graph_calls import graph_of, graph_parts_of
-from .sweeps import decomposition, position_gradient, torque
 
 Call = Callable[..., Any]
 
@@ -82,24 +76,37 @@ class AutogradBackend(TorchBackend):
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
-        parts: Sequence[Tensor] = self._of_links((decomposition, decomposition_functional), q, qd, qdd)
+        parts: Sequence[Tensor] = self._of_links("decomposition", q, qd, qdd)
         return parts
 
     def torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """Return tau (..., count) in the order of `Layout.torque`."""
-        tau: Tensor = self._of_links((torque, torque_functional), q, qd, qdd)
+        tau: Tensor = self._of_links("torque", q, qd, qdd)
         return tau
 
     def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """Return c0 (..., count) in the order of `Layout.velocity`."""
-        c0: Tensor = self._of_links((position_gradient, position_gradient_functional), q, qd, qdd)
+        c0: Tensor = self._of_links("position_gradient", q, qd, qdd)
         return c0
 
     def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
         """Return the kinetic and potential energies of the links in J, (..., N) each."""
-        at = cast(Tensor, q)
-        kinetic, potential = energies(tuple(self.modules), at, cast(Tensor, qd), self.seen_by(at))
+        at, rate = cast(Tensor, q), cast(Tensor, qd)
+        if self.structure.shares:
+            kinetic, potential, _ = self._of_links("energies", at, rate).tensor_split(3, -1)
+            return kinetic, potential
+        kinetic, potential = functional_sweeps.energies(tuple(self.modules), at, rate, self.seen_by(at))
         return kinetic.movedim(0, -1), potential.movedim(0, -1)
+
+    def power_beside(self, q: Numbers, qd: Numbers) -> Numbers:
+        """Return R_j, the power that links written by hand get otherwise than from joints, in W, (..., N)."""
+        power: Tensor = self._of_links("energies", q, qd).tensor_split(3, -1)[2]
+        return power
+
+    def named_shares(self, q: Numbers, qd: Numbers) -> Numbers:
+        """Return shares of links written by hand, (..., count), in the order of `Structure.share_rows`."""
+        shares: Tensor = self._of_links("named_shares", q, qd)
+        return shares
 
     def graph(self, *asked: Any) -> Any:
         """Return the graph of a torque, see `Dynamics.graph`."""
@@ -109,23 +116,43 @@ class AutogradBackend(TorchBackend):
         """Return the graphs of a torque's parts, see `Dynamics.graph_parts`."""
         return graph_parts_of(self, *asked)
 
-    def _of_links(self, calls: tuple[Call, Call], *motion: Numbers) -> Any:
-        """Return the result of a function of sweeps.py, or of its counterpart inside a transformation."""
-        links, (sweep, followed) = tuple(self.modules), calls
-        q, qd, qdd = cast("tuple[Tensor, Tensor, Tensor]", motion)
-        if torch.compiler.is_exporting():
+    def _of_links(self, call: str, *motion: Numbers) -> Any:
+        """Return the result of a function of sweeps.py, or of its counterpart inside a transformation.
+
+        Links that were written by hand have functions of their own, for both.
+        """
+        links, (q, *rates) = tuple(self.modules), cast("tuple[Tensor, ...]", motion)
+        written, exported = bool(self.structure.shares), torch.compiler.is_exporting()
+        sweep: Call = getattr(written_sweeps if written else sweeps, call)
+        if exported:
             # Export records sweeps as they run, for any number of samples, but no nested torch.func.
-            return sweep(links, self.seen_by(q), q, qd, qdd)
+            return sweep(links, self.seen_by(q), q, *rates)
         if transformed():
-            return followed(links, self.seen_by(q), q, qd, qdd)
+            followed: Call = sweep if written else getattr(functional_sweeps, f"{call}_functional")
+            return followed(links, self.seen_by(q), q, *rates)
         if torch.is_inference_mode_enabled():
             # Nothing can be differentiated in that mode, and the answer would be zeros.
             with torch.inference_mode(False), torch.no_grad():
-                return self._of_links(calls, q.clone(), qd.clone(), qdd.clone())
+                return self._of_links(call, *(a.clone() for a in (q, *rates)))
+        sweep = _recorded(sweep) if written else sweep
         p, most = self.seen_by(q), max(1, AT_A_TIME // self.structure.sizes.tau)
         if q[..., 0].numel() <= most:
-            return sweep(links, p, q, qd, qdd)
-        return _in_pieces(lambda some, *motion: sweep(links, some, *motion), p, (q, qd, qdd), most)
+            return sweep(links, p, q, *rates)
+        return _in_pieces(lambda some, *motion: sweep(links, some, *motion), p, (q, *rates), most)
+
+
+def _recorded(sweep: Call) -> Call:
+    """Return a function that differentiates whatever grad mode its caller is in."""
+
+    def call(links: Any, p: Parameters, q: Tensor, *rates: Tensor) -> Any:
+        wanted = p.wanted or (torch.is_grad_enabled() and any(t.requires_grad for t in (q, *rates)))
+        with torch.enable_grad():
+            found = sweep(links, p, q, *rates)
+        if wanted:
+            return found
+        return found.detach() if torch.is_tensor(found) else [part.detach() for part in found]
+
+    return call
 
 
 def _side_by_side(rows: Sequence[Tensor]) -> Tensor:

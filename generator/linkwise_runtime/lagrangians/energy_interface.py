@@ -52,6 +52,10 @@ class Parameters(Mapping[str, Tensor]):
     def __len__(self) -> int:
         return len(self._values)
 
+    def with_value(self, name: str, value: Tensor) -> "Parameters":
+        """Return the same parameters, but for one."""
+        return Parameters({**self._values, name: value}, self.like, self.wanted, self._learned)
+
     def constants(self, module: torch.nn.Module) -> Mapping[str, Any]:
         """Return the constants of a link: Python numbers, nested; tensors where a transformation needs them.
 
@@ -78,10 +82,6 @@ class Energies(Protocol):
     @property
     def path(self) -> tuple[int, ...]:
         """Coordinates that the energies depend on, ascending, counted from 0."""
-
-    @property
-    def linear(self) -> bool:
-        """True if the kinetic energy has terms linear in the velocities."""
 
     @property
     def before(self) -> "Energies | None":

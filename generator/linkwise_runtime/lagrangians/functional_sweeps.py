@@ -4,9 +4,7 @@ All differentiation is in reverse mode: a row of a second derivative is the grad
 Hessian times a direction is the gradient of (gradient . direction).
 
     tau = d(dL/dq . qd + dL/dqd . qdd)/dqd - dL/dq, the directions qd and qdd held fixed
-    c2 = d(dL/dqd)/dqd, c1 = 1/2 (d(tau)/dqd + h1), c0 = d(tau)/dq, a row for each coordinate
-
-with h1 = d(tau)/dqd at rest, from terms of K linear in qd.
+    c2 = d(dL/dqd)/dqd, c1 = 1/2 d(tau)/dqd, c0 = d(tau)/dq, a row for each coordinate
 """
 
 from collections.abc import Callable, Sequence
@@ -41,15 +39,13 @@ def decomposition_functional(links: Links, p: Parameters, q: Tensor, qd: Tensor,
     sweep, rest = _Sweep(links, p), torch.zeros_like(q)
     mass = sweep.rows(lambda v: sweep.slopes(q, v)[1], qd)
     slope = sweep.rows(lambda v: sweep.torques(q, v, qdd), qd)
-    linear = [j for j, link in enumerate(links) if link.linear]
-    lean = sweep.rows(lambda v: sweep.torques(q, v, rest), rest) if linear else torch.zeros_like(slope)
     pairs = [(i, j, k) for j, link in enumerate(links) for i in link.path for k in link.path]
     return [
         _entries(mass, [(i, j, k) for i, j, k in pairs if i <= k]),
-        _entries(0.5 * (slope + lean), pairs),
+        _entries(0.5 * slope, pairs),
         sweep.packed(sweep.torques(q, rest, rest)),
         sweep.packed(sweep.torques(q, qd, qdd)),
-        _entries(lean, [pair for pair in pairs if pair[1] in linear]),
+        _entries(slope, []),
     ]
 
 

@@ -15,9 +15,10 @@ from ..arrays.torch_modules import RunTimeValues
 from ..chosen_names import whole_number
 from ..interface import Numbers
 from ..structure import Structure
-from .energy_interface import Energies, Nested, Parameters
+from .energy_interface import Energies, Nested, Number, Parameters
 from .operation_recorder import Leaf, Operation, Ref, mapped
-from .recorded_torques import LinkEnergies, Part, RecordedParts, record
+from .recorded_torques import LinkEnergies, Part, RecordedParts, WrittenEnergies, record
+from .written_sweeps import WrittenTerms
 
 Name = int | str
 Links = Name | Iterable[Name] | None
@@ -199,7 +200,12 @@ def _torque_graphs(
     def chosen(values: Mapping[str, Tensor]) -> list[LinkEnergies]:
         p = _seen_as_leaves(backend, values)
         return [
-            LinkEnergies(link.path, link.linear, partial(link.kinetic, p=p), partial(link.potential, p=p))
+            LinkEnergies(
+                link.path,
+                partial(link.kinetic, p=p),
+                partial(link.potential, p=p),
+                _written(link, p) if structure.shares else None,
+            )
             for link in (links[j] for j in through)
         ]
 
@@ -216,6 +222,23 @@ def _torque_graphs(
         )
         for k, m in parts
     )
+
+
+def _written(module: Energies, p: Parameters) -> WrittenEnergies:
+    """Return the sums over the shares of a link that was written by hand."""
+    link = cast(WrittenTerms, module)
+
+    def motion(q: Sequence[Tensor], qd: Sequence[Tensor]) -> Number:
+        return sum(link.motions(q, qd, p).values(), 0.0)
+
+    def dissipation(q: Sequence[Tensor], qd: Sequence[Tensor]) -> Number:
+        return sum(link.dissipations(q, qd, p).values(), 0.0)
+
+    def force(q: Sequence[Tensor], qd: Sequence[Tensor], joint: int) -> Number:
+        found = (by_joint[joint] for by_joint in link.forces(q, qd, p).values() if joint in by_joint)
+        return sum(found, 0.0)
+
+    return WrittenEnergies(link.degree, motion, dissipation, force, p[link.time] if link.time else None)
 
 
 def _needed(

@@ -169,20 +169,15 @@ class Motion:
 
 @dataclass(frozen=True)
 class LaneEntries:
-    """Pairs (i, k) of coordinates of every link's path, and the lanes that belong to them.
-
-    linear: whether each link's kinetic energy has terms linear in the velocities
-    """
+    """Pairs (i, k) of coordinates of every link's path, and the lanes that belong to them."""
 
     paths: tuple[tuple[int, ...], ...]
     parents: tuple[int | None, ...]
-    linear: tuple[bool, ...]
 
     @cached_property
     def plan(self) -> Plan:
-        """Plan with d lanes of link j at e_k, and d + 1 more at rest if it has linear terms."""
-        counts = (len(path) * (1 + more) + more for path, more in zip(self.paths, self.linear, strict=True))
-        return Plan(self.paths, self.parents, tuple(counts))
+        """Plan with a lane of link j for each k on its path."""
+        return Plan(self.paths, self.parents, tuple(map(len, self.paths)))
 
     @cached_property
     def single(self) -> Plan:
@@ -197,37 +192,25 @@ class LaneEntries:
 
     @cached_property
     def lanes(self) -> Indices:
-        """Rows (link, k, kind): kind 0 at e_k, 1 at rest along qd (no k), 2 at rest along e_k."""
-        rows = np.zeros((self.plan.lanes, 3), np.intp)
-        for j, (path, start) in enumerate(zip(self.paths, self.plan.starts, strict=True)):
-            kinds = [(j, k, 0) for k in path]
-            if self.linear[j]:
-                kinds += [(j, NOWHERE, 1), *((j, k, 2) for k in path)]
-            rows[start : start + len(kinds)] = kinds
-        return rows
+        """Rows (link, k): the lane at e_k."""
+        rows = [(j, k) for j, path in enumerate(self.paths) for k in path]
+        return np.array(rows, np.intp).reshape(-1, 2)
 
     @cached_property
     def pairs(self) -> Indices:
-        """Rows (i, k, lanes at e_i and e_k, lanes at rest along qd, e_i and e_k), link by link."""
-        rows = []
-        for path, start, linear in zip(self.paths, self.plan.starts, self.linear, strict=True):
-            d = len(path)
-            rest = start + d
-            for a, i in enumerate(path):
-                for b, k in enumerate(path):
-                    still = (rest, rest + 1 + a, rest + 1 + b) if linear else (NOWHERE,) * 3
-                    rows.append((i, k, start + a, start + b, *still))
-        return np.array(rows, np.intp).reshape(-1, 7)
+        """Rows (i, k, lanes at e_i and e_k), link by link."""
+        rows = [
+            (i, k, start + a, start + b)
+            for path, start in zip(self.paths, self.plan.starts, strict=True)
+            for a, i in enumerate(path)
+            for b, k in enumerate(path)
+        ]
+        return np.array(rows, np.intp).reshape(-1, 4)
 
     @cached_property
     def upper(self) -> Indices:
         """Pairs with i <= k."""
         return np.flatnonzero(self.pairs[:, 0] <= self.pairs[:, 1])
-
-    @cached_property
-    def moving(self) -> Indices:
-        """Pairs of links with linear terms."""
-        return np.flatnonzero(self.pairs[:, 4] != NOWHERE)
 
 
 class Rows:

@@ -34,8 +34,6 @@ class PartialLagrangian(torch.nn.Module):
 
     path: ClassVar[tuple[int, ...]] = ()
     """Coordinates that the energies depend on, ascending, counted from 0."""
-    linear: ClassVar[bool] = False
-    """True if the kinetic energy has terms linear in the velocities."""
     parent: ClassVar["type[PartialLagrangian] | None"] = None
     """Lagrangian of the link that carries this one, if their energies share work."""
 

@@ -3,16 +3,18 @@
 With L = K - P of a link, p_i = dK/dqd_i, and every derivative by autograd:
 
     tau_ij = sum_k dp_i/dqd_k qdd_k + h_i + g_ij      h_i = sum_s dp_i/dq_s qd_s - dK/dq_i      g_ij = dP/dq_i
-    c2_ijk = dp_i/dqd_k     c1_ijk = 1/2 (dh_i/dqd_k + dh_i/dqd_k at rest)     c0_ijk = d(tau_ij)/d(q_k)
+    c2_ijk = dp_i/dqd_k     c1_ijk = 1/2 dh_i/dqd_k     c0_ijk = d(tau_ij)/d(q_k)
 
-At rest dh_i/dqd_k comes from terms of K linear in the velocities alone: zero for rigid links.
+Of links that were written by hand g_ij is the sum of all shares with names, and c1 of those with a kinetic
+energy of degree three or more is the mean of dh_i/dqd_k on the way from rest, as in written_sweeps.py.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import cast
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -24,7 +26,7 @@ Number = Tensor | float
 Slopes = tuple[dict[int, Number], dict[int, Number], Number]
 """Derivatives dp_i/dq_s and dp_i/dqd_s of a link by s, and dK/dq_i."""
 Part = tuple[int | None, int | None]
-"""Coordinate k and order m of a part; (None, None) is the whole torque, (None, 0) gravity."""
+"""Coordinate k and order m of a part; (None, None) is the torque, (None, 0) gravity, or all named shares."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +34,21 @@ class LinkEnergies:
     """Energies of one link in J, as functions of sequences of coordinates and velocities."""
 
     path: tuple[int, ...]
-    linear: bool
     kinetic: Callable[[Sequence[Tensor], Sequence[Tensor]], Number]
     potential: Callable[[Sequence[Tensor]], Number]
+    written: "WrittenEnergies | None" = None
+    """Terms beside them, of a link that was written by hand."""
+
+
+@dataclass(frozen=True)
+class WrittenEnergies:
+    """Sums over the shares of a link that was written by hand, and the leaf that is time."""
+
+    degree: int
+    motion: Callable[[Sequence[Tensor], Sequence[Tensor]], Number]
+    dissipation: Callable[[Sequence[Tensor], Sequence[Tensor]], Number]
+    force: Callable[[Sequence[Tensor], Sequence[Tensor], int], Number]
+    time: Tensor | None
 
 
 @dataclass(frozen=True)
@@ -74,8 +88,10 @@ def record(
             ]
             for kind in MOTIONS
         ]
+        # Time is a parameter, by which written energies are differentiated.
         values = {
-            leaf.key: tensor_of(leaf, value.detach().reshape(-1)[0].item()) for leaf, value in beside.items()
+            leaf.key: tensor_of(leaf, value.detach().reshape(-1)[0].item(), leaf.name == structure.time)
+            for leaf, value in beside.items()
         }
         energies = list(links(values))
         with recorder:
@@ -124,19 +140,38 @@ class _Torque:
     @cached_property
     def damping(self) -> list[Number]:
         """Coefficients c1_ik in the closing convention, by k on the path."""
-        slopes = [self._slopes(self.velocity_force, [self._qd[k] for k in self._path], 3)]
-        for link in self._links:
-            if link.linear:
-                rest = [torch.zeros_like(v, requires_grad=True) for v in self._qd]
-                force = self._force(self._momentum(link, rest), rest)
-                slopes.append(self._slopes(force, [rest[k] for k in self._path], 3))
-        return [_times(_sum(column), 0.5) for column in zip(*slopes, strict=True)]
+        degree = max((link.written.degree for link in self._links if link.written), default=2)
+        if degree <= 2:
+            slopes = self._slopes(self.velocity_force, [self._qd[k] for k in self._path], 3)
+            return [_times(slope, 0.5) for slope in slopes]
+        points, weights = np.polynomial.legendre.leggauss((degree + 1) // 2)
+        parts = []
+        for point, weight in zip((points + 1.0) / 2.0, weights / 2.0, strict=True):
+            moved = [float(point) * v for v in self._qd]
+            slopes_of = (self._momentum(link.kinetic, link.path, moved) for link in self._links)
+            force = _sum([self._force(slopes, moved) for slopes in slopes_of])
+            slopes = self._slopes(force, [moved[k] for k in self._path], 3)
+            parts.append([_times(slope, float(weight)) for slope in slopes])
+        return [_sum(column) for column in zip(*parts, strict=True)]
 
     @cached_property
     def gravity(self) -> Number:
-        """Gravity torque g_i, summed over the links."""
+        """Gravity torque g_i, or that of all shares with names, summed over the links."""
         at = [self._q[self._joint]]
-        return _sum([slope for link in self._links for slope in self._slopes(link.potential(self._q), at, 1)])
+        stored = [slope for link in self._links for slope in self._slopes(link.potential(self._q), at, 1)]
+        return _sum([*stored, *(part for link in self._links if link.written for part in self._lost(link))])
+
+    def _lost(self, link: LinkEnergies) -> Iterator[Number]:
+        """Yield parts of the shares of a link that was written by hand, but for its potentials."""
+        written, qd, i = link.written, self._qd, self._joint
+        assert written is not None
+        yield self._force(self._momentum(written.motion, link.path, qd), qd)
+        yield from self._slopes(written.dissipation(self._q, qd), [qd[i]], 1)
+        yield _times(written.force(self._q, qd, i), -1.0)
+        if written.time is not None:
+            for term in (written.motion, link.kinetic):
+                (momentum,) = self._slopes(term(self._q, qd), [qd[i]], 1)
+                yield from self._slopes(momentum, [written.time], 2)
 
     @cached_property
     def stiffness(self) -> list[Number]:
@@ -148,11 +183,16 @@ class _Torque:
 
     @cached_property
     def _moving(self) -> list[Slopes]:
-        return [self._momentum(link, self._qd) for link in self._links]
+        return [self._momentum(link.kinetic, link.path, self._qd) for link in self._links]
 
-    def _momentum(self, link: LinkEnergies, qd: Sequence[Tensor]) -> Slopes:
-        """Return dp_i/dq_s and dp_i/dqd_s by s, and dK/dq_i of a link."""
-        kinetic, path = link.kinetic(self._q, qd), link.path
+    def _momentum(
+        self,
+        energy: Callable[[Sequence[Tensor], Sequence[Tensor]], Number],
+        path: tuple[int, ...],
+        qd: Sequence[Tensor],
+    ) -> Slopes:
+        """Return dp_i/dq_s and dp_i/dqd_s by s, and dK/dq_i of an energy K of a link with this path."""
+        kinetic = energy(self._q, qd)
         momentum, force = self._slopes(kinetic, [qd[self._joint], self._q[self._joint]], 1)
         slopes = self._slopes(momentum, [*(self._q[s] for s in path), *(qd[s] for s in path)], 2)
         bends, rates = slopes[: len(path)], slopes[len(path) :]

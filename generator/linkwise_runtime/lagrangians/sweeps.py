@@ -2,20 +2,15 @@
 
 With L = K - P of one link, K of degree two in the velocities, and D_i = d/dt d/dqd_i - d/dq_i,
 
-    tau_i = D_i L           M = d2K/dqd2            dK/dqd = p + b            p = M qd
-    c1_ik = 1/2 (dM_ik/dt + dp_i/dq_k - dp_k/dq_i) + h1_ik       h1_ik = db_i/dq_k - db_k/dq_i
-
-where b comes from the terms of K linear in qd; without these, c1_ik = 1/2 d(tau_i)/d(qd_k).
+    tau_i = D_i L           M = d2K/dqd2            dK/dqd = p = M qd
+    c1_ik = 1/2 (dM_ik/dt + dp_i/dq_k - dp_k/dq_i) = 1/2 d(tau_i)/d(qd_k)
 
 Nothing here is derived in advance. A first reverse sweep gives the gradient of K. The Hessian of K times a
 direction is the gradient of (gradient . direction), as the Hessian is symmetric: a second reverse sweep over
 the graph of the first. Several directions, and several links, go side by side in lanes.
 
-Link j has these lanes; e_k is a velocity of 1 of coordinate k alone:
-
-    at e_k       dK/dqd is column k of M, its change along qd column k of dM/dt; dp_k/dq = d(e_k . M qd)/dq
-    at rest      one lane, if K has terms linear in qd: the share of the above that is due to b
-    at rest      then one lane for each coordinate too: dK/dqd_k = b_k, whose derivatives are needed alone
+Link j has a lane for each coordinate k: at e_k, a velocity of 1 of k alone, dK/dqd is column k of M, its
+change along qd column k of dM/dt, and dp_k/dq = d(e_k . M qd)/dq.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,7 +20,7 @@ import torch
 from torch import Tensor
 
 from .energy_interface import Energies, Parameters, Recording, gradient, variable
-from .lanes import NOWHERE, Indices, LaneEntries, Leaf, Motion, Plan, Rows, pick
+from .lanes import Indices, LaneEntries, Leaf, Motion, Plan, Rows, pick
 
 Links = Sequence[Energies]
 
@@ -91,26 +86,23 @@ def entries_of(links: Links) -> LaneEntries:
     """Return the entries and lanes of these links."""
     numbers = {id(link): j for j, link in enumerate(links)}
     parents = tuple(numbers.get(id(link.before)) for link in links)
-    return _entries(tuple(link.path for link in links), parents, tuple(link.linear for link in links))
+    return _entries(tuple(link.path for link in links), parents)
 
 
 _entries = lru_cache(maxsize=64)(LaneEntries)
 
 
 def decomposition(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> list[Tensor]:
-    """Return c2 (i <= k), c1, g, tau and h1, packed link by link: (..., count) each.
-
-    h1 is the part of c1 that comes from terms of K linear in qd.
-    """
+    """Return c2 (i <= k), c1, g, tau and h1, which is empty, packed link by link: (..., count) each."""
     entries, record = _begin(links, p, q, qd, qdd)
     with torch.enable_grad():
         sweep = Sweep(links, p, entries.plan, (q, qd, qdd), record)
-        mass, c1, h1 = _second_derivatives(sweep, entries)
+        mass, c1 = _second_derivatives(sweep, entries)
         gravity = _gravity(sweep, entries)
         k = entries.pairs[:, 1]
         terms = mass * pick(qdd.movedim(-1, 0), k) + c1 * pick(qd.movedim(-1, 0), k)
         tau = _sums(terms, entries) + gravity
-        return [record.finish(part) for part in (pick(mass, entries.upper), c1, gravity, tau, h1)]
+        return [record.finish(part) for part in (pick(mass, entries.upper), c1, gravity, tau, c1[:0])]
 
 
 def torque(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
@@ -128,53 +120,33 @@ def torque(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> T
 def position_gradient(links: Links, p: Parameters, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
     """Return d(tau_i)/d(q_k) of every link over its path, row by row, shape (..., count)."""
     entries, record = _begin(links, p, q, qd, qdd)
-    resting = LaneEntries(entries.paths, entries.parents, (False,) * len(links))
     with torch.enable_grad():
         # Lane e_i of a link serves its tau_i.
-        sweep = Sweep(links, p, resting.plan, (q, qd, qdd), record)
+        sweep = Sweep(links, p, entries.plan, (q, qd, qdd), record)
         (qd_, q_, place), (rate, force, gravity) = sweep.torque(keep=True)
-        mine = sweep.marks(lambda k: resting.lanes[:, 1] == k)
+        mine = sweep.marks(lambda k: entries.lanes[:, 1] == k)
         weights = [*sweep.along(qd_, mine), *(-m for m in sweep.along(q_, mine)), *sweep.along(place, mine)]
         moved = [*q_.variables(), *place.variables()]
         slopes = gradient([*rate, *force, *gravity], weights, moved, record.wanted, last=True)
         found = sweep.rows(slopes, q_, place)
-        return record.finish(found(resting.pairs[:, 1], resting.pairs[:, 2]))
+        return record.finish(found(entries.pairs[:, 1], entries.pairs[:, 2]))
 
 
 def _begin(links: Links, p: Parameters, *motion: Tensor) -> tuple[LaneEntries, Recording]:
     return entries_of(links), Recording.of(motion, p.wanted)
 
 
-def _second_derivatives(sweep: Sweep, entries: LaneEntries) -> tuple[Tensor, Tensor, Tensor]:
-    """Return M_ik and c1_ik of all pairs (i, k), and h1, the part of c1 from terms of K linear in qd.
-
-    h1 has the pairs of links with such terms.
-    """
-    coordinate, kind = entries.lanes[:, 1], entries.lanes[:, 2]
+def _second_derivatives(sweep: Sweep, entries: LaneEntries) -> tuple[Tensor, Tensor]:
+    """Return M_ik and c1_ik of all pairs (i, k)."""
+    coordinate = entries.lanes[:, 1]
     keep, along_qd = sweep.record.wanted, sweep.same(sweep.v)
-    q, qd, force, momentum = sweep.kinetic(sweep.marks(lambda k: (coordinate == k) & (kind == 0)))
+    q, qd, force, momentum = sweep.kinetic(sweep.marks(lambda k: coordinate == k))
     rate = gradient(force, sweep.along(q, along_qd), qd.variables(), keep, last=False)
     mass_rate, mass = sweep.rows(rate, qd), sweep.rows(momentum, qd)
-    i, k, at_i, at_k, rest, rest_i, rest_k = entries.pairs.T
-    if not any(entries.linear):
-        bent = gradient(momentum, sweep.along(qd, along_qd), q.variables(), keep, last=True)
-        bend = sweep.rows(bent, q)
-        c1 = 0.5 * (mass_rate(i, at_k) + bend(k, at_i) - bend(i, at_k))
-        return mass(i, at_k), c1, c1[:0]
-    along_unit = sweep.marks(lambda k: (coordinate == k) & (kind == 2))
-    moving = sweep.marks(lambda k: kind != 2)
-    way = [along_unit(c, rows) + moving(c, rows) * along_qd(c, rows) for c, rows in qd.places()]
-    x, v = q.variables(), qd.variables()
-    both = gradient(momentum, way, [*x, *v], keep, last=True)
-    bend, lean = sweep.rows(both[: len(x)], q), sweep.rows(both[len(x) :], qd)
-    # At rest along e_k, the Hessian gives column k of M without dK/dqd's part b, which may be far larger.
-    still = torch.from_numpy(rest != NOWHERE).to(sweep.record.like.device)
-    columns = lean(i, rest_k), mass(i, at_k)
-    mass_ik = torch.where(still.reshape(-1, *[1] * sweep.record.like.dim()), *columns)
-    c1 = mass_rate(i, at_k) - mass_rate(i, rest)
-    c1 = c1 + bend(k, at_i) - bend(k, rest) - bend(i, at_k) + bend(i, rest)
-    h1 = bend(k, rest_i) - bend(i, rest_k)
-    return mass_ik, 0.5 * c1 + h1, pick(h1, entries.moving)
+    i, k, at_i, at_k = entries.pairs.T
+    bent = gradient(momentum, sweep.along(qd, along_qd), q.variables(), keep, last=True)
+    bend = sweep.rows(bent, q)
+    return mass(i, at_k), 0.5 * (mass_rate(i, at_k) + bend(k, at_i) - bend(i, at_k))
 
 
 def _gravity(sweep: Sweep, entries: LaneEntries) -> Tensor:

@@ -2,7 +2,9 @@
 
 State (q, v, W): v = qd, or with constraints that of the independent joints, and W the work that was done:
 
-    dq/dt = qd    dv/dt = qdd (ydd)    dW/dt = qd . (tau - sum_e load torque_e - damping - friction)
+    dq/dt = qd    dv/dt = qdd (ydd)    dW/dt = qd . (tau - sum_e load torque_e - damping - friction) + R
+
+with R the power that links which were written by hand get otherwise than from joints.
 
 With constraints the dependent joints of every q are closed first, by Newton's method from where they are, and
 qd = G v, so that they do not drift.
@@ -16,7 +18,7 @@ import numpy as np
 
 from ..arguments import NOTHING, Beside
 from ..arrays.backend import ArrayBackend
-from ..chosen_names import listed, sample_of
+from ..chosen_names import listed, sample_of, short
 from ..constraints.closed_places import ClosedPlace
 from ..constraints.independent_joints import least_left, why_not_following
 from ..constraints.tied_joints import TiedJoints, without_gradient
@@ -150,6 +152,8 @@ class EquationsOfMotion:
     passive: bool
     ties: TiedMotion | None
     """Motion under constraints; None for an open tree."""
+    varying: "Varying | None" = None
+    """Time and inputs that the robot depends on; None without any."""
 
     def motion(self, t: float, state: State) -> tuple[Numbers, Numbers]:
         """Return q and qd of all joints, (..., n) each, which keep the constraints."""
@@ -161,10 +165,15 @@ class EquationsOfMotion:
     def rates(self, t: float, state: State) -> State:
         """Return the rates of a state."""
         q, qd = self.motion(t, state)
+        if self.varying is not None:
+            self.varying.move(t, q, qd)
         tau, pull = self.torques(t, q, qd), self.load_torque(t, q, qd)
         given = tau if pull is None else tau - pull
         if not self.passive:
-            return State(qd, self._accelerated(t, state.q, q, qd, given, False), (qd * given).sum(-1))
+            work = (qd * given).sum(-1)
+            if self.engine.structure.shares:
+                work = work + self.engine.power_beside(q, qd).sum(-1)
+            return State(qd, self._accelerated(t, state.q, q, qd, given, False), work)
         spring, damping, friction, _ = self.engine.answers.passive_torque(q, qd, 0.0 * qd)
         work = (qd * (given - damping - friction)).sum(-1)
         if any(self.engine.structure.passive_sums.armature):
@@ -202,9 +211,12 @@ class EquationsOfMotion:
         torques = found.loads.torques(self.engine, q, found.vectors)
         return sum(torques[1:], torques[0]) if torques else None
 
-    def energy(self, q: Numbers, qd: Numbers) -> Numbers:
+    def energy(self, t: float, q: Numbers, qd: Numbers) -> Numbers:
         """Return the energy of links, springs and armature in J, (...)."""
-        total = _conserved(self.engine, q, qd).sum(-1)
+        if self.varying is not None:
+            self.varying.move(t, q, qd)
+        kinetic, potential = self.engine.answers.energy(q, qd)
+        total = (kinetic + potential).sum(-1)
         if self.passive:
             sums = self.engine.structure.passive_sums
             stiffness, pull, armature = (
@@ -212,6 +224,41 @@ class EquationsOfMotion:
             )
             total = total + ((stiffness * q / 2.0 + pull) * q + armature * qd * qd / 2.0).sum(-1)
         return total
+
+
+class Varying:
+    """Time and inputs of links that were written by hand, which move with a motion."""
+
+    def __init__(self, engine: ArrayBackend, inputs: Mapping[str, object]) -> None:
+        """Begin with a copy of a back end, whose parameters move while the robot's own stay."""
+        self.engine, self._inputs = engine.separate(), inputs
+
+    def move(self, t: float, q: Numbers, qd: Numbers) -> None:
+        """Set time and inputs to what they are at an instant; raises as `weights` does."""
+        structure = self.engine.structure
+        values: dict[str, object] = {structure.time: t} if structure.time else {}
+        for name, given in self._inputs.items():
+            found = given(t, q, qd) if callable(given) else given
+            values[name] = self.engine.weights(name, found, q)
+        self.engine.set_parameters(values)
+
+
+def varying_of(engine: ArrayBackend, inputs: object) -> Varying | None:
+    """Return time and inputs as `simulate` is given them; None where the robot depends on neither.
+
+    Raises ValueError for an input that the robot does not have.
+    """
+    structure = engine.structure
+    given = inputs if inputs is not None else {}
+    if not isinstance(given, Mapping):
+        raise TypeError(
+            f"inputs is a {type(given).__name__}; give a dictionary of values or functions by name"
+        )
+    for name in given:
+        if name not in structure.inputs:
+            there = f"its inputs are {listed(structure.inputs)}" if structure.inputs else "it has no inputs"
+            raise ValueError(f"inputs names {short(name)}, which {structure.name} does not have; {there}")
+    return Varying(engine, given) if structure.time or given else None
 
 
 def read_at(
@@ -229,15 +276,3 @@ def read_at(
             f"{tuple(q.shape[:-1])} of q and qd; give these as many from the start"
         )
     return [engine.weights(name, a, q) for name, a in zip((*named, *beside), read, strict=True)]
-
-
-def _conserved(engine: ArrayBackend, q: Numbers, qd: Numbers) -> Numbers:
-    """Return qd . dK/dqd - K + P of each link, (..., N), which only torques and loads change.
-
-    For rigid links it is K + P. With K = K2 + K1 + K0 by its order in qd it is K2 - K0 + P.
-    """
-    kinetic, potential = engine.answers.energy(q, qd)
-    if engine.tree is not None:
-        return kinetic + potential
-    back, rest = (engine.answers.energy(q, rate)[0] for rate in (-qd, 0.0 * qd))
-    return (kinetic + back) / 2.0 - 2.0 * rest + potential

@@ -16,7 +16,7 @@ from ..chosen_names import short
 from ..constraints.robot_constraints import Constraints
 from ..interface import Numbers, array_of, namespace
 from ..quantities import Trajectory
-from .equations_of_motion import EquationsOfMotion, Given, ReadLoads, State, TiedMotion
+from .equations_of_motion import EquationsOfMotion, Given, ReadLoads, State, TiedMotion, varying_of
 from .induced_accelerations import DrivenRobot, constraints_of
 from .source_forces import loads_of
 
@@ -119,6 +119,7 @@ class Simulated(NamedTuple):
     rtol: object
     atol: object
     constraints: object
+    inputs: object
 
 
 def simulate_motion(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
@@ -142,8 +143,11 @@ def simulate_motion(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
     step = None if asked.step is None else _positive("step", asked.step)
     tolerances = _positive("rtol", asked.rtol), _positive("atol", asked.atol)
     passive = asked.passive and bool(engine.structure.passive)
+    varying = varying_of(engine, asked.inputs)
+    if varying is not None:
+        engine = varying.engine
     equations, state = _started(
-        EquationsOfMotion(engine, tau, given, passive, None), start, rate, constraints
+        EquationsOfMotion(engine, tau, given, passive, None, varying), start, rate, constraints
     )
     if asked.method == "RK4":
         states = in_fixed_steps(equations.rates, equations.close_ties, state, times, step)
@@ -200,7 +204,7 @@ def _collected(
     for t, state in zip(times, states, strict=True):
         q, qd = equations.motion(t, state)
         tau = equations.torques(t, q, qd)
-        rows.append((q, qd, tau, equations.energy(q, qd), state.work))
+        rows.append((q, qd, tau, equations.energy(t, q, qd), state.work))
     like = rows[0][0]
     xp = namespace(like)
     columns = (xp.stack(column) for column in zip(*rows, strict=True))

@@ -115,7 +115,7 @@ class NativeBackend(NumpyBackend):
         links, rule: what torch differentiates, one or the other
         """
         super().__init__(structure, links, {}, rule)
-        self._forms = links
+        self._forms, self._sources = links, sources
         self.parameters = dict(parameters)
         self.calls = NativeCalls(structure, sources, parameters)
         self.quick = QuickCalls(self.calls)
@@ -168,6 +168,17 @@ class NativeBackend(NumpyBackend):
         """Return the object that computes a controller's torque for one sample in C."""
         targets, framed = cast(JointTargets, joints), cast("FrameTargets | None", frame)
         return NativeTorque(self.calls, self.tree is not None, targets, framed)
+
+    def separate(self) -> ArrayBackend:
+        """Return a copy whose parameters may be set."""
+        made = NativeBackend(self.structure, self._sources, self._forms, self.parameters, self.rule)
+        made.threads_set = self.threads_set
+        made.calls.learned = True  # the values are read anew in each call
+        return made
+
+    def set_parameters(self, values: Mapping[str, object]) -> None:
+        """Give run-time parameters of a separate copy these values, one number each."""
+        self.calls.parameters.update(cast("Mapping[str, float | Numbers]", values))
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""

@@ -2,7 +2,7 @@
 
    A cube is a row (N, LINKS, N) of c(i, j, k), a square a row (N, LINKS) of g(i, j) or tau(i, j). Link j has values for
    the joints on its path alone, path[path_start[j]] to path[path_start[j + 1] - 1]. The file that includes this one has
-   these tables, and linear[j], whether link j has h1. It says by W and SIZED, as for closed forms, of how many samples
+   these tables, and nonquadratic[j], whether link j has h1. It says by W and SIZED, as for closed forms, of how many samples
    functions are, and includes this once for each. Values come packed, as links store them: entry e of sample b is at
    e * W + b, in cubes too. Of links, `first` is the first, and the one before `last` the last. */
 #ifndef LINKWISE_DENSE_H
@@ -49,7 +49,7 @@ static inline void SIZED(to_slopes)(int first, int last, real *RESTRICT c1, cons
         for (int e = 0; e < length * length; ++e, c1 += W)
             for (int b = 0; b < W; ++b)
                 c1[b] *= R(2.0);
-        if (!linear[j])
+        if (!nonquadratic[j])
             continue;
         c1 -= length * length * W;
         for (int e = 0; e < length * length; ++e, c1 += W, h1 += W)

@@ -61,7 +61,7 @@ def decomposition_outputs(forms: LinkForms, number: int) -> list[Output]:
         *outputs("c1", forms.velocity, number),
         *outputs("g", forms.gravity, number),
         *outputs("tau", forms.decomposed_torque, number),
-        *outputs("h1", forms.velocity_linear, number),
+        *outputs("h1", forms.velocity_excess, number),
     ]
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import product
 
 from linkwise.emit.c.header import align_columns
-from linkwise.package.potential_word import potential_word
+from linkwise.package.share_word import share_word
 from linkwise.symbolic.system import EnergySystem, System
 
 FORCES = {"rad": "N m", "m": "N"}
@@ -25,10 +25,10 @@ STIFFNESSES = {
 """Units of c0, by those of joints i and k."""
 
 
-def quantity_lines(system: System, linear: bool) -> Iterator[str]:
+def quantity_lines(system: System, nonquadratic: bool) -> Iterator[str]:
     """Return a table: each quantity, its unit for every two units of joints i and k, and its meaning.
 
-    `linear` says whether an energy has terms linear in the velocities.
+    `nonquadratic` says whether links have terms that are not quadratic in the velocities.
     """
     units = {coordinate.unit for coordinate in system.coordinates}
     kinds = [unit for unit in FORCES if unit in units]
@@ -39,29 +39,27 @@ def quantity_lines(system: System, linear: bool) -> Iterator[str]:
     rows = [
         ["i, k in", *(f"{i}, {k}" for i, k in pairs), "what it is"],
         ["c2(i, j, k)", *inertias, "mass matrix of link j"],
-        ["c1(i, j, k)", *dampings, _velocity(linear)],
-        ["g(i, j)", *forces, f"torque at rest: {potential(system)}"],
+        ["c1(i, j, k)", *dampings, _velocity(nonquadratic)],
+        ["g(i, j)", *forces, f"what has a name of its own: {potential(system)}"],
         ["tau(i, j)", *forces, "the sum above"],
         ["c0(i, j, k)", *(STIFFNESSES[pair] for pair in pairs), "position gradient, d(tau(i, j))/d(q_k)"],
     ]
-    if linear:
-        what = "what energies linear in qd add to c1, as on a base that is moved"
+    if nonquadratic:
+        what = "2 c1 - d(tau)/d(qd): not all terms are quadratic in qd"
         rows.append(["h1(i, j, k)", *dampings, what])
     return align_columns(rows)
 
 
 def causes(system: System) -> str:
     """Return the causes of a link's torques, in words."""
-    return (
-        f"by its inertia and {'its potential energy' if isinstance(system, EnergySystem) else 'its weight'}"
-    )
+    return f"by its inertia and {potential(system) if isinstance(system, EnergySystem) else 'its weight'}"
 
 
-def _velocity(linear: bool) -> str:
-    of = " of what is quadratic in qd, and h1" if linear else ""
-    return f"velocity coefficients, 1/2 d(tau)/d(qd){of}"
+def _velocity(nonquadratic: bool) -> str:
+    more = " + h1/2" if nonquadratic else ""
+    return f"velocity coefficients, 1/2 d(tau)/d(qd){more}"
 
 
 def potential(system: System) -> str:
     """Return the word for g."""
-    return potential_word(not isinstance(system, EnergySystem))
+    return share_word(system.share_names)

@@ -29,7 +29,7 @@ def robot_view(
     calls = [link_calls(link, own) for link, own in zip(links, functions, strict=True)]
     return path_fields(system) | {
         "n": n,
-        "linear": ", ".join("1" if link.size.h1 else "0" for link in links),
+        "nonquadratic": ", ".join("1" if link.size.h1 else "0" for link in links),
         "totals": totals(robot.size),
         "total": robot.size.total,
         "parameters": [(name, place) for place, name in enumerate(names)],
@@ -76,7 +76,7 @@ def path_fields(system: System) -> dict[str, Any]:
 def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, Any]:
     """Return the fields of NAME.h but for its name, its costs and its stack."""
     robot = whole(links)
-    linear = bool(robot.size.h1)
+    nonquadratic = bool(robot.size.h1)
     return {
         "commands": header.commands(name),
         "cpp_command": header.cpp_command(name),
@@ -87,7 +87,7 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "full": ", ".join(array for array in ("c1", "c0", "h1") if robot.size.of(array)),
         "causes": causes(system),
         "potential": potential(system),
-        "quantities": list(quantity_lines(system, linear)),
+        "quantities": list(quantity_lines(system, nonquadratic)),
         "links": list(header.link_lines(system, links)),
         "joints": list(header.joint_lines(system)),
         "names": [c_string(c.name) for c in system.coordinates],

@@ -52,7 +52,7 @@ class EntryCounts:
 
     @property
     def arrays(self) -> tuple[str, ...]:
-        """Arrays that hold anything, h1 being empty without energies linear in the velocities."""
+        """Arrays that hold anything, h1 being empty where all is quadratic in the velocities."""
         return tuple(array for array in ARRAYS if self.of(array))
 
 
@@ -71,7 +71,7 @@ def link_spans(links: Sequence[LinkForms]) -> tuple[Span, ...]:
     spans: list[Span] = []
     start = EntryCounts()
     for number, forms in enumerate(links, 1):
-        c2, c1, g, h1 = forms.acceleration, forms.velocity, forms.gravity, forms.velocity_linear
+        c2, c1, g, h1 = forms.acceleration, forms.velocity, forms.gravity, forms.velocity_excess
         size = EntryCounts(len(c2), len(c1), len(g), len(h1))
         spans.append(Span(number, number, size, start))
         start += size

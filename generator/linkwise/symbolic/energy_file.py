@@ -1,0 +1,63 @@
+"""Python files that define energies in SymPy; they are run."""
+
+import runpy
+from collections.abc import Mapping
+from pathlib import Path
+from traceback import walk_tb
+from types import ModuleType
+from typing import Any
+
+from linkwise.errors import LinkwiseError
+from linkwise.symbolic.moving_bodies import BODIES
+from linkwise.symbolic.passed_over import refuse_passed_over
+from linkwise.symbolic.system import EnergySystem, LinkEnergy
+from linkwise.symbolic.user_energies import energy_system
+
+
+def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
+    """Return the system of a Python file that defines `coordinates`, `links`, and optionally other names.
+
+    The file is run; the other names are those of the arguments of `energy_system`. Raises LinkwiseError as
+    that does, and for a name that nobody reads.
+    """
+    try:
+        scope: dict[str, Any] = runpy.run_path(str(path))
+    except LinkwiseError:
+        raise
+    except (Exception, SystemExit) as error:  # the user's own code may raise anything
+        raise LinkwiseError(f"running the file failed{_said(error, str(path))}") from error
+    refuse_passed_over(path.read_bytes(), scope)
+    links = scope.get("links")
+    if not isinstance(links, (list, tuple)) or not all(
+        isinstance(one, (LinkEnergy, *BODIES)) for one in links
+    ):
+        kinds = ", ".join(f"linkwise.{kind.__name__}" for kind in BODIES)
+        raise LinkwiseError(f"the file must define 'links', a list of linkwise.LinkEnergy, or of {kinds}")
+    if not isinstance(scope.get("coordinates"), (list, tuple, Mapping)):
+        raise LinkwiseError("the file must define 'coordinates', a list of linkwise.Coordinate")
+    return energy_system(
+        scope.get("name", path.stem),
+        scope["coordinates"],
+        links,
+        scope.get("parameters"),
+        symbolic,
+        None if isinstance(scope.get("time"), ModuleType) else scope.get("time"),
+        scope.get("inputs", ()),
+    )
+
+
+def _said(error: BaseException, path: str) -> str:
+    """Return in words the last line of the user's file that an error passed through, and the error."""
+    said = _text_of(error)
+    lines = [at for frame, at in walk_tb(error.__traceback__) if frame.f_code.co_filename == path]
+    if isinstance(error, SyntaxError) and error.filename == path:
+        lines, said = [error.lineno] if error.lineno else [], error.msg
+    place = f" in line {lines[-1]}" if lines else ""
+    return f"{place}: {type(error).__name__}{': ' if said else ''}{said}"
+
+
+def _text_of(error: BaseException) -> str:
+    try:
+        return str(error)
+    except Exception:  # the user's own class may raise here, too
+        return ""

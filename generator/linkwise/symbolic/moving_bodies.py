@@ -1,0 +1,128 @@
+"""Particles and rigid bodies by where they are: their velocities, and so their energies, follow."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import sympy as sp
+from linkwise_runtime.structure import GRAVITY
+
+from linkwise.errors import LinkwiseError
+from linkwise.escape import short
+from linkwise.symbolic.system import POTENTIAL, Forces, LinkEnergy, Named
+
+Rate: TypeAlias = Callable[[sp.Expr], sp.Expr]
+"""Function that returns the time derivative of an expression in coordinates and time."""
+ZERO = sp.S.Zero
+
+
+@dataclass(frozen=True)
+class Particle:
+    """A point mass: K = m |ṙ|²/2.
+
+    mass: in kg
+    position: r, its two or three components in m, in axes that stand still
+    gravity: of its field in m/s², as many components, along the same axes; the potential −m g·r is its share
+    `gravity`
+    potential, dissipation, forces: as in `LinkEnergy`, beside these
+    """
+
+    name: str
+    mass: sp.Expr
+    position: Sequence[sp.Expr]
+    gravity: Sequence[sp.Expr] = ()
+    potential: sp.Expr | Named = ZERO
+    dissipation: sp.Expr | Named = ZERO
+    forces: Forces = field(default_factory=dict)
+
+    def energies(self, rate: Rate) -> LinkEnergy:
+        """Return the energies; raise LinkwiseError for what is no place or no field."""
+        mass, place = _expression("mass", self.mass), _vector("position", self.position, (2, 3))
+        kinetic = mass * sum((rate(x) ** 2 for x in place), ZERO) / 2
+        return _link(self, kinetic, mass, place)
+
+
+@dataclass(frozen=True)
+class RigidBody:
+    """A rigid body: K = m |ṙ|²/2 + ω·I ω/2, with ω in its own axes from RᵀṘ.
+
+    mass: in kg
+    position: r of its centre of mass, three components in m, in axes that stand still
+    rotation: R, three rows: the columns are the body's own axes in those that stand still
+    inertia: I about the centre of mass in kg m², along the own axes: three principal ones, or three rows
+    gravity: in m/s², as of `Particle`
+    potential, dissipation, forces: as in `LinkEnergy`, beside these
+    """
+
+    name: str
+    mass: sp.Expr
+    position: Sequence[sp.Expr]
+    rotation: Any
+    inertia: Any
+    gravity: Sequence[sp.Expr] = ()
+    potential: sp.Expr | Named = ZERO
+    dissipation: sp.Expr | Named = ZERO
+    forces: Forces = field(default_factory=dict)
+
+    def energies(self, rate: Rate) -> LinkEnergy:
+        """Return the energies; raise LinkwiseError for what is no place, rotation, inertia or field."""
+        mass, place = _expression("mass", self.mass), _vector("position", self.position, (3,))
+        turned, inertia = _matrix("rotation", self.rotation), _inertia(self.inertia)
+        spin = sp.simplify(turned.T * turned.applyfunc(rate))
+        omega = sp.Matrix([spin[2, 1], spin[0, 2], spin[1, 0]])
+        moving = mass * sum((rate(x) ** 2 for x in place), ZERO) / 2
+        return _link(self, moving + (omega.T * inertia * omega)[0] / 2, mass, place)
+
+
+BODIES = (Particle, RigidBody)
+"""Kinds of links that are given by where they are."""
+
+
+def _link(body: Particle | RigidBody, kinetic: sp.Expr, mass: sp.Expr, place: sp.Matrix) -> LinkEnergy:
+    potential = body.potential if isinstance(body.potential, Mapping) else {POTENTIAL: body.potential}
+    if len(body.gravity):
+        field_ = _vector("gravity", body.gravity, (len(place),))
+        if GRAVITY in potential:
+            raise LinkwiseError(
+                "its potential names gravity, and it has a field of gravity too; leave one out"
+            )
+        potential = {GRAVITY: -mass * place.dot(field_), **potential}
+    return LinkEnergy(body.name, kinetic, potential, body.dissipation, body.forces)
+
+
+def _vector(what: str, given: Any, lengths: Sequence[int]) -> sp.Matrix:
+    try:
+        vector = sp.Matrix(list(given))
+    except (TypeError, ValueError, sp.SympifyError):
+        vector = None
+    if vector is None or vector.shape not in [(length, 1) for length in lengths]:
+        wanted = " or ".join(map(str, lengths))
+        raise LinkwiseError(f"its {what} is {short(repr(given))}; give {wanted} components")
+    return vector
+
+
+def _matrix(what: str, given: Any) -> sp.Matrix:
+    try:
+        matrix = sp.Matrix(given)
+    except (TypeError, ValueError, sp.SympifyError):
+        matrix = None
+    if matrix is None or matrix.shape != (3, 3):
+        raise LinkwiseError(f"its {what} is {short(repr(given))}; give three rows of three")
+    return matrix
+
+
+def _inertia(given: Any) -> sp.Matrix:
+    rows = list(given) if isinstance(given, Sequence) else given
+    if isinstance(rows, list) and len(rows) == 3 and not any(isinstance(row, Sequence) for row in rows):
+        return sp.diag(*rows)
+    return _matrix("inertia", given)
+
+
+def _expression(what: str, given: object) -> sp.Expr:
+    try:
+        found = sp.sympify(given, strict=True)
+    except sp.SympifyError:
+        found = None
+    if not isinstance(found, sp.Expr):
+        raise LinkwiseError(f"its {what} is {short(repr(given))}; give a number or a SymPy expression")
+    return found

@@ -1,0 +1,282 @@
+"""Shares with names: potentials, dissipation, forces, imposed motions; and kinetic energies of any degree.
+
+Held against SymPy's LagrangesMethod, equations by hand, and motions by SciPy.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from conftest import needs_compiler
+from helpers.answers import random_states, relative_error
+from linkwise import (
+    Coordinate,
+    LinkEnergy,
+    LinkwiseError,
+    check_package,
+    energy_system,
+    generate,
+    write_package,
+)
+from linkwise.package.load import import_package
+from linkwise.symbolic.moving_bodies import Particle, RigidBody
+from linkwise.symbolic.system import EnergySystem
+from sympy.physics.mechanics import LagrangesMethod, ReferenceFrame, dynamicsymbols
+
+BACKENDS = ("numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler))
+T = dynamicsymbols._t
+X, THETA, PUSH = dynamicsymbols("x theta F")
+M, m, r, k, b, w, B, g = sp.symbols("M m r k b w B g", positive=True)
+VALUES = {M: 2.0, m: 0.3, r: 0.5, k: 40.0, b: 0.8, w: 2.3, B: 0.7, g: 9.81}
+
+
+def crane() -> EnergySystem:
+    """A cart on a spring and a damper, pushed, whose pendulum hangs from a point that is shaken."""
+    hung = [X + r * sp.sin(THETA) + sp.sin(w * T) / 10, -r * sp.cos(THETA)]
+    cart = LinkEnergy(
+        "cart",
+        M * X.diff(T) ** 2 / 2,
+        {"spring": k * X**2 / 2, "magnet": B * THETA * X.diff(T)},
+        {"damper": b * X.diff(T) ** 2 / 2},
+        {"push": {X: PUSH}},
+    )
+    bob = Particle("bob", m, hung, gravity=[0, -g])
+    return energy_system("crane", {X: "m", THETA: "rad"}, [cart, bob], VALUES, inputs=[PUSH])
+
+
+def loaded(system: EnergySystem, folder: Path, backend: str) -> Any:
+    write_package(generate(system, [backend]), folder / system.name)
+    return import_package(folder / system.name).load(backend)
+
+
+def values_of(array: Any) -> Any:
+    return array.detach().numpy() if hasattr(array, "detach") else array
+
+
+def given(backend: str, *states: Any) -> Any:
+    if backend in ("numpy", "native"):
+        return states
+    return [pytest.importorskip("torch").from_numpy(state) for state in states]
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_torques_are_those_of_sympys_lagranges_method(backend: str, tmp_path: Path) -> None:
+    hung = sp.Matrix([X + r * sp.sin(THETA) + sp.sin(w * T) / 10, -r * sp.cos(THETA)]).diff(T)
+    kinetic = M * X.diff(T) ** 2 / 2 + m * (hung.T * hung)[0] / 2
+    potential = k * X**2 / 2 + B * THETA * X.diff(T) - m * g * r * sp.cos(THETA)
+    world = ReferenceFrame("N")
+    forces = [(world, 0 * world.x)]
+    whole = LagrangesMethod(kinetic - potential, [X, THETA], forcelist=forces, frame=world)
+    equations = whole.form_lagranges_equations() + sp.Matrix([b * X.diff(T) - PUSH, 0])
+    symbols = sp.symbols("x0:2 v0:2 a0:2")
+    named = {q.diff(T, n): symbols[2 * n + i] for n in (2, 1, 0) for i, q in enumerate((X, THETA))}
+    exact = sp.lambdify([*symbols, T, PUSH], list(equations.xreplace(named).xreplace(VALUES)))
+    robot = loaded(crane(), tmp_path, backend)
+    for t, force in ((0.0, 0.0), (0.37, -5.0)):
+        states = random_states(2, 20)
+        expected = np.array([exact(*np.concatenate(s), t, force) for s in zip(*states, strict=True)])
+        moved = robot.at(t=t, F=force)
+        tau = values_of(moved.inverse_dynamics(*given(backend, *states)))
+        assert relative_error(tau, expected) <= 1e-12
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_each_share_is_told_by_its_name_and_all_sum_up(backend: str, tmp_path: Path) -> None:
+    robot = loaded(crane(), tmp_path, backend).at(t=0.37, F=-5.0)
+    q, qd, qdd = random_states(2, 20)
+    motion = given(backend, q, qd, qdd)
+    shares = dict(
+        zip(robot.share_names, np.moveaxis(values_of(robot.named_shares(*motion[:2])), -1, 0), strict=True)
+    )
+    (x, theta), (v, omega), zero = q.T, qd.T, 0.0 * q.T[0]
+    shaken = -0.1 * 2.3**2 * np.sin(2.3 * 0.37)  # the point's acceleration
+    expected = {
+        "spring": ([40.0 * x, zero], [zero, zero]),
+        "magnet": ([-0.7 * omega, 0.7 * v], [zero, zero]),
+        "damper": ([0.8 * v, zero], [zero, zero]),
+        "push": ([zero + 5.0, zero], [zero, zero]),
+        "gravity": ([zero, zero], [zero, 0.3 * 9.81 * 0.5 * np.sin(theta)]),
+        "imposed motion": ([zero, zero], [zero + 0.3 * shaken, 0.3 * 0.5 * np.cos(theta) * shaken]),
+    }
+    assert shares.keys() == expected.keys()
+    for name, by_link in expected.items():
+        assert relative_error(shares[name], np.moveaxis(np.array(by_link), 0, -1).swapaxes(0, 1)) <= 1e-12, (
+            name
+        )
+    parts = robot.propagation(*motion)
+    named = robot.named_shares(*motion[:2]).sum(-1)
+    whole = parts.acceleration.sum(-1) + parts.velocity.sum(-1) + named
+    assert relative_error(values_of(whole), values_of(robot.partial_torque(*motion))) <= 1e-13
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_velocity_forces_of_degree_four_are_owned_in_equal_parts(backend: str, tmp_path: Path) -> None:
+    x, y = Coordinate("x", "m"), Coordinate("y", "m")
+    kinetic = x.qd**2 / 2 + y.qd**2 / 2 + x.q * x.qd**2 * y.qd**2 / 4 + y.q * x.qd**3 / 6
+    robot = loaded(energy_system("quartic", [x, y], [LinkEnergy("it", kinetic)]), tmp_path, backend)
+    q, qd, qdd = random_states(2, 20)
+    parts = robot.propagation(*given(backend, q, qd, qdd))
+    (u, v), by = qd.T, values_of(parts.velocity)[:, :, 0]
+    # h_x = u (u v^2/2) + v u^2/2 - u^2 v^2/4 = u^2 v^2/4 + u^2 v/2, of which x has two of four factors, then
+    # two of three; h_y = u (u^2 v/2) - u^3/6, three of four, and all of the last.
+    first, second = u**2 * v**2 / 4, u**2 * v / 2
+    assert (
+        relative_error(by[:, 0], np.stack([first / 2 + 2 * second / 3, first / 2 + second / 3], -1)) <= 1e-13
+    )
+    third = u**3 * v / 2
+    assert relative_error(by[:, 1], np.stack([3 * third / 4 - u**3 / 6, third / 4], -1)) <= 1e-13
+    with pytest.raises(ValueError, match="more than two velocities at once, and no Christoffel symbols"):
+        robot.christoffel(*given(backend, q))
+
+
+@pytest.mark.parametrize("system", [crane, lambda: rolling_in_pieces()], ids=["crane", "pieces"])
+def test_check_proves_every_back_end(system: Any, tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    write_package(generate(system()), tmp_path / "it")
+    assert [f"{r.name}: {r.detail}" for r in check_package(tmp_path / "it") if r.failed] == []
+
+
+def rolling_in_pieces() -> EnergySystem:
+    """Springs and rails with corners, stops and branches; roots and logarithms are on one side alone."""
+    x, y = Coordinate("x", "m"), Coordinate("y")
+    beyond = sp.sqrt(x.q + sp.Rational(1, 9)) * x.q**2 + sp.log(1 + x.q) * x.q
+    rail = sp.Piecewise((3 * x.q**2, x.q < 0), (beyond, True))
+    stop = 40 * sp.Max(0, sp.Abs(y.q) - sp.Rational(1, 2)) ** 2 + 2 * sp.Min(x.q, y.q, 0) ** 2
+    turned = y.qd**2 * sp.atan2(3 + y.q**2, 1 + x.q**2) / 2 + x.qd**2
+    grip = sp.Piecewise((-2, sp.And(y.qd > 0, x.q > 0)), (3, sp.Or(y.qd < 0, sp.Eq(x.q, 1))), (0, True))
+    links = [
+        LinkEnergy("rail", turned, {"rail": rail, "stop": stop}),
+        LinkEnergy("brake", 0, dissipation=sp.Abs(y.qd), forces={"grip": {"y": grip}}),
+    ]
+    return energy_system("pieces", [x, y], links)
+
+
+def test_motions_are_those_of_scipy_and_their_energy_is_accounted_for(tmp_path: Path) -> None:
+    integrate = pytest.importorskip("scipy.integrate")
+    robot = loaded(crane(), tmp_path, "numpy")
+    time, start = np.linspace(0.0, 2.0, 401), np.array([0.2, 0.5, 0.0, 0.0])
+
+    def force(t: float) -> float:
+        return 3.0 * np.cos(5.0 * t)
+
+    def rates(t: float, y: Any) -> Any:
+        x, theta, v, omega = y
+        shaken = -0.1 * 2.3**2 * np.sin(2.3 * t)
+        mass = np.array([[2.3, 0.15 * np.cos(theta)], [0.15 * np.cos(theta), 0.075]])
+        bias = [
+            -0.15 * omega**2 * np.sin(theta) + 40 * x - 0.7 * omega + 0.8 * v - force(t) + 0.3 * shaken,
+            0.7 * v + 0.15 * 9.81 * np.sin(theta) + 0.15 * np.cos(theta) * shaken,
+        ]
+        return [v, omega, *np.linalg.solve(mass, -np.array(bias))]
+
+    exact = integrate.solve_ivp(rates, (0.0, 2.0), start, "DOP853", time, rtol=1e-12, atol=1e-13).y.T
+    options: dict[str, Any] = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
+    inputs = {"F": lambda t, q, qd: force(t)}
+    found = robot.simulate(start[:2], start[2:], time, inputs=inputs, **options)
+    np.testing.assert_allclose(np.concatenate([found.q, found.qd], -1), exact, atol=1e-9)
+    assert np.abs(found.energy_drift).max() <= 1e-9
+    assert np.ptp(found.energy) > 0.1
+    assert robot.parameters["t"] == 0.0  # the robot itself stays where it was
+    with pytest.raises(ValueError, match="inputs names 'G', which crane does not have; its inputs are F"):
+        robot.simulate(start[:2], start[2:], time, inputs={"G": 1.0})
+
+
+def test_a_body_turns_with_eulers_equations(tmp_path: Path) -> None:
+    """A free body by three angles: without torques, angular momentum stands still in the world."""
+    a, c, e = dynamicsymbols("a c e")
+    rotation = sp.rot_axis3(-a) * sp.rot_axis1(-c) * sp.rot_axis3(-e)
+    top = RigidBody("top", 1, [0, 0, 0], rotation, [1, 2, sp.Rational(5, 2)])
+    robot = loaded(energy_system("top", {a: "rad", c: "rad", e: "rad"}, [top]), tmp_path, "numpy")
+    start, rate = np.array([0.1, 0.9, 0.4]), np.array([0.7, -1.1, 2.0])
+    motion = robot.simulate(start, rate, np.linspace(0, 2, 201), method="DOP853", rtol=1e-12, atol=1e-13)
+    turned = sp.lambdify([a, c, e], rotation)
+    slopes = [sp.lambdify([a, c, e], rotation.diff(angle)) for angle in (a, c, e)]
+    momenta = []
+    for q, qd in zip(motion.q, motion.qd, strict=True):
+        frame = turned(*q)
+        spin = frame.T @ sum(slope(*q) * speed for slope, speed in zip(slopes, qd, strict=True))
+        omega = np.array([spin[2, 1], spin[0, 2], spin[1, 0]])
+        momenta.append(frame @ (np.array([1.0, 2.0, 2.5]) * omega))
+    np.testing.assert_allclose(momenta, np.broadcast_to(momenta[0], (201, 3)), atol=1e-9)
+    assert np.ptp(motion.q, axis=0).min() > 0.1
+
+
+FLAT = Coordinate("x", "m")
+LOOSE = sp.Symbol("u")
+BAD = {
+    "a potential that moves a mass": (
+        {"potential": FLAT.qd**2},
+        "its potential energy has degree 2 in the velocities; what is of degree two and more is kinetic",
+    ),
+    "an input in an energy": (
+        {"potential": {"spring": LOOSE * FLAT.q**2}},
+        "its potential energy 'spring' has the input u, whose change would change the energy",
+    ),
+    "a step": (
+        {"potential": sp.Piecewise((0, FLAT.q < 1), (1, True))},
+        "its potential energy jumps where .* passes zero, and has no force there",
+    ),
+    "a sign": (
+        {"potential": {"well": sp.sign(FLAT.q)}},
+        "its potential energy 'well' jumps where x passes zero",
+    ),
+    "no last piece": (
+        {"potential": sp.Piecewise((FLAT.q**2, FLAT.q < 1))},
+        "a Piecewise has no value where none of its conditions is true",
+    ),
+    "a force on nothing": (
+        {"forces": {"y": 1}},
+        "its forces name 'y', which is no coordinate; choose among x",
+    ),
+    "forces without coordinates": (
+        {"forces": 3},
+        "its forces are 3; give a dictionary of forces by coordinate",
+    ),
+    "a name that motion has": ({"dissipation": {"velocity": FLAT.qd**2}}, "a share is called 'velocity'"),
+    "a name that is none": ({"potential": {3: FLAT.q}}, "a share is called 3; give it a name in quotes"),
+    "a jump of the dissipation": ({"dissipation": sp.sign(FLAT.qd)}, "its dissipation jumps where"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_has_no_force_is_refused_by_name(case: str) -> None:
+    terms, message = BAD[case]
+    links = [LinkEnergy("bad", FLAT.qd**2, **terms)]
+    with pytest.raises(LinkwiseError, match=f"^(while deriving robot 'it': )?link 'bad': {message}"):
+        generate(energy_system("it", [FLAT], links, inputs=[LOOSE]), ["numpy"])
+
+
+FUNCTIONS = {
+    "a coordinate without a unit": (([X], [X.diff(T) ** 2], {}), "the coordinate x(t) has no unit"),
+    "an unknown function": (
+        ({X: "m"}, [X.diff(T) ** 2 * PUSH], {}),
+        "link '0': F(t) is neither a coordinate or its velocity nor among `inputs`",
+    ),
+    "an acceleration": (
+        ({X: "m"}, [X.diff(T, 2) ** 2], {}),
+        "an acceleration, which energies and forces do not",
+    ),
+    "the rate of an input": (
+        ({X: "m"}, [X.diff(T) ** 2 + PUSH.diff(T)], {"inputs": [PUSH]}),
+        "Derivative(F(t), t) is neither a coordinate",
+    ),
+    "another time": (
+        ({X: "m"}, [X.diff(T) ** 2], {"time": sp.Symbol("s")}),
+        "x(t) is a function of t, and time is s",
+    ),
+    "time as a parameter": (
+        ({X: "m"}, [X.diff(T) ** 2], {"parameters": {T: 3.0}}),
+        "2 different parameters are called t",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", FUNCTIONS)
+def test_functions_of_time_are_coordinates_or_inputs(case: str) -> None:
+    (coordinates, kinetic, more), message = FUNCTIONS[case]
+    links = [LinkEnergy(str(at), one) for at, one in enumerate(kinetic)]
+    with pytest.raises(LinkwiseError) as caught:
+        energy_system("it", coordinates, links, **more)
+    assert message in str(caught.value)
