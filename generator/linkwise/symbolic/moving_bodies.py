@@ -18,7 +18,7 @@ ZERO = sp.S.Zero
 
 @dataclass(frozen=True)
 class Particle:
-    """A point mass: K = m |ṙ|²/2.
+    """A point mass: K = m ṙ·ṙ/2.
 
     mass: in kg
     position: r, its two or three components in m, in axes that stand still
@@ -44,7 +44,7 @@ class Particle:
 
 @dataclass(frozen=True)
 class RigidBody:
-    """A rigid body: K = m |ṙ|²/2 + ω·I ω/2, with ω in its own axes from RᵀṘ.
+    """A rigid body: K = m ṙ·ṙ/2 + ω·I ω/2, with ω in its own axes from RᵀṘ.
 
     mass: in kg
     position: r of its centre of mass, three components in m, in axes that stand still
