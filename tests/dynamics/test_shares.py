@@ -3,6 +3,7 @@
 Held against SymPy's LagrangesMethod, equations by hand, and motions by SciPy.
 """
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 import sympy as sp
 from conftest import needs_compiler
 from helpers.answers import random_states, relative_error
+from helpers.motion_logs import smooth, write_csv
 from linkwise import (
     Coordinate,
     LinkEnergy,
@@ -20,9 +22,13 @@ from linkwise import (
     generate,
     write_package,
 )
+from linkwise.analysis import analyze
+from linkwise.analysis.show.page import page_data
+from linkwise.escape import column_part
 from linkwise.package.load import import_package
 from linkwise.symbolic.moving_bodies import Particle, RigidBody
 from linkwise.symbolic.system import EnergySystem
+from matplotlib.text import Text
 from sympy.physics.mechanics import LagrangesMethod, ReferenceFrame, dynamicsymbols
 
 BACKENDS = ("numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler))
@@ -280,3 +286,39 @@ def test_functions_of_time_are_coordinates_or_inputs(case: str) -> None:
     with pytest.raises(LinkwiseError) as caught:
         energy_system("it", coordinates, links, **more)
     assert message in str(caught.value)
+
+
+def test_an_analysis_has_each_share_as_a_cause_of_its_own(tmp_path: Path) -> None:
+    x, y = Coordinate("x", "m"), Coordinate("y", "m")
+    spring = LinkEnergy("cart", x.qd**2, {"spring/left": 20 * x.q**2}, {"damper": x.qd**2 / 2})
+    tail = LinkEnergy("tail", (x.qd + y.qd) ** 2 / 2, {"gravity": 3 * (x.q + y.q)})
+    write_package(generate(energy_system("train", [x, y], [spring, tail])), tmp_path / "train")
+    log = write_csv(tmp_path / "log.csv", smooth(40, 2), ["x", "y"])
+    result = analyze(log, tmp_path / "train", induced=["joints"])
+    values = {column.name: row for column, row in zip(result.columns, result.values, strict=True)}
+    expected = {"spring/left": 40 * values["q/x"], "damper": values["qd/x"]}
+    for name, torque in expected.items():
+        np.testing.assert_allclose(values[f"tau_share/x/cart/{column_part(name)}"], torque, atol=1e-12)
+        # M^-1 of two masses of 2 and 1 in a row: what pulls at x moves it by 1/2, and y against it.
+        np.testing.assert_allclose(
+            values[f"acc_share/joints/x/cart/{column_part(name)}"], -torque / 2, atol=1e-12
+        )
+        np.testing.assert_allclose(
+            values[f"acc_share/joints/y/cart/{column_part(name)}"], torque / 2, atol=1e-12
+        )
+    np.testing.assert_allclose(values["tau_share/y/tail/gravity"], 3.0)
+    assert not any(name.startswith(("tau_gravity", "acc_gravity", "power_gravity")) for name in values)
+    np.testing.assert_allclose(result.named_shares.sum(-1), result.gravity)
+    page = json.loads(page_data(result))
+    assert (page["named"], page["shares"]) == ("tau_share", ["spring/left", "damper", "gravity"])
+    labels = [text.get_text() for text in result.figure("shares").findobj(Text)]
+    assert {"spring/left", "damper", "gravity"} <= set(labels)
+
+
+def test_logs_of_what_depends_on_time_or_inputs_are_refused(tmp_path: Path) -> None:
+    write_package(generate(crane(), ["numpy"]), tmp_path / "crane")
+    log = write_csv(tmp_path / "log.csv", smooth(40, 2), ["x", "theta"])
+    with pytest.raises(
+        LinkwiseError, match=r"crane: its torques depend on t, F, beside its joints' motion, and logs"
+    ):
+        analyze(log, tmp_path / "crane")

@@ -73,6 +73,8 @@ class InducedSources:
         own = model.passive_torque(q, qd, qdd)[:3] if self.robot.passive else ()
         torques: dict[str, Array] = dict(zip(LOSSES, own, strict=False))
         torques |= {"acc_qd": packed.velocity, "acc_gravity": packed.gravity}
+        if self.robot.is_written:
+            torques["acc_share"] = model.named_shares(q, qd)[:, *self.robot.structure.share_rows.T]
         forces = np.zeros((*q.shape, len(self.every)))
         for x, ((quantity, at), places) in enumerate(self.every.items()):
             there = torques.get(quantity, out.T)
@@ -105,8 +107,12 @@ def _parts(robot: OpenedRobot, rows: ResultRows) -> Iterator[tuple[str, tuple[in
         yield "acc_tau", (i,), i, row
     for i, j, k, at in sorted((*ijk, at) for at, ijk in enumerate(layout.velocity.tolist())):
         yield "acc_qd", (j, k), i, at
-    for i, j, at in sorted((*ij, at) for at, ij in enumerate(layout.gravity.tolist())):
-        yield "acc_gravity", (j,), i, at
+    if robot.is_written:
+        for i, j, m, at in sorted((*ijm, at) for at, ijm in enumerate(robot.structure.share_rows.tolist())):
+            yield "acc_share", (j, m), i, at
+    else:
+        for i, j, at in sorted((*ij, at) for at, ij in enumerate(layout.gravity.tolist())):
+            yield "acc_gravity", (j,), i, at
     for quantity, field in zip(LOSSES, PASSIVE.values(), strict=False):
         for i in robot.with_own(field):
             yield quantity, (i,), i, i

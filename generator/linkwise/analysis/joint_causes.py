@@ -23,11 +23,11 @@ FEW = 7
 class Cause:
     """One cause of joint torques, and its quantities."""
 
-    kind: Literal["gravity", "load", "own", "acceleration", "velocity", "motion"]
+    kind: Literal["named", "load", "own", "acceleration", "velocity", "motion"]
     label: str
     quantities: tuple[str, ...]
     number: int | None = None
-    """Number of the load, or of the joint that moves."""
+    """Number of the share with a name, of the load, or of the joint that moves."""
 
     @property
     def is_motion(self) -> bool:
@@ -36,7 +36,8 @@ class Cause:
 
     def rows(self, result: AnalysisResult, i: int) -> Index:
         """Return the numbers of the rows of the cause's torques on joint i."""
-        where = {} if self.number is None else {"load" if self.kind == "load" else "cause": self.number}
+        axis = {"load": "load", "named": "share"}.get(self.kind, "cause")
+        where = {} if self.number is None else {axis: self.number}
         return result.rows.numbers(*self.quantities, joint=i, **where)
 
 
@@ -46,12 +47,16 @@ def causes_of(
     shown: Callable[[str], str] = str,
     together: bool = True,
 ) -> tuple[Cause, ...]:
-    """Return the causes in order: gravity or potential energy, loads, passive torques, each joint's motion.
+    """Return the causes in order: gravity or shares with names, loads, passive torques, each joint's motion.
 
     joints: names of the joints, (n,); shown: function that formats a name. together: a motion is one cause,
     otherwise its acceleration and its velocity are two.
     """
-    found = [Cause("gravity", result.robot.potential, ("tau_gravity",))]
+    robot = result.robot
+    if robot.is_written:
+        found = [Cause("named", shown(name), ("tau_share",), m) for m, name in enumerate(robot.share_names)]
+    else:
+        found = [Cause("named", "gravity", ("tau_gravity",))]
     found += [Cause("load", shown(name), ("tau_load",), e) for e, name in enumerate(result.load_labels)]
     found += [
         Cause("own", f"own {name.removeprefix('tau_')}", (name,)) for name in PASSIVE if name in result.rows

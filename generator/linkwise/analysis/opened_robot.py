@@ -16,7 +16,7 @@ from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.file_joints import FileJoint, Order
 from linkwise_runtime.qpos_motion import Qpos
 from linkwise_runtime.rule.joint_tree import TreeFrame
-from linkwise_runtime.structure import PassiveJoint
+from linkwise_runtime.structure import PassiveJoint, Structure
 
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.contacts.ground import GroundContacts
@@ -66,9 +66,32 @@ class OpenedRobot:
     """Contacts on which the robot stands on the ground."""
 
     @property
+    def structure(self) -> Structure:
+        """Robot of the package, in names and numbers."""
+        structure: Structure = self.package.module.ROBOT
+        return structure
+
+    @property
+    def is_written(self) -> bool:
+        """True if the links were written by hand, and their shares that are not of motion have names."""
+        return bool(self.structure.shares)
+
+    @property
+    def is_unstored(self) -> bool:
+        """True if shares of links take or give energy that nothing stores, as dissipation does."""
+        energies = self.package.manifest.energies
+        shares = () if energies is None else (share for link in energies.links for share in link.shares)
+        return any(share.forces or {share.motion, share.dissipation} != {"0"} for share in shares)
+
+    @property
+    def share_names(self) -> tuple[str, ...]:
+        """Names of the shares that are not of motion: gravity of rigid links."""
+        return self.structure.share_names
+
+    @property
     def potential(self) -> str:
-        """Name of the shares g_ij."""
-        return share_word(self.package.module.ROBOT.share_names)
+        """Names of these shares as a phrase."""
+        return share_word(self.share_names)
 
     @property
     def followers(self) -> tuple[FollowingJoint, ...]:

@@ -172,8 +172,13 @@ class AnalysisResult(WholeMovement):
 
     @property
     def gravity(self) -> Array:
-        """g_ij (S, n, N), the part of τ_ij by gravity and other potentials."""
-        return self.dense("tau_gravity")
+        """g_ij (S, n, N), the part of τ_ij by gravity, or by all shares with names."""
+        return self.dense("tau_share").sum(-1) if self.robot.is_written else self.dense("tau_gravity")
+
+    @property
+    def named_shares(self) -> Array:
+        """Shares of τ_ij that are not of motion (S, n, N, M), by the robot's `share_names`."""
+        return self.dense("tau_share") if self.robot.is_written else self.gravity[..., None]
 
     @property
     def load_torque(self) -> Array:

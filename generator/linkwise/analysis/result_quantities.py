@@ -9,8 +9,10 @@ from linkwise_runtime.call_table import CALLS, PASSIVE_KINDS, PROPAGATION, TORQU
 
 MOTION = ("tau_qdd", "tau_qd")
 """The parts of a partial torque by the motion of each joint."""
-TERMS = (*MOTION, "tau_gravity")
-"""The parts that sum to a partial torque."""
+OF_RIGID = (*MOTION, "tau_gravity")
+"""The parts that sum to a partial torque of a rigid link."""
+TERMS = (*OF_RIGID, "tau_share")
+"""The parts that sum to a partial torque: a link that was written by hand has named shares for gravity."""
 PASSIVE = {
     "tau_spring": "stiffness",
     "tau_damping": "damping",
@@ -43,7 +45,8 @@ TABLE = {
     "tau_link": ("", "partial torque: on the joint, through the link"),
     "tau_qdd": ("", "propagation torque: on the joint, through the link, by the cause's acceleration"),
     "tau_qd": ("", "propagation torque: on the joint, through the link, by the cause's velocity"),
-    "tau_gravity": ("", "on the joint, through the link, by gravity and other potentials"),
+    "tau_gravity": ("", "on the joint, through the link, by gravity"),
+    "tau_share": ("", "on the joint, through the link: the share of this name"),
     "tau_spring": ("", "what the joint takes for its own spring"),
     "tau_damping": ("", "what the joint takes for its own damping"),
     "tau_friction": ("", "what the joint takes for its own Coulomb friction"),
@@ -81,7 +84,11 @@ TABLE = {
     ),
     "power_qdd": ("", "power that the joint sends into the link, by the cause's acceleration"),
     "power_qd": ("", "power that the joint sends into the link, by the cause's velocity"),
-    "power_gravity": ("", "power that the joint sends into the link, by gravity and other potentials"),
+    "power_gravity": ("", "power that the joint sends into the link, by gravity"),
+    "power_share": (
+        "named_power joint link share",
+        "power that the joint sends into the link, by the share of this name",
+    ),
     "power_spring": ("", "power that the joint sends into its own spring"),
     "power_damping": ("", "power that the joint's own damping takes"),
     "power_friction": ("", "power that the joint's own Coulomb friction takes"),
@@ -97,7 +104,11 @@ TABLE = {
     ),
     "acc_gravity": (
         "induced_gravity point component link",
-        "acceleration by the link's weight and other potentials alone",
+        "acceleration by the link's weight alone",
+    ),
+    "acc_share": (
+        "induced_shares point component link share",
+        "acceleration by the share of this name on the link alone",
     ),
     "acc_spring": ("", "acceleration by the spring of the cause's joint alone"),
     "acc_damping": ("", "acceleration by the damping of the cause's joint alone"),
@@ -139,9 +150,10 @@ UNITS |= {"contact": "", "slip": "velocity:constraint"}
 """Unit by the first part of a name, as the runtime writes it: torque:joint depends on the joint."""
 OF_PACKAGES = {
     "tau_link": CALLS["partial_torque"].answers[0],
-    **dict(zip(TERMS, PROPAGATION, strict=True)),
+    **dict(zip(OF_RIGID, PROPAGATION, strict=True)),
+    "tau_share": CALLS["named_shares"].answers[0],
     **dict(zip(PASSIVE, call_table.PASSIVE, strict=True)),
-    **dict(zip(POWER_TERMS, call_table.POWER, strict=False)),
+    **dict(zip(POWER_TERMS, call_table.POWER, strict=False)),  # whose last is that of gravity
 }
 """Arrays that are called as those of `robot.labelled` in a package."""
 LINK_LAST = ("constraint", "contact", "link")

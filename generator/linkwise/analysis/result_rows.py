@@ -31,7 +31,7 @@ from linkwise.escape import column_part
 Place = tuple[str, tuple[int, ...]]
 """A quantity, and the index along each of its axes."""
 OVER_TIME = {"velocity": "/s", "acceleration": "/s²"}
-FIELD_OF = {"load": "cause", "contact": "cause", "constraint": "cause", "component": "row"}
+FIELD_OF = {"load": "cause", "share": "cause", "contact": "cause", "constraint": "cause", "component": "row"}
 """Fields of `Column` that have the indices along axes of other names."""
 
 
@@ -54,8 +54,9 @@ class QuantityRows(NamedTuple):
 class Column:
     """A row as a column of a table; `joint`, `link` and `cause` are indices, None where they mean nothing.
 
-    The cause is a coordinate; for the torque of a load it is that load, for share and power of a contact that
-    contact, and for a force or slip the row of the constraint, where `load` is the load that causes a force,
+    The cause is a coordinate; for a share with a name it is that share, for the torque of a load that load,
+    for share and power of a contact that contact, and for a force or slip the row of the constraint, where
+    `load` is the load that causes a force,
     if one does. An induced acceleration has the number of its point and of a row of that point.
     """
 
@@ -93,7 +94,7 @@ class ResultRows:
         components = {
             row: unit.partition("/")[0] for p in points for row, unit in zip(p.rows, p.units, strict=True)
         }
-        axes = axes_of(robot.joints, robot.units, robot.links, ()) | {
+        axes = axes_of(robot.joints, robot.units, robot.links, robot.share_names) | {
             "load": NamedAxis("load", tuple(borne.name for borne in loads)),
             "constraint": NamedAxis("constraint", rows, bases),
             "contact": NamedAxis("contact", contacts),
@@ -196,7 +197,10 @@ def torque_places(
     out += [("tau_link", (i, j)) for i, j, _ in terms.torque]
     out += [("tau_qdd", (i, j, k)) for i, j, k, _ in terms.acceleration]
     out += [("tau_qd", (i, j, k)) for i, j, k, _ in terms.velocity]
-    out += [("tau_gravity", (i, j)) for i, j, _ in terms.gravity]
+    if robot.is_written:
+        out += [("tau_share", (i, j, m)) for i, j, m in sorted(robot.structure.share_rows.tolist())]
+    else:
+        out += [("tau_gravity", (i, j)) for i, j, _ in terms.gravity]
     own = {name: robot.with_own(field) for name, field in PASSIVE.items()}
     out += [(name, (i,)) for name, joints in own.items() for i in robot.joints_supporting(joints)]
     out += [

@@ -105,7 +105,10 @@ class Decomposer:
         _spread(out, rows["tau_link"], packed.torque, sources.torque)
         _spread(out, rows["tau_qdd"], packed.acceleration, sources.acceleration, qdd)
         _spread(out, rows["tau_qd"], packed.velocity, sources.velocity, qd)
-        _spread(out, rows["tau_gravity"], packed.gravity, sources.gravity)
+        if self.robot.is_written:
+            rows.put(out, "tau_share", self.robot.model.named_shares(q, qd))
+        else:
+            _spread(out, rows["tau_gravity"], packed.gravity, sources.gravity)
         self.forces.fill(out, rows, standing, time, (q, qd, qdd), partial)
         closure = self._closure(out, partial) | self.induced.fill(out, unborne, standing, q, qd, qdd)
         if self.convention == "gradient":

@@ -60,7 +60,8 @@ def file_name(graph: Overlay) -> str:
     k = coordinates.pop() if len(coordinates) == 1 else None
     order = orders.pop() if len(orders) == 1 else None
     if order is not None:
-        words.append("gravity" if k is None and order == 0 else MOTIONS[order])
+        still = "gravity" if graph.potential == "gravity" else "named"
+        words.append(still if k is None and order == 0 else MOTIONS[order])
     elif k is not None:
         words.append("motion")
     return "_".join([*words, *([] if k is None else [str(k + 1)])])

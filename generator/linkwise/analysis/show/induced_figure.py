@@ -37,7 +37,7 @@ MOST = 8
 NOTHING = 1e-9
 """Part of the largest component below which a component is only rounding."""
 MOTION = ("acc_qd", "acc_constraint", "acc_kinematic")
-Kind = Literal["sum", "torque", "torques", "gravity", "velocity", "passive", "load", "contact"]
+Kind = Literal["sum", "torque", "torques", "named", "velocity", "passive", "load", "contact"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,11 @@ def _sources(result: AnalysisResult, point: int, components: Sequence[int]) -> l
     if rest:
         others = [every[at] for at in rest]
         found.append(source("torques", f"torques of {len(rest)} others", "acc_tau", cause=others))
-    found.append(source("gravity", result.robot.potential, "acc_gravity"))
+    if result.robot.is_written:
+        named = enumerate(result.robot.share_names)
+        found += [source("named", name, "acc_share", number=m, share=m) for m, name in named]
+    else:
+        found.append(source("named", "gravity", "acc_gravity"))
     found.append(source("velocity", "velocities", *MOTION))
     if any(name in result.rows for name in LOSSES):
         found.append(source("passive", "springs and losses", *LOSSES))
@@ -119,7 +123,7 @@ def _sources(result: AnalysisResult, point: int, components: Sequence[int]) -> l
 
 def numbers_of_curves(rows: ResultRows) -> int:
     """Return how many numbers per sample the curves of all points hold, at most."""
-    kinds = {"acc": 5, "acc_tau": 1, "acc_load": 1}
+    kinds = {"acc": 5, "acc_tau": 1, "acc_load": 1, "acc_share": 1}
     return sum(count * len(rows[name].at) for name, count in kinds.items())
 
 
@@ -135,7 +139,7 @@ def induced(result: AnalysisResult, point: int) -> "Figure":
     curves = source_curves(result, point, list(shown))
     for at, (panel, (component, unit)) in enumerate(zip(panels, shown.values(), strict=True)):
         for source, found in curves:
-            look = _look(source, len(result.robot.driven))
+            look = _look(source, len(result.robot.driven), len(result.load_labels))
             panel.plot(found.time[at], found.values[at], label=drawn(source.label, 34), **look)
         zero_line(panel)
         panel.set_ylabel(f"{drawn(component)} ({unit})")
@@ -146,7 +150,7 @@ def induced(result: AnalysisResult, point: int) -> "Figure":
     return figure
 
 
-def _look(source: ShareSource, joints: int) -> dict[str, Any]:
+def _look(source: ShareSource, joints: int, loads: int) -> dict[str, Any]:
     match source.kind:
         case "sum":
             return {"color": INK, "linewidth": 2.4}
@@ -160,5 +164,8 @@ def _look(source: ShareSource, joints: int) -> dict[str, Any]:
             return {"color": BROWN, "linewidth": 1.0}
         case "load":
             return {"color": colour(joints + source.number), "linewidth": 1.4, "linestyle": "dashdot"}
-    style = {"gravity": "solid", "velocity": "dashed", "passive": "dotted", "contact": "dashdot"}[source.kind]
+        case "named" if source.number:  # the first is grey
+            shade = colour(joints + loads + source.number - 1)
+            return {"color": shade, "linewidth": 1.4, "linestyle": "solid"}
+    style = {"named": "solid", "velocity": "dashed", "passive": "dotted", "contact": "dashdot"}[source.kind]
     return {"color": GRAVITY, "linewidth": 1.4, "linestyle": style}

@@ -34,10 +34,11 @@ def encoded(values: Array, kind: str = "<f8") -> str:
 PIECES, POINTS = 750, 1_000_000
 """Most pieces of a long curve, and most points of all curves together; a point takes five bytes."""
 KINDS = {"tau": ("whole",), "tau_link": ("whole",), **{name: (name, "motion") for name in MOTION}}
-KINDS |= {name: (name,) for name in ("tau_gravity", *PASSIVE, "tau_load")}
+KINDS |= {name: (name,) for name in ("tau_gravity", "tau_share", *PASSIVE, "tau_load")}
 """Kinds of the curves in which a quantity counts."""
 Key = tuple[str, int, int | None, int | None]
-"""Kind of cause ("motion" and "whole" are sums), indices of joint and cause, and link, None for all links."""
+"""Kind of cause ("motion" and "whole" are sums), indices of joint and of cause, share or load, and link, None
+for all links."""
 
 
 class CurveSums:
@@ -50,7 +51,8 @@ class CurveSums:
             axes = QUANTITIES[name].axes
             for row, at in result.rows[name].listed():
                 index = dict(zip(axes, at, strict=True))
-                link, cause = index.get("link"), index.get("load", place.get(index.get("cause", -1)))
+                link, moved = index.get("link"), place.get(index.get("cause", -1))
+                cause = index.get("load", index.get("share", moved))
                 for kind in kinds:
                     for some in dict.fromkeys((link if name == "tau_link" else None, link)):
                         rows.setdefault((kind, place[index["joint"]], cause, some), []).append(row)

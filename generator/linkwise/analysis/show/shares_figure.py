@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 MANY = 12
 """Number of joints above which a bar has the joint's own motion, the largest other one, and the rest."""
-HATCHES = {"motion": "", "acceleration": "", "velocity": "////", "own": "....", "load": "xx"}
+HATCHES = {"motion": "", "acceleration": "", "velocity": "////", "own": "....", "load": "xx", "named": ""}
 LARGEST, REST = "largest motion of another joint", "motions of all other joints, shares added"
 
 
@@ -47,12 +47,13 @@ def share_parts(result: AnalysisResult) -> tuple[list[SharePart], list[SharePart
 
 
 def _fixed(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
-    """Return parts for gravity, loads, and joints' own torques."""
+    """Return parts for gravity or shares with names, loads, and joints' own torques."""
     own = [cause for cause, _ in found if cause.kind == "own"]
-    tones = [*own, *(cause for cause, _ in found if cause.kind == "load")]  # in the page's order
+    named = [cause for cause, _ in found if cause.kind == "named"][1:]  # the first is grey
+    tones = [*own, *(cause for cause, _ in found if cause.kind == "load"), *named]  # in the page's order
     out = []
     for cause, values in found:
-        if cause.kind == "gravity":
+        if cause.kind == "named" and cause not in named:
             out.append(SharePart(cause.label, values, GRAVITY))
         else:
             fill = tone(len(result.robot.driven) + tones.index(cause))
@@ -96,8 +97,9 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     bars = _bars(left, every)
     _bars(right, movement)
     out = f"{robot.potential} and loads" if result.loads else robot.potential
-    left.set_title(f"everything, {out} too")
-    right.set_title(f"the movement alone, without {out}")
+    told = len(robot.share_names) == 1  # several are in the legend
+    left.set_title(f"everything, {out} too" if told else "everything")
+    right.set_title(f"the movement alone, without {out}" if told else "the movement alone")
     left.set_yticks(range(len(robot.driven)), [drawn(robot.plot_joints[i]) for i in robot.driven])
     left.set_ylim(len(robot.driven) - 0.4, -0.6)
     left.set_ylabel("loaded joint")
