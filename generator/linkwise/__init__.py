@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from linkwise.robot import Coordinate, Options, read_robot
     from linkwise.study import ProcessPool, RayCluster, StudyOutcome, run_study
     from linkwise.symbolic.moving_bodies import Particle, RigidBody
+    from linkwise.symbolic.sympy_system import from_sympy
     from linkwise.symbolic.system import LinkEnergy, System
     from linkwise.symbolic.user_energies import energy_system
 
@@ -62,6 +63,7 @@ __all__ = [
     "analyze",
     "check_package",
     "energy_system",
+    "from_sympy",
     "generate",
     "identify",
     "kept_package",
@@ -96,6 +98,7 @@ _ROOM_OF = {
     "analyze": "analysis",
     "check_package": "check",
     "energy_system": "symbolic.user_energies",
+    "from_sympy": "symbolic.sympy_system",
     "generate": "pipeline",
     "identify": "identification",
     "kept_package": "package_cache",

@@ -9,7 +9,7 @@ from typing import Any
 
 from linkwise.errors import LinkwiseError
 from linkwise.symbolic.moving_bodies import BODIES
-from linkwise.symbolic.passed_over import refuse_passed_over
+from linkwise.symbolic.passed_over import READ, refuse_passed_over
 from linkwise.symbolic.system import EnergySystem, LinkEnergy
 from linkwise.symbolic.user_energies import energy_system
 
@@ -17,7 +17,8 @@ from linkwise.symbolic.user_energies import energy_system
 def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
     """Return the system of a Python file that defines `coordinates`, `links`, and optionally other names.
 
-    The file is run; the other names are those of the arguments of `energy_system`. Raises LinkwiseError as
+    The file is run; the other names are those of the arguments of `energy_system`. A file may define `system`
+    instead, as `energy_system` and `from_sympy` return it. Raises LinkwiseError as
     that does, and for a name that nobody reads.
     """
     try:
@@ -27,6 +28,8 @@ def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
     except (Exception, SystemExit) as error:  # the user's own code may raise anything
         raise LinkwiseError(f"running the file failed{_said(error, str(path))}") from error
     refuse_passed_over(path.read_bytes(), scope)
+    if isinstance(scope.get("system"), EnergySystem):
+        return _whole(scope, symbolic)
     links = scope.get("links")
     if not isinstance(links, (list, tuple)) or not all(
         isinstance(one, (LinkEnergy, *BODIES)) for one in links
@@ -44,6 +47,18 @@ def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
         None if isinstance(scope.get("time"), ModuleType) else scope.get("time"),
         scope.get("inputs", ()),
     )
+
+
+def _whole(scope: Mapping[str, Any], symbolic: bool) -> EnergySystem:
+    """Return the system that a file made itself, by `from_sympy` or `energy_system`."""
+    system: EnergySystem = scope["system"]
+    if beside := [name for name in READ if name in scope and name not in ("system", "time", "inputs")]:
+        raise LinkwiseError(
+            f"the file defines 'system', and {beside[0]!r} beside it, which counts for nothing"
+        )
+    if symbolic and system.request.get("parameters") != "symbolic":
+        raise LinkwiseError("the file makes its 'system' with numbers; give symbolic=True there")
+    return system
 
 
 def _said(error: BaseException, path: str) -> str:

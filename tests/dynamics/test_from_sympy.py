@@ -1,0 +1,129 @@
+"""Systems of sympy.physics.mechanics, held against SymPy's own KanesMethod and LagrangesMethod."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from helpers.answers import relative_error
+from linkwise import LinkwiseError, from_sympy, generate, read_system, write_package
+from linkwise.package.load import import_package
+from sympy.physics.mechanics import (
+    Force,
+    KanesMethod,
+    LagrangesMethod,
+    Particle,
+    PinJoint,
+    Point,
+    PrismaticJoint,
+    ReferenceFrame,
+    RigidBody,
+    System,
+    Torque,
+    dynamicsymbols,
+)
+from sympy.physics.mechanics.actuator import LinearDamper, LinearSpring
+from sympy.physics.mechanics.pathway import LinearPathway
+
+T = dynamicsymbols._t
+X, THETA, U, OMEGA, PUSH = dynamicsymbols("x theta u omega F")
+M, m, r, k, c, g = sp.symbols("M m r k c g", positive=True)
+
+
+def cart_pole() -> tuple[System, dict[sp.Symbol, float]]:
+    """A cart on a spring and a damper, pushed, whose pole is turned by a torque."""
+    wall, cart, pole = RigidBody("wall"), RigidBody("cart", mass=M), RigidBody("pole", mass=m)
+    system = System.from_newtonian(wall)
+    slide = PrismaticJoint("slide", wall, cart, coordinates=X, speeds=U, joint_axis=wall.x)
+    pin = PinJoint(
+        "pin", cart, pole, coordinates=THETA, speeds=OMEGA, joint_axis=cart.z, child_point=r * pole.y
+    )
+    system.add_joints(slide, pin)
+    system.apply_uniform_gravity(-g * wall.frame.y)
+    way = LinearPathway(wall.masscenter, cart.masscenter)
+    system.add_actuators(LinearSpring(k, way, equilibrium_length=sp.Rational(1, 10)), LinearDamper(c, way))
+    system.add_loads(Force(cart.masscenter, PUSH * wall.x), Torque(pole.frame, sp.sin(T) * wall.z))
+    values = {M: 2.0, m: 0.3, r: 0.5, k: 40.0, c: 0.8, g: 9.81}
+    inertias = {s for body in (cart, pole) for s in body.central_inertia.to_matrix(body.frame).free_symbols}
+    return system, values | dict.fromkeys(sorted(inertias, key=str), 0.02)
+
+
+def loaded(system: Any, folder: Path) -> Any:
+    write_package(generate(system, ["numpy"]), folder / system.name)
+    return import_package(folder / system.name).load("numpy")
+
+
+def test_a_system_moves_as_kanes_method_says(tmp_path: Path) -> None:
+    system, values = cart_pole()
+    robot = loaded(from_sympy(system, values, inputs=[PUSH], name="pole"), tmp_path).at(t=0.4, F=1.3)
+    assert robot.link_names == ("cart", "pole")
+    assert robot.share_names == ("force", "LinearSpring", "LinearDamper", "gravity")
+    system.form_eoms()
+    kane = system.eom_method
+    assert isinstance(kane, KanesMethod)
+    known = [X, THETA, U, OMEGA, PUSH, T, *values]
+    exact = sp.lambdify(known, [kane.mass_matrix, kane.forcing])
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        q, qd = rng.normal(size=2), rng.normal(size=2)
+        mass, forcing = exact(*q, *qd, 1.3, 0.4, *values.values())
+        qdd = np.linalg.solve(mass, forcing).ravel()
+        assert relative_error(robot.forward_dynamics(q, qd, np.zeros(2)), qdd) <= 1e-12
+
+
+def test_generalised_speeds_become_velocities_and_energies_those_of_lagranges_method(tmp_path: Path) -> None:
+    frame, origin = ReferenceFrame("N"), Point("O")
+    system = System(frame, origin)
+    origin.set_vel(frame, 0)
+    bead = Particle("bead", Point("P"), m)
+    bead.masscenter.set_pos(origin, X * sp.cos(THETA) * frame.x + X * sp.sin(THETA) * frame.y)
+    speeds = {X.diff(T): U, THETA.diff(T): OMEGA / X}  # along and across the ray
+    bead.masscenter.set_vel(frame, bead.masscenter.pos_from(origin).dt(frame).subs(speeds))
+    bead.potential_energy = k * X**2 / 2
+    system.add_bodies(bead)
+    system.add_coordinates(X, THETA)
+    system.add_speeds(U, OMEGA)
+    system.add_kdes(U - X.diff(T), OMEGA - X * THETA.diff(T))
+    values = {m: 0.7, k: 3.0}
+    with pytest.raises(LinkwiseError, match=r"x\(t\), theta\(t\) have no unit; give them, units="):
+        from_sympy(system, values)
+    robot = loaded(from_sympy(system, values, {X: "m", THETA: "rad"}, name="bead"), tmp_path)
+    kinetic = m * (X.diff(T) ** 2 + X**2 * THETA.diff(T) ** 2) / 2
+    equations = LagrangesMethod(kinetic - k * X**2 / 2, [X, THETA]).form_lagranges_equations()
+    symbols = sp.symbols("x0:2 v0:2 a0:2")
+    named = {q.diff(T, n): symbols[2 * n + i] for n in (2, 1, 0) for i, q in enumerate((X, THETA))}
+    exact = sp.lambdify(symbols, list(equations.xreplace(named).xreplace(values)))
+    states = np.random.default_rng(1).normal(size=(3, 10, 2))
+    expected = [exact(*np.concatenate(state)) for state in states.swapaxes(0, 1)]
+    assert relative_error(robot.inverse_dynamics(*states), expected) <= 1e-12
+
+
+FILE = """
+import sympy as sp
+from linkwise import from_sympy
+from sympy.physics.mechanics import PrismaticJoint, RigidBody, System
+
+wall, cart = RigidBody("wall"), RigidBody("cart", mass=2)
+_system = System.from_newtonian(wall)
+_system.add_joints(PrismaticJoint("slide", wall, cart, joint_axis=wall.x))
+"""
+
+
+def test_a_file_may_hold_a_whole_system(tmp_path: Path) -> None:
+    (tmp_path / "cart.py").write_text(FILE + "system = from_sympy(_system, name='cart')\n")
+    assert read_system(tmp_path / "cart.py").link_names == ("cart",)
+    (tmp_path / "two.py").write_text(FILE + "system = from_sympy(_system)\nlinks = []\n")
+    with pytest.raises(LinkwiseError, match=r"two\.py: the file defines 'system', and 'links' beside it"):
+        read_system(tmp_path / "two.py")
+
+
+def test_constraints_are_refused() -> None:
+    system, values = cart_pole()
+    system.add_holonomic_constraints(X - sp.sin(THETA))
+    with pytest.raises(LinkwiseError, match="the system has holonomic constraints, which are not read yet"):
+        from_sympy(system, values)
+    with pytest.raises(
+        LinkwiseError, match=r"from_sympy takes a sympy\.physics\.mechanics\.System, and got 3"
+    ):
+        from_sympy(3)  # type: ignore[arg-type]
