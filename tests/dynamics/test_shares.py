@@ -159,9 +159,10 @@ def rolling_in_pieces() -> EnergySystem:
     return energy_system("pieces", [x, y], links)
 
 
-def test_motions_are_those_of_scipy_and_their_energy_is_accounted_for(tmp_path: Path) -> None:
+@pytest.mark.parametrize("backend", ["numpy", pytest.param("native", marks=needs_compiler)])
+def test_motions_are_those_of_scipy_and_their_energy_is_accounted_for(backend: str, tmp_path: Path) -> None:
     integrate = pytest.importorskip("scipy.integrate")
-    robot = loaded(crane(), tmp_path, "numpy")
+    robot = loaded(crane(), tmp_path, backend)
     time, start = np.linspace(0.0, 2.0, 401), np.array([0.2, 0.5, 0.0, 0.0])
 
     def force(t: float) -> float:
@@ -187,6 +188,18 @@ def test_motions_are_those_of_scipy_and_their_energy_is_accounted_for(tmp_path: 
     assert robot.parameters["t"] == 0.0  # the robot itself stays where it was
     with pytest.raises(ValueError, match="inputs names 'G', which crane does not have; its inputs are F"):
         robot.simulate(start[:2], start[2:], time, inputs={"G": 1.0})
+
+
+@pytest.mark.parametrize("backend", ["torch", "autograd", pytest.param("native", marks=needs_compiler)])
+def test_tensors_move_as_arrays_do_with_time_and_inputs(backend: str, tmp_path: Path) -> None:
+    torch = pytest.importorskip("torch")
+    q, qd, time = np.array([[0.2, 0.5], [0.1, -1.0]]), np.zeros((2, 2)), np.linspace(0.0, 0.2, 21)
+    inputs = {"F": lambda t, q, qd: np.cos(5.0 * t)}
+    expected = loaded(crane(), tmp_path / "numpy", "numpy").simulate(q, qd, time, inputs=inputs)
+    robot = loaded(crane(), tmp_path, backend)
+    found = robot.simulate(torch.from_numpy(q), torch.from_numpy(qd), time, inputs=inputs)
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(values_of(one), other, atol=1e-12)
 
 
 def test_a_body_turns_with_eulers_equations(tmp_path: Path) -> None:

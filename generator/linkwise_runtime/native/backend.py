@@ -115,7 +115,7 @@ class NativeBackend(NumpyBackend):
         links, rule: what torch differentiates, one or the other
         """
         super().__init__(structure, links, {}, rule)
-        self._forms, self._sources = links, sources
+        self._forms = links
         self.parameters = dict(parameters)
         self.calls = NativeCalls(structure, sources, parameters)
         self.quick = QuickCalls(self.calls)
@@ -171,9 +171,10 @@ class NativeBackend(NumpyBackend):
 
     def separate(self) -> ArrayBackend:
         """Return a copy whose parameters may be set."""
-        made = NativeBackend(self.structure, self._sources, self._forms, self.parameters, self.rule)
-        made.threads_set = self.threads_set
-        made.calls.learned = True  # the values are read anew in each call
+        made = cast(NativeBackend, ArrayBackend.separate(self))
+        made.calls = self.calls.separate()
+        made.quick = QuickCalls(made.calls)
+        made.direct, made.at_once = made.quick.direct(), None
         return made
 
     def set_parameters(self, values: Mapping[str, object]) -> None:

@@ -71,10 +71,11 @@ class NativeCalls:
         sources: Path,
         parameters: Mapping[str, float | Numbers],
         threads: int | None = None,
+        changing: bool = False,
     ) -> None:
         """Compile at the first call for this package; raise RuntimeError where that is not possible.
 
-        threads: the number of cores unless given
+        threads: the number of cores unless given; changing: whether parameters change from call to call
         """
         self.structure, self.parameters = structure, dict(parameters)
         self.sources = loaded(structure, sources)
@@ -83,11 +84,17 @@ class NativeCalls:
         self.sizes = {call: [math.prod(shape) for shape in shapes] for call, shapes in self.shapes.items()}
         self._complete = {call: all(sizes) for call, sizes in self.sizes.items()}
         self._widths = {call: sum(sizes) for call, sizes in self.sizes.items()}
-        self.learned = has_tensors(parameters.values())
+        self.learned = changing or has_tensors(parameters.values())
         self._constants = {kind: self._numbers(kind) for kind in map(np.dtype, ("f4", "f8"))}
         self._of_one, self._shape = OneSamplePool(self._one_sample), (structure.n,)
         self._functions: dict[tuple[str, NumberType], CFunction] = {}
         self._function("packed", np.dtype("f8"))
+
+    def separate(self) -> "NativeCalls":
+        """Return the same functions for parameters that change from call to call."""
+        return NativeCalls(
+            self.structure, self.sources.directory, self.parameters, self.threads_set, changing=True
+        )
 
     @property
     def threads(self) -> int:

@@ -21,6 +21,7 @@ from ..interface import ClosedForms, Numbers
 from ..rule.calls import RigidRule
 from .build import Sources
 from .calls import FUNCTIONS, NativeCalls
+from .compiled_calls import QuickCalls
 from .memory import NumberArray
 
 FLOATS = (torch.float64, torch.float32)
@@ -72,6 +73,18 @@ class TorchSide(TorchBackend):
         self.calls, self.run = calls, run
         self._given = [value for value in calls.parameters.values() if torch.is_tensor(value)]
         self.operators = {call: operator(calls, links, rule, call) for call in OPERATED}
+
+    def separate(self) -> TorchBackend:
+        """Return a copy whose parameters may be set."""
+        made = cast(TorchSide, super().separate())
+        made.calls = self.calls.separate()
+        made.run = QuickCalls(made.calls).run
+        return made
+
+    def set_parameters(self, values: Mapping[str, object]) -> None:
+        """Give run-time parameters of a separate copy these values, one number each."""
+        super().set_parameters(values)
+        self.calls.parameters.update(cast("Mapping[str, float | Numbers]", values))
 
     @cached_property
     def answers(self) -> Answers:
