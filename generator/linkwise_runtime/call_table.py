@@ -173,7 +173,9 @@ DYNAMICS = (
         "mass_matrix",
     ),
     *_by_link("coriolis_matrix", QD, "joint cause", COEFFICIENT_UNITS[1], "torque per velocity of the cause"),
-    *_by_link("gravity_torque", Q, "joint", TORQUE, "torque of gravity and other potentials"),
+    *_by_link(
+        "gravity_torque", Q, "joint", TORQUE, "torque at rest: of gravity, or of all shares with names"
+    ),
     Call(
         "forward_dynamics",
         ("q", "qd", "tau"),
@@ -227,7 +229,7 @@ DYNAMICS = (
 SOURCES = (
     ("actuators", "cause", "by what the actuator of the cause gives"),
     ("velocity", "link cause", "by velocity forces on the link, by the velocity of the cause"),
-    ("gravity", "link", "by the weight of the link and other potentials"),
+    ("gravity", "link", "by the weight of the link, or all of its shares with names"),
     ("passive", "source cause", "by spring, damping and friction of the cause"),
     ("loads", "load", "by the load"),
     ("constraints", "cause", "by constraints that turn with the velocity of the cause"),

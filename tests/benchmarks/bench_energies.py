@@ -3,8 +3,8 @@
     python tests/benchmarks/bench_energies.py [--only NAME]
 
 LagrangesMethod derives equations of motion, and lambdify(cse=True) makes a function of them: M and the
-forcing. linkwise derives closed forms link by link, emits them, and native computes tau_ij of one sample by C.
-Times are the least of several rounds that take turns.
+forcing. linkwise derives closed forms link by link, and native computes tau_ij of one sample by C. Times
+are the least of several rounds that take turns.
 """
 
 import argparse

@@ -315,6 +315,10 @@ FILES = {
         GOOD + "parametres = {sp.Symbol('m'): 1.0}",
         "'parametres' in line 6 would count for nothing: linkwise reads parameters, ",
     ),
+    "a link's own mistake": (
+        GOOD + "links = [\n    LinkEnergy('b', 0, x.q),\n    LinkEnergy('a', sp.Symbol('mu') * x.qd**2),\n]",
+        "line 8: link 'a': the symbol mu is neither a coordinate",
+    ),
     "complex": (GOOD + "parameters = {sp.Symbol('m'): sp.I}", "parameter m has no value as a real number"),
     "huge": (GOOD + "parameters = {sp.Symbol('m'): 10**400}", "parameter m has no value as a real number"),
     "infinite": (GOOD + "parameters = {sp.Symbol('m'): sp.oo}", "parameter m has NaN or infinity"),

@@ -27,7 +27,9 @@ def graph(
     coordinate: Annotated[str, typer.Option(help="Joint k, whose motion is followed, or all")] = "all",
     order: Annotated[
         str,
-        typer.Option(help="2 acceleration, 1 velocity, 0 potential energy (of a joint: position), or all"),
+        typer.Option(
+            help="2 acceleration, 1 velocity, 0 gravity or named shares (of a joint: position), or all"
+        ),
     ] = "all",
     fold: Annotated[
         str, typer.Option(help="What a picture draws as one node: none, line, link, or auto")

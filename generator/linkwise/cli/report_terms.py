@@ -34,7 +34,9 @@ def terms(
     joint: Annotated[str, typer.Option(help="Joint i: its name, its number from 1, or all")] = "1",
     link: LinkName = "all",
     coordinate: Annotated[str, typer.Option(help="Joint k, whose motion is kept")] = "1",
-    order: Annotated[int, typer.Option(help="Kept: 2 acceleration, 1 velocity, 0 potential energy")] = 2,
+    order: Annotated[
+        int, typer.Option(help="Kept: 2 acceleration, 1 velocity, 0 gravity and potentials")
+    ] = 2,
     budget: Budget = BUDGET,
     partial: Annotated[
         bool, typer.Option("--partial", help="Report on the links that fit the budget")
@@ -45,7 +47,7 @@ def terms(
     """Count terms and operations of the partial torques, and those that one bucket needs."""
     if order not in (0, 1, 2):
         raise LinkwiseError(
-            f"--order is {order}; choose 2 for acceleration, 1 for velocity, 0 for potential energy"
+            f"--order is {order}; choose 2 for acceleration, 1 for velocity, 0 for gravity and potentials"
         )
     system = read_system(robot, options)
     tell_run(robot)

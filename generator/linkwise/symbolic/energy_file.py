@@ -1,5 +1,7 @@
 """Python files that define energies in SymPy; they are run."""
 
+import ast
+import re
 import runpy
 from collections.abc import Mapping
 from pathlib import Path
@@ -38,15 +40,34 @@ def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
         raise LinkwiseError(f"the file must define 'links', a list of linkwise.LinkEnergy, or of {kinds}")
     if not isinstance(scope.get("coordinates"), (list, tuple, Mapping)):
         raise LinkwiseError("the file must define 'coordinates', a list of linkwise.Coordinate")
-    return energy_system(
-        scope.get("name", path.stem),
-        scope["coordinates"],
-        links,
-        scope.get("parameters"),
-        symbolic,
-        None if isinstance(scope.get("time"), ModuleType) else scope.get("time"),
-        scope.get("inputs", ()),
-    )
+    try:
+        return energy_system(
+            scope.get("name", path.stem),
+            scope["coordinates"],
+            links,
+            scope.get("parameters"),
+            symbolic,
+            None if isinstance(scope.get("time"), ModuleType) else scope.get("time"),
+            scope.get("inputs", ()),
+        )
+    except LinkwiseError as error:
+        line = _line_of_link(str(error), path.read_bytes())
+        raise LinkwiseError(f"line {line}: {error}" if line else str(error)) from error
+
+
+def _line_of_link(told: str, source: bytes) -> int | None:
+    """Return the last line with the link that an error names; None where the file makes up the name."""
+    found = re.match(r"link ('[^']*'|\"[^\"]*\"): ", told)
+    if found is None:
+        return None
+    name = ast.literal_eval(found[1])
+    calls = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call))
+    return max((call.lineno for call in calls if _is_named(call, name)), default=None)
+
+
+def _is_named(call: ast.Call, name: str) -> bool:
+    given = [*call.args[:1], *(keyword.value for keyword in call.keywords if keyword.arg == "name")]
+    return any(isinstance(one, ast.Constant) and one.value == name for one in given)
 
 
 def _whole(scope: Mapping[str, Any], symbolic: bool) -> EnergySystem:
