@@ -114,9 +114,7 @@ def test_a_file_may_hold_a_whole_system(tmp_path: Path) -> None:
     (tmp_path / "cart.py").write_text(FILE + "system = from_sympy(_system, name='cart')\n")
     assert read_system(tmp_path / "cart.py").link_names == ("cart",)
     (tmp_path / "two.py").write_text(FILE + "system = from_sympy(_system)\nlinks = []\n")
-    with pytest.raises(
-        LinkwiseError, match=r"two\.py: the file defines 'system', and 'links' beside it"
-    ):
+    with pytest.raises(LinkwiseError, match=r"two\.py: the file defines 'system', and 'links' beside it"):
         read_system(tmp_path / "two.py")
 
 

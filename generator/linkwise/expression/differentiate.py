@@ -75,8 +75,9 @@ def _call_tangent(function: str, f: Expression, a: Expression, da: Expression) -
         case "cosh":
             return a.call("sinh") * da
         case "tanh":
-            cosh = a.call("cosh")  # 1 − tanh² would leave nothing but rounding where tanh is near 1
-            return da / (cosh * cosh)
+            # 1 − tanh² would leave nothing but rounding where tanh is near 1, and cosh² overflows there.
+            small = (-2.0 * a.call("abs")).call("exp")
+            return 4.0 * small / ((1.0 + small) * (1.0 + small)) * da
         case "exp":
             return f * da
         case "log":
