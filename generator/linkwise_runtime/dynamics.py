@@ -336,8 +336,14 @@ class Dynamics(RobotCalls):
     def mass_matrix(self, q: Array, by_link: bool = False, out: Array | None = None) -> Array:
         """Return the mass matrix M_ik = sum_j c2_ijk, shape (..., n, n); by link c2_ijk, (..., n, N, n).
 
-        In kg m^2, kg m or kg, where none, one or both of i and k are prismatic.
+        In kg m^2, kg m or kg, where none, one or both of i and k are prismatic. Raises ValueError for links
+        with kinetic energies of degree three or more in the velocities, which M then depends on.
         """
+        if max(self.structure.degrees, default=2) > 2:
+            raise ValueError(
+                f"the mass matrix of {self.structure.name} depends on the velocities too; sum c2 of "
+                "coefficients(q, qd) over the links"
+            )
         mass: Array = self._call("mass_matrix_by_link" if by_link else "mass_matrix", (q,), out)
         return mass
 

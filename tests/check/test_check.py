@@ -611,7 +611,19 @@ def test_an_energy_that_is_not_the_one_that_a_user_wrote_fails(tmp_path: Path) -
     write_package(generate(read_system(str(DATA / "turntable.py")), ["numpy"]), package)
     change_file(package, "forms/link_1.py", "0.2 * (qd1 * qd1) + 0.5", "0.200001 * (qd1 * qd1) + 0.5")
     failing = [name for name, mark in marks(package).items() if mark == "FAIL"]
-    assert failing == ["numpy: energies of the links"]
+    assert failing == [
+        "numpy: energies of the links",
+        "numpy: a simulated motion against energies differentiated",
+    ]
+
+
+def test_power_that_comes_from_elsewhere_than_joints_is_held_against_the_energies(tmp_path: Path) -> None:
+    package, hoop = tmp_path / "hoop", DATA.parents[1] / "examples" / "energies" / "bead_on_hoop.py"
+    write_package(generate(read_system(str(hoop)), ["numpy"]), package)
+    assert set(marks(package).values()) == {"ok"}
+    change_file(package, "forms/link_1.py", "-(qd1 * (0.002 * qd1)", "-(qd1 * (0.002001 * qd1)")
+    failing = [name for name, mark in marks(package).items() if mark == "FAIL"]
+    assert failing == ["numpy: a simulated motion against energies differentiated"]
 
 
 def test_a_lagrangian_that_is_not_the_one_that_a_user_wrote_fails(tmp_path: Path) -> None:

@@ -150,10 +150,11 @@ def rolling_in_pieces() -> EnergySystem:
     beyond = sp.sqrt(x.q + sp.Rational(1, 9)) * x.q**2 + sp.log(1 + x.q) * x.q
     rail = sp.Piecewise((3 * x.q**2, x.q < 0), (beyond, True))
     stop = 40 * sp.Max(0, sp.Abs(y.q) - sp.Rational(1, 2)) ** 2 + 2 * sp.Min(x.q, y.q, 0) ** 2
+    stop += 5 * sp.Max(0, x.q - 1, y.q - 1) ** 2
     turned = y.qd**2 * sp.atan2(3 + y.q**2, 1 + x.q**2) / 2 + x.qd**2
     grip = sp.Piecewise((-2, sp.And(y.qd > 0, x.q > 0)), (3, sp.Or(y.qd < 0, sp.Eq(x.q, 1))), (0, True))
     links = [
-        LinkEnergy("rail", turned, {"rail": rail, "stop": stop}),
+        LinkEnergy("rail", turned, {"Führung */": rail, "stop": stop}),
         LinkEnergy("brake", 0, dissipation=sp.Abs(y.qd), forces={"grip": {"y": grip}}),
     ]
     return energy_system("pieces", [x, y], links)
@@ -200,6 +201,19 @@ def test_tensors_move_as_arrays_do_with_time_and_inputs(backend: str, tmp_path: 
     found = robot.simulate(torch.from_numpy(q), torch.from_numpy(qd), time, inputs=inputs)
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(values_of(one), other, atol=1e-12)
+
+
+@pytest.mark.parametrize("backend", ["torch", "autograd"])
+def test_gradients_by_an_input_are_kept(backend: str, tmp_path: Path) -> None:
+    torch = pytest.importorskip("torch")
+    robot, rest, time = loaded(crane(), tmp_path, backend), torch.zeros(2), np.linspace(0.0, 0.2, 5)
+
+    def ends(force: Any) -> Any:
+        return robot.simulate(rest.double(), rest.double(), time, inputs={"F": force}).q[-1].sum()
+
+    force = torch.tensor(0.5, dtype=torch.float64, requires_grad=True)
+    (slope,) = torch.autograd.grad(ends(force), force)
+    assert abs(slope - (ends(0.5 + 1e-4) - ends(0.5 - 1e-4)) / 2e-4) <= 1e-8 * abs(slope)
 
 
 def test_a_body_turns_with_eulers_equations(tmp_path: Path) -> None:
@@ -256,6 +270,21 @@ BAD = {
     "a name that motion has": ({"dissipation": {"velocity": FLAT.qd**2}}, "a share is called 'velocity'"),
     "a name that is none": ({"potential": {3: FLAT.q}}, "a share is called 3; give it a name in quotes"),
     "a jump of the dissipation": ({"dissipation": sp.sign(FLAT.qd)}, "its dissipation jumps where"),
+    "a step far away": (
+        {"potential": sp.Piecewise((0, FLAT.q < 500), (1e-5, True))},
+        "its potential energy jumps where x - 500 passes zero",
+    ),
+    "a full turn": (
+        {"potential": sp.atan2(sp.sin(FLAT.q), sp.cos(FLAT.q))},
+        "its potential energy jumps where",
+    ),
+    "a name between spaces": ({"potential": {" a": FLAT.q}}, "a share is called ' a'; leave out the spaces"),
+    "a dissipation at rest": ({"dissipation": FLAT.q**2}, "its dissipation depends on no velocity"),
+    "an input at which nothing is defined": (
+        {"forces": {"x": 1 / LOOSE}},
+        "its force is no number where time and inputs are 0",
+    ),
+    "a matrix": ({"potential": sp.Matrix([FLAT.q])}, "its potential energy is Matrix.*; give a SymPy expr"),
 }
 
 
@@ -263,8 +292,73 @@ BAD = {
 def test_what_has_no_force_is_refused_by_name(case: str) -> None:
     terms, message = BAD[case]
     links = [LinkEnergy("bad", FLAT.qd**2, **terms)]
+    inputs = [LOOSE] if "input" in case else []
     with pytest.raises(LinkwiseError, match=f"^(while deriving robot 'it': )?link 'bad': {message}"):
-        generate(energy_system("it", [FLAT], links, inputs=[LOOSE]), ["numpy"])
+        generate(energy_system("it", [FLAT], links, inputs=inputs), ["numpy"])
+
+
+def test_a_weight_that_is_lifted_off_the_floor_does_not_jump() -> None:
+    weight = sp.Piecewise((2e4 * (FLAT.q - 1), FLAT.q > 1), (0, True))
+    energy_system("crane", [FLAT], [LinkEnergy("load", FLAT.qd**2, weight)])
+
+
+ROOM = (FLAT.q, 0, 0)
+BODIES = {
+    "a mass": (Particle("a", -1, ROOM), "its mass is -1, and no body has a negative one"),
+    "one number of gravity": (Particle("a", 1, ROOM, gravity=9.81), "its gravity is 9.81; give 3 components"),
+    "letters": (Particle("a", 1, "xy"), "its position is 'xy'; give 2 or 3 components"),
+    "an input": (
+        Particle("a", 1, [FLAT.q + LOOSE, 0]),
+        "where it is depends on the input u, whose rate",
+    ),
+    "a velocity": (
+        Particle("a", 1, [FLAT.q + FLAT.qd, 0]),
+        "where it is depends on the velocity d.x./dt, whose rate",
+    ),
+    "a stretch": (RigidBody("a", 1, ROOM, 2 * sp.eye(3), [1, 1, 1]), "its rotation is none: its columns are"),
+    "a mirror": (RigidBody("a", 1, ROOM, sp.diag(1, 1, -1), [1, 1, 1]), "its rotation is a reflection"),
+    "a lopsided inertia": (
+        RigidBody("a", 1, ROOM, sp.eye(3), [[1, 0.2, 0], [0, 1, 0], [0, 0, 1]]),
+        "its inertia is not symmetric; give I_xy twice",
+    ),
+    "a long inertia": (
+        RigidBody("a", 1, ROOM, sp.eye(3), np.array([1, 1, 5])),
+        "its principal inertias are 1, 1 and 5, which no rigid body has",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BODIES)
+def test_what_is_no_body_is_refused_by_name(case: str) -> None:
+    body, message = BODIES[case]
+    inputs = [LOOSE] if "input" in case else []
+    with pytest.raises(LinkwiseError, match=f"^link 'a': {message}"):
+        energy_system("it", [FLAT], [body], inputs=inputs)
+
+
+GIVEN = {
+    "a velocity as time": ({"time": FLAT.qd}, "`time` is d.x./dt, which is a coordinate or its velocity too"),
+    "a position as input": ({"inputs": [FLAT.q]}, "the input x is a coordinate or its velocity too"),
+    "time as input": ({"time": LOOSE, "inputs": [LOOSE]}, "the input u is time too"),
+    "an input twice": ({"inputs": [LOOSE, LOOSE]}, "the input u is another input too"),
+    "one input": ({"inputs": LOOSE}, "`inputs` is u; give a list"),
+    "a set of inputs": ({"inputs": {LOOSE}}, "`inputs` is .*; give a list"),
+    "an input of nothing": (
+        {"inputs": [LOOSE]},
+        "the input u is in no force and no dissipation",
+    ),
+    "no links": ({"links": None}, "`links` is None; give a list of linkwise.LinkEnergy"),
+    "a kind of links": ({"links": [LinkEnergy]}, "`links` is .*; give a list of linkwise.LinkEnergy"),
+    "no coordinates": ({"coordinates": None}, "the coordinates are no list"),
+}
+
+
+@pytest.mark.parametrize("case", GIVEN)
+def test_what_is_no_part_of_a_system_is_refused_by_name(case: str) -> None:
+    more, message = GIVEN[case]
+    asked = {"coordinates": [FLAT], "links": [LinkEnergy("a", FLAT.qd**2)], **more}
+    with pytest.raises(LinkwiseError, match=message):
+        energy_system("it", **asked)
 
 
 FUNCTIONS = {
@@ -279,7 +373,7 @@ FUNCTIONS = {
     ),
     "the rate of an input": (
         ({X: "m"}, [X.diff(T) ** 2 + PUSH.diff(T)], {"inputs": [PUSH]}),
-        "Derivative(F(t), t) is neither a coordinate",
+        "Derivative(F(t), t) is the rate of an input, which is not known",
     ),
     "another time": (
         ({X: "m"}, [X.diff(T) ** 2], {"time": sp.Symbol("s")}),
@@ -287,7 +381,7 @@ FUNCTIONS = {
     ),
     "time as a parameter": (
         ({X: "m"}, [X.diff(T) ** 2], {"parameters": {T: 3.0}}),
-        "2 different parameters are called t",
+        "t is time or an input, and stands among `parameters` too; leave it out there",
     ),
 }
 

@@ -15,7 +15,7 @@
    i, k in       rad, rad   what it is
    c2(i, j, k)   kg m^2     mass matrix of link j
    c1(i, j, k)   kg m^2/s   velocity coefficients, 1/2 d(tau)/d(qd)
-   g(i, j)       N m        what has a name of its own: gravity
+   g(i, j)       N m        what has a name of its own: 'gravity'
    tau(i, j)     N m        the sum above
    c0(i, j, k)   N m/rad    position gradient, d(tau(i, j))/d(q_k)
 
@@ -193,7 +193,7 @@ void planar3_jacobian_rate(int frame, const double *point, const double *q, cons
    Reads q (JOINTS); writes mass (JOINTS, JOINTS). */
 void planar3_mass_matrix(const double *q, double *mass);
 
-/* Accelerations under the torques tau(i) of the joints, by the motion and gravity: forward dynamics. Returns 0; where M is
+/* Accelerations under the torques tau(i) of the joints, by the motion and 'gravity': forward dynamics. Returns 0; where M is
    singular, or the motion not finite, the number of a joint, from 1, that can move together with those before it without
    moving any mass, and then leaves qdd as it was. Near there, where rounding leaves fewer than half of the digits of qdd, it
    writes qdd and returns the number of such a joint, negative: of its inertia, less than the root of DBL_EPSILON, 1.5e-8, in
@@ -359,7 +359,7 @@ void planar3_jacobian_ratef(int frame, const float *point, const float *q, const
    Reads q (JOINTS); writes mass (JOINTS, JOINTS). */
 void planar3_mass_matrixf(const float *q, float *mass);
 
-/* Accelerations under the torques tau(i) of the joints, by the motion and gravity: forward dynamics. Returns 0; where M is
+/* Accelerations under the torques tau(i) of the joints, by the motion and 'gravity': forward dynamics. Returns 0; where M is
    singular, or the motion not finite, the number of a joint, from 1, that can move together with those before it without
    moving any mass, and then leaves qdd as it was. Near there, where rounding leaves fewer than half of the digits of qdd, it
    writes qdd and returns the number of such a joint, negative: of its inertia, less than the root of DBL_EPSILON, 1.5e-8, in

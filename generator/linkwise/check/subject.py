@@ -19,6 +19,7 @@ from linkwise.check.constraint_checks import HeldContacts
 from linkwise.check.frame_checks import FrameReference, frame_reference
 from linkwise.check.parametric_tree import tree_with
 from linkwise.check.regressor_checks import regressor_reference
+from linkwise.check.simulated_terms import simulated_terms
 from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion
 from linkwise.oracle.energies import TextTerms, energy_reference, states_of_energies
 from linkwise.oracle.loop_reference import LoopReference, loop_reference
@@ -172,7 +173,21 @@ class Subject:
     @cached_property
     def simulation(self) -> SimulatedMotion | str:
         """A short motion, or the reason why there is none."""
+        if self.terms is not None:
+            return simulated_terms(self.terms, there(self.manifest.energies).inputs, self.reference)
         return simulated_motion(self.manifest, there(self.tree), there(self.closed_states))
+
+    @cached_property
+    def terms(self) -> Sequence[Sequence[TextTerms]] | None:
+        """Terms of the links, exact, then with errors in each operation; None where nothing can read them."""
+        written = self.manifest.energies
+        if written is None or not find_spec("torch"):
+            return None
+        joints = [joint.name for joint in self.manifest.joints]
+        return [
+            [TextTerms(one, joints, written.time, self.parameters, noise) for one in written.links]
+            for noise in (None, 1, 2, 3)
+        ]
 
     @cached_property
     def tried_reference(self) -> tuple[Reference | None, int]:
@@ -183,13 +198,8 @@ class Subject:
             states = random_states(manifest.joints, samples, rest=rest)
             recursion, magnitudes = NewtonEuler(manifest, self.tree), Magnitudes(manifest, self.tree)
             return body_reference(recursion, magnitudes, states), len(states.q)
-        written = manifest.energies
-        if written is not None and find_spec("torch"):
-            joints = [joint.name for joint in manifest.joints]
-            exact, *noisy = (
-                [TextTerms(one, joints, written.time, self.parameters, noise) for one in written.links]
-                for noise in (None, 1, 2, 3)
-            )
+        if self.terms is not None:
+            exact, *noisy = self.terms
             names = self.package.module.ROBOT.share_names
             found = states_of_energies(exact, names, manifest.joints, self.count[0])
             defined = len(found.states.q) > 0

@@ -51,9 +51,11 @@ def sum_calls(name: str, model: Dynamics, reference: Reference) -> Iterator[Resu
 def _sums(model: Dynamics, reference: Reference, at: Any, kind: Any = float) -> Iterator[Entries]:
     """Yield matrices and gravity of some samples, whole and link by link."""
     q, qd, _ = (a.astype(kind) for a in reference.states.at(at).motion)
+    has_mass = max(model.structure.degrees, default=2) <= 2
     for by_link in (False, True):
         velocity = reference.values["c1"], reference.scales["c1"]
-        yield _summed("M", model.mass_matrix(q, by_link=by_link), reference.at_rest("c2"), at, by_link)
+        if has_mass:
+            yield _summed("M", model.mass_matrix(q, by_link=by_link), reference.at_rest("c2"), at, by_link)
         yield _summed("C", model.coriolis_matrix(q, qd, by_link=by_link), velocity, at, by_link)
         yield _summed("g", model.gravity_torque(q, by_link=by_link), reference.at_rest("g"), at, by_link)
 

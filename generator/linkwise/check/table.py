@@ -104,6 +104,10 @@ def _moving_on(a: BackendAnswers) -> bool:
     return _by_forms(a) and a.subject.closed_states is not None
 
 
+def _simulated(a: BackendAnswers) -> bool:
+    return _moving_on(a) or (_by_forms(a) and a.subject.terms is not None)
+
+
 def _of_bodies(a: BackendAnswers) -> bool:
     return _by_any(a) and a.subject.tree is not None and a.model.backend.rule is not None
 
@@ -189,7 +193,7 @@ CHECKS: tuple[Check[Any], ...] = (
     _called("contacts", _moving_on, _contacts),
     _called(
         "a simulated motion",
-        _moving_on,
+        _simulated,
         lambda name, a: simulation_calls(name, a.model, a.subject.simulation),
     ),
     _called("passive torques", _by_any, _passive),

@@ -127,7 +127,11 @@ def _frames(tree: RigidTree) -> list[dict[str, str | None]]:
 def parameters(system: System) -> tuple[Parameter, ...]:
     """Return the run-time parameters: values in the file, units and meanings."""
     if isinstance(system, EnergySystem):
-        return tuple(Parameter(s.name, float(v), "", "of the energies") for s, v in system.parameters.items())
+        told = {system.time: "time"} | dict.fromkeys(system.inputs, "an input, given from outside")
+        return tuple(
+            Parameter(s.name, float(v), "", told.get(s, "of the energies"))
+            for s, v in system.parameters.items()
+        )
     return system.robot.parameters
 
 

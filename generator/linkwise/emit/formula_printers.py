@@ -22,11 +22,18 @@ class FormulaPrinter(Printer):
         return NAMES.get(name, name)
 
     def choice(self, condition: str, then: str, other: str) -> str:
-        """Return a sympy.Piecewise."""
+        """Return a sympy.Piecewise, or the sign that it is."""
+        argument = condition.removeprefix("0.0 < ")
+        if (then, other) == ("1.0", f"Piecewise((-1.0, {argument} < 0.0), (0.0, True))"):
+            return f"sign({argument})"
         return f"Piecewise(({then}, {condition}), ({other}, True))"
 
     def print(self, entry: Entry, operands: tuple[Text, ...]) -> Text:
         """Return the text of one node; equal factors are a square."""
+        if entry[0] == "select" and operands[2][1] == ATOM and operands[2][0].startswith("Piecewise("):
+            text, _ = super().print(entry, operands)
+            inner = f"({operands[2][0]}, True))"
+            return text.replace(inner, operands[2][0].removeprefix("Piecewise(")), ATOM
         if entry[0] != "mul":
             return super().print(entry, operands)
         (a, pa), (b, pb) = operands
@@ -70,20 +77,23 @@ class _Latex:
 
     def _call(self, name: str, arguments: list[ast.expr]) -> str:
         match name, arguments:
-            case "Piecewise", [ast.Tuple(elts=[then, condition]), ast.Tuple(elts=[other, _])]:
-                assert isinstance(condition, ast.Compare)
-                sign = SIGNS[type(condition.ops[0])]
-                holds = f"{self.text(condition.left)} {sign} {self.text(condition.comparators[0])}"
-                return (
-                    rf"\begin{{cases}} {self.text(then)} & \text{{if}}\: {holds} \\ "
-                    rf"{self.text(other)} & \text{{otherwise}} \end{{cases}}"
-                )
+            case "Piecewise", [*pieces, ast.Tuple(elts=[other, _])]:
+                rows = [*map(self._piece, pieces), rf"{self.text(other)} & \text{{otherwise}}"]
+                return r"\begin{cases} " + r" \\ ".join(rows) + r" \end{cases}"
             case "sqrt", [argument]:
                 return rf"\sqrt{{{self.text(argument)}}}"
             case "Abs", [argument]:
                 return rf"\left|{{{self.text(argument)}}}\right|"
         function = rf"\{name}" if name in OWN_IN_LATEX else rf"\operatorname{{{name}}}"
         return rf"{function}{{\left({', '.join(map(self.text, arguments))}\right)}}"
+
+    def _piece(self, piece: ast.expr) -> str:
+        assert isinstance(piece, ast.Tuple)
+        then, condition = piece.elts
+        assert isinstance(condition, ast.Compare)
+        sign = SIGNS[type(condition.ops[0])]
+        holds = f"{self.text(condition.left)} {sign} {self.text(condition.comparators[0])}"
+        return rf"{self.text(then)} & \text{{if}}\: {holds}"
 
     def _bracketed(self, node: ast.AST) -> str:
         text = self.text(node)

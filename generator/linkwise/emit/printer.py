@@ -31,6 +31,9 @@ class Printer:
         """Return the text of a value where a condition is true, and another where not."""
         raise NotImplementedError
 
+    def named(self, text: str, name: str) -> None:
+        """Note the variable that a text becomes."""
+
     def print(self, entry: Entry, operands: tuple[Text, ...]) -> Text:
         """Return the text of one node from its operands' texts; raises ValueError for an unknown kind."""
         match entry[0], operands:
@@ -76,6 +79,11 @@ class PythonPrinter(Printer):
         text = super().comparison(a, sign, b)
         self._compared[text] = b if NUMBER.fullmatch(a) else a
         return text
+
+    def named(self, text: str, name: str) -> None:
+        """Keep what a condition compares that is a variable now."""
+        if text in self._compared:
+            self._compared[name] = self._compared[text]
 
     def choice(self, condition: str, then: str, other: str) -> str:
         """Return a call of `where`.

@@ -98,6 +98,7 @@ class _Writer:
 
     def _assign(self, node: Node) -> None:
         name = self.names.take(self.graph.names.get(node))
+        self.printer.named(self.texts[node][0], name)
         self.assignments.append((name, self.texts[node][0]))
         self.texts[node], self.latest[node] = (name, ATOM), len(self.assignments)
 

@@ -61,6 +61,7 @@ def overlay(robot: Any, joint: int, link: int | None, parts: Sequence[TorqueGrap
     """Overlay graphs; `robot` is the package's robot, on its autograd back end."""
     nodes: dict[str, Any] = {}
     users: dict[str, list[int]] = {}
+    written = robot.structure.shares
     for number, part in enumerate(parts):
         for node in part.nodes:
             nodes.setdefault(node.key, node)
@@ -71,7 +72,7 @@ def overlay(robot: Any, joint: int, link: int | None, parts: Sequence[TorqueGrap
         joint,
         tuple(robot.link_names) if link is None else (robot.link_names[link],),
         link,
-        share_word(robot.structure.share_names),
+        share_word(robot.structure.share_names if link is None or not written else written[link]),
         tuple(parts),
         nodes,
         {key: tuple(numbers) for key, numbers in users.items()},

@@ -1,5 +1,6 @@
 """References from the text of the energies that a manifest gives, whose Lagrangians torch differentiates."""
 
+import copy
 import operator
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -52,8 +53,8 @@ class TextTerms:
             name: torch.tensor(value, dtype=torch.float64)
             for name, value in parameter_values(parameters).items()
         }
-        symbols = dict(zip(parameters, parameter_values(parameters), strict=True))
-        self._time = symbols.get(time, "")
+        self._symbols = dict(zip(parameters, parameter_values(parameters), strict=True))
+        self._time = self._symbols.get(time, "")
         self.now = self._parameters.get(self._time, torch.zeros((), dtype=torch.float64))
 
     @property
@@ -61,6 +62,14 @@ class TextTerms:
         """True if a formula changes at conditions."""
         shares = (part for _, *parts, forces in self.shares for part in (*parts, *forces.values()))
         return any(PIECES & formula.functions() for formula in (self.kinetic, *shares))
+
+    def at(self, time: float, inputs: Mapping[str, float]) -> "TextTerms":
+        """Return the same terms with time and inputs, by name, as they are at an instant."""
+        torch, moved = extra("torch"), copy.copy(self)
+        moved.now = torch.tensor(time, dtype=torch.float64)
+        given = {self._symbols[name]: torch.tensor(v, dtype=torch.float64) for name, v in inputs.items()}
+        moved._parameters = {**self._parameters, **given}
+        return moved
 
     def value(self, formula: TextFormula, q: Any, qd: Any, time: Any) -> Any:
         """Return the value of one of the formulas, without an axis."""
@@ -229,6 +238,23 @@ def _values(terms: Terms, names: Sequence[str], states: States) -> tuple[dict[st
     return values, np.stack([np.stack(kind, 1) for kind in kinds]), np.stack(power, 1)
 
 
+def equations_of_motion(terms: Terms, q: Array, qd: Array) -> tuple[Array, Array, float, float]:
+    """Return M (n, n), the torques (n,) without acceleration, the power beside the joints, and the energy.
+
+    q, qd: (n,), at the time and the inputs that the terms have
+    """
+    torch = extra("torch")
+    at, rate = torch.from_numpy(q), torch.from_numpy(qd)
+    mass, bias, beside, energy = torch.zeros(len(q), len(q), dtype=torch.float64), 0.0 * at, 0.0, 0.0
+    for one in terms:
+        link, now = _Link(one, ()), one.now
+        mass = mass + link.func.jacrev(link.momentum, 1)(at, rate, now)
+        bias = bias + link.torque(at, rate, 0.0 * at)
+        beside += float(link.beside(at, rate))
+        energy += float(link.energy(at, rate, now))
+    return mass.numpy(), bias.numpy(), beside, energy
+
+
 class _Link:
     """Quantities of one link in the order of NAMES, then K, P, L and power, for one sample.
 
@@ -288,6 +314,11 @@ class _Link:
 
     def energy(self, q: Any, qd: Any, time: Any) -> Any:
         return self.stored_kinetic(q, qd, time) + self.potential(q, time)
+
+    def beside(self, q: Any, qd: Any) -> Any:
+        """Return R = dE/dt - tau . qd, what time itself changes, and dissipation, forces and motions give."""
+        lost = sum((self.lost(share, q, qd) for share in self.terms.shares), 0.0 * q)
+        return self.func.grad(self.energy, 2)(q, qd, self.terms.now) - (lost * qd).sum()
 
     def momentum(self, q: Any, qd: Any, time: Any) -> Any:
         return self.func.grad(self.kinetic, 1)(q, qd, time)

@@ -93,13 +93,16 @@ class LatexReader:
         raise self._lost()
 
     def _cases(self) -> Any:
-        """Return one of two values, which stand with their conditions after \\begin{cases}."""
-        then = self._closed(self._closed(self._sum(), "&"), r"\text{if}\:")
+        """Return the value of the first row whose condition holds, or of the last, after \\begin{cases}."""
+        then = self._closed(self._sum(), "&")
+        if self._taken(r"\text{otherwise}"):
+            return self._closed(then, r"\end{cases}")
+        self._closed(None, r"\text{if}\:")
         left = self._sum()
         strict = self._taken("<")
         right = self._sum() if strict else self._closed(None, r"\leq") or self._sum()
         self._closed(None, r"\\")
-        other = self._closed(self._closed(self._sum(), r"& \text{otherwise}"), r"\end{cases}")
+        other = self._cases()
         holds = left < right if strict else left <= right
         return self._functions["where"](holds, then, other)
 

@@ -104,6 +104,10 @@ def sorted_terms(
         stored, moving = _potential(named, expr, motion)
         shares.setdefault(named, {}).update(potential=stored, motion=moving)
     for named, expr in terms.dissipation.items():
+        if expr != 0 and not expr.has(*motion.velocities):
+            raise LinkwiseError(
+                f"its dissipation{_called(named, DISSIPATION)} depends on no velocity: its force would be 0"
+            )
         shares.setdefault(named, {})["dissipation"] = expr
     for named, by_joint in terms.forces.items():
         shares.setdefault(named, {})["forces"] = {i: q for i, q in sorted(by_joint.items()) if q != 0}
@@ -182,6 +186,8 @@ def _named(what: str, given: object, usual: str) -> dict[str, sp.Expr]:
 def _check_name(name: object) -> None:
     if not isinstance(name, str) or not name.strip() or not name.isprintable():
         raise LinkwiseError(f"a share is called {short(repr(name))}; give it a name in quotes")
+    if name != name.strip():
+        raise LinkwiseError(f"a share is called {short(repr(name))}; leave out the spaces around its name")
     if name in RESERVED:
         raise LinkwiseError(f"a share is called {name!r}, as are those of motion; choose another name")
 
@@ -195,7 +201,7 @@ def _expression(what: str, given: object) -> sp.Expr:
         expression = sp.sympify(given, strict=True)
     except sp.SympifyError:
         expression = None
-    if not isinstance(expression, sp.Expr):
+    if not isinstance(expression, sp.Expr) or expression.is_Matrix:
         raise LinkwiseError(f"its {what} is {short(repr(given))}; give a SymPy expression, 0 for none")
     return expression
 

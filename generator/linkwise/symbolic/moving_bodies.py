@@ -1,11 +1,14 @@
 """Particles and rigid bodies by where they are: their velocities, and so their energies, follow."""
 
+import random
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
+import numpy as np
 import sympy as sp
 from linkwise_runtime.structure import GRAVITY
+from sympy.core.function import AppliedUndef
 from sympy.simplify.fu import TR5, TR6
 
 from linkwise.errors import LinkwiseError
@@ -14,7 +17,11 @@ from linkwise.symbolic.system import POTENTIAL, Forces, LinkEnergy, Named
 
 Rate: TypeAlias = Callable[[sp.Expr], sp.Expr]
 """Function that returns the time derivative of an expression in coordinates and time."""
+Values: TypeAlias = Mapping[sp.Symbol, float]
+"""Values of parameters."""
 ZERO = sp.S.Zero
+ROUNDED = 1e-9
+"""Relative error that numbers of a rotation or an inertia may have."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +43,9 @@ class Particle:
     dissipation: sp.Expr | Named = ZERO
     forces: Forces = field(default_factory=dict)
 
-    def energies(self, rate: Rate) -> LinkEnergy:
-        """Return the energies; raise LinkwiseError for what is no place or no field."""
-        mass, place = _expression("mass", self.mass), _vector("position", self.position, (2, 3))
+    def energies(self, rate: Rate, values: Values) -> LinkEnergy:
+        """Return the energies; raise LinkwiseError for what is no mass, place or field."""
+        mass, place = _mass(self.mass, values), _vector("position", self.position, (2, 3))
         return _link(self, mass * _square(rate(x) for x in place) / 2, mass, place)
 
 
@@ -64,10 +71,12 @@ class RigidBody:
     dissipation: sp.Expr | Named = ZERO
     forces: Forces = field(default_factory=dict)
 
-    def energies(self, rate: Rate) -> LinkEnergy:
-        """Return the energies; raise LinkwiseError for what is no place, rotation, inertia or field."""
-        mass, place = _expression("mass", self.mass), _vector("position", self.position, (3,))
+    def energies(self, rate: Rate, values: Values) -> LinkEnergy:
+        """Return the energies; raise LinkwiseError for what is no mass, place, rotation, inertia or field."""
+        mass, place = _mass(self.mass, values), _vector("position", self.position, (3,))
         turned, inertia = _matrix("rotation", self.rotation), _inertia(self.inertia)
+        _check_rotation(turned, values)
+        _check_inertia(inertia, values)
         spin = sp.simplify(turned.T * turned.applyfunc(rate))
         omega = sp.Matrix([spin[2, 1], spin[0, 2], spin[1, 0]])
         moving = mass * _square(rate(x) for x in place) / 2
@@ -87,7 +96,7 @@ def _square(velocity: Iterable[sp.Expr]) -> sp.Expr:
 
 def _link(body: Particle | RigidBody, kinetic: sp.Expr, mass: sp.Expr, place: sp.Matrix) -> LinkEnergy:
     potential = body.potential if isinstance(body.potential, Mapping) else {POTENTIAL: body.potential}
-    if len(body.gravity):
+    if not isinstance(body.gravity, Sequence) or len(body.gravity):
         field_ = _vector("gravity", body.gravity, (len(place),))
         if GRAVITY in potential:
             raise LinkwiseError(
@@ -99,7 +108,7 @@ def _link(body: Particle | RigidBody, kinetic: sp.Expr, mass: sp.Expr, place: sp
 
 def _vector(what: str, given: Any, lengths: Sequence[int]) -> sp.Matrix:
     try:
-        vector = sp.Matrix(list(given))
+        vector = None if isinstance(given, str) else sp.Matrix([sp.sympify(x, strict=True) for x in given])
     except (TypeError, ValueError, sp.SympifyError):
         vector = None
     if vector is None or vector.shape not in [(length, 1) for length in lengths]:
@@ -119,10 +128,53 @@ def _matrix(what: str, given: Any) -> sp.Matrix:
 
 
 def _inertia(given: Any) -> sp.Matrix:
+    given = given.tolist() if hasattr(given, "tolist") and not isinstance(given, sp.MatrixBase) else given
     rows = list(given) if isinstance(given, Sequence) else given
     if isinstance(rows, list) and len(rows) == 3 and not any(isinstance(row, Sequence) for row in rows):
         return sp.diag(*rows)
     return _matrix("inertia", given)
+
+
+def _mass(given: object, values: Values) -> sp.Expr:
+    mass = _expression("mass", given)
+    value = sp.sympify(mass.xreplace(dict(values)))
+    if value.is_number and value.is_negative:
+        raise LinkwiseError(f"its mass is {mass}, and no body has a negative one")
+    return mass
+
+
+def _at_random(matrix: sp.Matrix, values: Values) -> sp.Matrix:
+    """Return a matrix at a position drawn at random, with these values of parameters."""
+    chosen = random.Random(0)
+    free = sorted(matrix.free_symbols - set(values), key=str) + sorted(matrix.atoms(AppliedUndef), key=str)
+    return matrix.subs({**dict(values), **{one: chosen.uniform(0.1, 1.0) for one in free}}).evalf()
+
+
+def _check_rotation(turned: sp.Matrix, values: Values) -> None:
+    found = _at_random(turned, values)
+    apart = found.T * found - sp.eye(3)
+    if not all(number.is_number for number in found):
+        return
+    if max(abs(number) for number in apart) > ROUNDED:
+        raise LinkwiseError("its rotation is none: its columns are not of length 1 and at right angles")
+    if found.det() < 0:
+        raise LinkwiseError("its rotation is a reflection: its determinant is -1")
+
+
+def _check_inertia(inertia: sp.Matrix, values: Values) -> None:
+    found = _at_random(inertia, values)
+    if not all(number.is_number and number.is_real for number in found):
+        return
+    rows = np.array(found.tolist(), dtype=float)
+    size = ROUNDED * np.abs(rows).max()
+    if np.abs(rows - rows.T).max() > size:
+        raise LinkwiseError("its inertia is not symmetric; give I_xy twice, and so on")
+    least, middle, most = np.linalg.eigvalsh(rows)
+    if least < -size or most > least + middle + size:
+        raise LinkwiseError(
+            f"its principal inertias are {least:.3g}, {middle:.3g} and {most:.3g}, which no rigid body has: "
+            "none is negative, or more than the two others together"
+        )
 
 
 def _expression(what: str, given: object) -> sp.Expr:

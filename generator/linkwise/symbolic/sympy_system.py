@@ -4,7 +4,7 @@ Generalised speeds become velocities by the system's kinematic differential equa
 generalised forces Q_i = F · ∂v/∂q̇_i + T · ∂ω/∂q̇_i.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import sympy as sp
@@ -27,7 +27,7 @@ def from_sympy(
     system: System,
     parameters: Mapping[sp.Symbol, float] | None = None,
     units: Mapping[sp.Expr, str] | None = None,
-    inputs: Iterable[sp.Expr] = (),
+    inputs: Sequence[sp.Expr] = (),
     name: str = "system",
     symbolic: bool = False,
 ) -> EnergySystem:
@@ -47,14 +47,14 @@ def from_sympy(
             f"from_sympy takes a sympy.physics.mechanics.System, and got {short(repr(system))}"
         )
     _refuse_constraints(system)
-    reader = _Reader(system)
+    reader = _SystemReader(system)
     links = [link for link in map(reader.link, system.bodies) if _moves(link)]
     if (rest := reader.rest()) is not None:
         links.append(rest)
     return energy_system(name, _units(system, units or {}), links, parameters, symbolic, inputs=inputs)
 
 
-class _Reader:
+class _SystemReader:
     """Bodies and loads of a system, in coordinates and velocities."""
 
     def __init__(self, system: System) -> None:

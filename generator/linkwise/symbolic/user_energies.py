@@ -1,7 +1,7 @@
 """Systems whose link energies a user writes in SymPy."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from sys import float_info
 from typing import Any
 
@@ -19,12 +19,12 @@ from linkwise.symbolic.written_motion import WrittenMotion
 
 def energy_system(
     name: str,
-    coordinates: Iterable[Coordinate] | Mapping[sp.Expr, str],
-    links: Iterable[LinkEnergy | Particle | RigidBody],
+    coordinates: Sequence[Coordinate] | Mapping[sp.Expr, str],
+    links: Sequence[LinkEnergy | Particle | RigidBody],
     parameters: Mapping[sp.Symbol, float] | None = None,
     symbolic: bool = False,
     time: sp.Symbol | None = None,
-    inputs: Iterable[sp.Expr] = (),
+    inputs: Sequence[sp.Expr] = (),
 ) -> EnergySystem:
     """Return the system of links that a user wrote, checked: every symbol known, every expression usable.
 
@@ -38,19 +38,26 @@ def energy_system(
     Time and inputs are run-time parameters, with the value 0 unless another is given. Raises LinkwiseError
     naming the link, and for more coordinates than can be generated.
     """
-    motion = WrittenMotion(_listed(coordinates), time, _listed(inputs))
+    motion = WrittenMotion(coordinates, time, inputs)
+    if not isinstance(links, list | tuple) or not all(isinstance(k, (LinkEnergy, *BODIES)) for k in links):
+        kinds = " and ".join(f"linkwise.{kind.__name__}" for kind in BODIES)
+        raise LinkwiseError(f"`links` is {short(repr(links))}; give a list of linkwise.LinkEnergy, {kinds}")
     links = tuple(links)
     check_joints(len(motion.coordinates), "leave some out")
     _check_names(name, motion.coordinates, links)
+    motion.check_apart()
     values = _values(parameters or {}, motion)
     checked, used = [], set[sp.Symbol]()
     for link in links:
         with within(f"link {link.name!r}"):
-            written = link.energies(motion.rate) if isinstance(link, BODIES) else link
+            written = link.energies(motion.rate, values) if isinstance(link, BODIES) else link
             terms = written_terms(written, motion)
             found = _checked(link.name, terms, motion, values, symbolic)
             used |= symbols_of(terms.all())
             checked.append(found)
+    for symbol in motion.inputs:
+        if symbol not in used:
+            raise LinkwiseError(f"the input {symbol} is in no force and no dissipation; leave it out")
     kept = {symbol: value for symbol, value in values.items() if symbolic and symbol in used}
     varying = {symbol: value for symbol, value in motion.varying.items() if symbol in used}
     request = {"parameters": "symbolic" if symbolic else "numeric"}
@@ -63,10 +70,6 @@ def energy_system(
         time=motion.time if motion.time in varying else None,
         inputs=tuple(symbol for symbol in motion.inputs if symbol in varying),
     )
-
-
-def _listed(given: Iterable[Any]) -> Any:
-    return given if isinstance(given, Mapping) else list(given)
 
 
 def _check_names(name: str, coordinates: tuple[Coordinate, ...], links: tuple[Any, ...]) -> None:
@@ -95,6 +98,12 @@ def _values(parameters: Mapping[sp.Symbol, float], motion: WrittenMotion) -> dic
     """Return the parameters with float values; one symbol a name, as generated code knows names only."""
     if not isinstance(parameters, Mapping) or not all(isinstance(s, sp.Symbol) for s in parameters):
         raise LinkwiseError("`parameters` must be a dictionary of SymPy symbols and their values")
+    for symbol in parameters:
+        if symbol in motion.varying:
+            raise LinkwiseError(
+                f"{symbol} is time or an input, and stands among `parameters` too; leave it out there: its "
+                "value is given at run time"
+            )
     for name, count in Counter(symbol.name for symbol in (*parameters, *motion.varying)).items():
         if count > 1:
             raise LinkwiseError(
@@ -134,6 +143,13 @@ def _checked(
     numbers = {symbol: sp.Float(value, 17) for symbol, value in values.items()}
     plain = terms.mapped(lambda expr: _whole(expr.xreplace(numbers)))
     _check_real(*(expr for _, expr in (*terms.all(), *plain.all())))
+    none_given = dict.fromkeys(motion.varying, sp.S.Zero)
+    for what, expr in plain.all():
+        if none_given and expr.xreplace(none_given).has(sp.nan, sp.oo, -sp.oo, sp.zoo):
+            raise LinkwiseError(
+                f"its {what} is no number where time and inputs are 0, as they are unless others are given; "
+                "write it such that it is one there"
+            )
     if symbolic:
         _check_exponents((power for _, expr in terms.all() for power in expr.atoms(sp.Pow)), set(values))
     chosen = terms if symbolic else plain

@@ -29,6 +29,7 @@ class WrittenMotion:
             time, [*functions, *(one for one in _items(inputs) if isinstance(one, AppliedUndef))]
         )
         self.coordinates = tuple(self._coordinates(coordinates))
+        self._input_functions: set[sp.Expr] = set()
         self.inputs = tuple(self._input(one) for one in _items(inputs))
 
     @property
@@ -69,6 +70,13 @@ class WrittenMotion:
     def rate(self, expr: sp.Expr) -> sp.Expr:
         """Return the time derivative of an expression in coordinates and time."""
         found = self.plain(sp.sympify(expr))
+        for kind, symbols in (("the input", self.inputs), ("the velocity", self.velocities)):
+            for symbol in symbols:
+                if found.has(symbol):
+                    raise LinkwiseError(
+                        f"where it is depends on {kind} {symbol}, whose rate is not known; use coordinates, "
+                        "time and parameters"
+                    )
         own = sum((sp.diff(found, c.q) * c.qd for c in self.coordinates), sp.S.Zero)
         return own + (sp.diff(found, self.time) if self.time is not None else 0)
 
@@ -82,6 +90,19 @@ class WrittenMotion:
         raise LinkwiseError(
             f"its forces name {short(repr(given))}, which is no coordinate; choose among {names}"
         )
+
+    def check_apart(self) -> None:
+        """Raise LinkwiseError for a symbol that is given as two of coordinate, velocity, time and input."""
+        known = dict.fromkeys((*self.positions, *self.velocities), "a coordinate or its velocity")
+        if self.time is not None and self.time in known:
+            raise LinkwiseError(
+                f"`time` is {self.time}, which is {known[self.time]} too; give its own symbol"
+            )
+        known |= {self.time: "time"} if self.time is not None else {}
+        for symbol in self.inputs:
+            if symbol in known:
+                raise LinkwiseError(f"the input {symbol} is {known[symbol]} too; give each its own symbol")
+            known[symbol] = "another input"
 
     def _coordinates(self, given: Any) -> Iterable[Coordinate]:
         units = dict(given) if isinstance(given, Mapping) else {}
@@ -110,7 +131,10 @@ class WrittenMotion:
     def _input(self, given: object) -> sp.Symbol:
         if isinstance(given, AppliedUndef):
             symbol = sp.Symbol(given.func.__name__, real=True)
+            if given in self._of_function:
+                raise LinkwiseError(f"the input {given} is a coordinate too; give each its own function")
             self._of_function[given] = symbol
+            self._input_functions.add(given)
             return symbol
         if not isinstance(given, sp.Symbol):
             raise LinkwiseError(f"the input {short(repr(given))} is no symbol and no function of time")
@@ -119,6 +143,8 @@ class WrittenMotion:
     def _unknown(self, part: sp.Expr) -> str:
         if part in self._accelerations:
             return f"{part} is an acceleration, which energies and forces do not depend on"
+        if isinstance(part, sp.Derivative) and part.expr in self._input_functions:
+            return f"{part} is the rate of an input, which is not known; make it an input of its own"
         return (
             f"{part} is neither a coordinate or its velocity nor among `inputs`; add it to `coordinates`, "
             "or to `inputs` if it is given from outside"

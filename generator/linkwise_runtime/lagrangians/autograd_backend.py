@@ -51,7 +51,7 @@ class AutogradBackend(TorchBackend):
             while at is not None and id(at) not in sources:
                 sources[id(at)] = cast(torch.nn.Module, at)
                 at = at.before
-        return numbers_of(tuple(sources.values()))
+        return *self.parameters.values(), *numbers_of(tuple(sources.values()))
 
     def seen_by(self, q: Tensor) -> Parameters:
         """Return the parameters and constants as a call computes with them."""

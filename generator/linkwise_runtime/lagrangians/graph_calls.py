@@ -55,7 +55,7 @@ class TorqueGraph:
     coordinate: str | None
     """Joint k whose motion the part is due to; None for all."""
     order: int | None
-    """2 acceleration, 1 velocity; 0 position, without a coordinate gravity; None for all orders."""
+    """2 acceleration, 1 velocity; 0 position, without a coordinate gravity or named shares; None for all."""
     leaves: tuple[Leaf, ...]
     """Motions and parameters that are connected with the torque."""
     operations: tuple[Operation, ...]
@@ -68,7 +68,8 @@ class TorqueGraph:
     def __repr__(self) -> str:
         """Return which torque or part of it this is, and its size; the operations are in `operations`."""
         words = {None: "motion", 0: "position", 1: "velocity", 2: "acceleration"}
-        every = {None: "", 0: ", gravity", 1: ", all velocities", 2: ", all accelerations"}
+        still = "named shares" if self.backend.structure.shares else "gravity"
+        every = {None: "", 0: f", {still}", 1: ", all velocities", 2: ", all accelerations"}
         part = every[self.order] if self.coordinate is None else f", {words[self.order]} of {self.coordinate}"
         through = ", ".join(self.links) if len(self.links) <= 3 else f"{len(self.links)} links"
         sizes = f"{len(self.operations)} operations, {len(self.leaves)} leaves"

@@ -234,11 +234,16 @@ class Varying:
         self.engine, self._inputs = engine.separate(), inputs
 
     def move(self, t: float, q: Numbers, qd: Numbers) -> None:
-        """Set time and inputs to what they are at an instant; raises as `weights` does."""
+        """Set time and inputs to what they are at an instant.
+
+        Raises ValueError for an input that is no finite number, and as `weights` does.
+        """
         structure = self.engine.structure
         values: dict[str, object] = {structure.time: t} if structure.time else {}
         for name, given in self._inputs.items():
             found = given(t, q, qd) if callable(given) else given
+            if isinstance(found, float | np.ndarray) and not np.isfinite(found).all():
+                raise ValueError(f"input {name!r} is not finite at t = {t:g}")
             values[name] = self.engine.weights(name, found, q)
         self.engine.set_parameters(values)
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from itertools import product
 
 from linkwise.emit.c.header import align_columns
+from linkwise.escape import c_comment
 from linkwise.package.share_word import share_word
 from linkwise.symbolic.system import EnergySystem, System
 
@@ -61,5 +62,5 @@ def _velocity(nonquadratic: bool) -> str:
 
 
 def potential(system: System) -> str:
-    """Return the word for g."""
-    return share_word(system.share_names)
+    """Return the word for g, for a comment."""
+    return c_comment(share_word(system.share_names))
