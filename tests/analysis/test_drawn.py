@@ -188,7 +188,7 @@ def test_the_time_line_stands_at_the_instant(page: Any, result: Analysis) -> Non
         ("everything", "Gravity and loads are in."),
         ("movement", "Left out: gravity, load =push."),
         ("tau_load", "Left out: gravity, and other causes than those chosen."),
-        ("tau_gravity", "Left out: load =push, and other causes than those chosen."),
+        ("named", "Left out: load =push, and other causes than those chosen."),
     ],
 )
 def test_captions_say_which_causes_are_left_out(page: Any, order: str, said: str) -> None:
