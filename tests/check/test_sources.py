@@ -16,7 +16,8 @@ from linkwise.check.frame_checks import frame_calls, frame_reference
 from linkwise.check.parametric_tree import check_numbers, tree_with
 from linkwise.expression.expression_graph import FUNCTIONS
 from linkwise.oracle.energies import TextTerms, energy_reference, states_of_energies
-from linkwise.oracle.formula_text import NAMES, NUMPY, LatexReader, TextFormula, Unreadable, torch_functions
+from linkwise.oracle.formula_text import NAMES, NUMPY, TextFormula, Unreadable, torch_functions
+from linkwise.oracle.latex_reader import LatexReader
 from linkwise.oracle.magnitudes import Magnitudes
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import (

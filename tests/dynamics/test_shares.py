@@ -189,6 +189,8 @@ def test_motions_are_those_of_scipy_and_their_energy_is_accounted_for(backend: s
     assert robot.parameters["t"] == 0.0  # the robot itself stays where it was
     with pytest.raises(ValueError, match="inputs names 'G', which crane does not have; its inputs are F"):
         robot.simulate(start[:2], start[2:], time, inputs={"G": 1.0})
+    with pytest.raises(ValueError, match="input 'F' is not finite at t = 0"):
+        robot.simulate(start[:2], start[2:], time, inputs={"F": lambda *_: np.nan}, method="RK45")
 
 
 @pytest.mark.parametrize("backend", ["torch", "autograd", pytest.param("native", marks=needs_compiler)])
@@ -267,6 +269,10 @@ BAD = {
         {"forces": 3},
         "its forces are 3; give a dictionary of forces by coordinate",
     ),
+    "forces by name and by coordinate": (
+        {"forces": {"a": {"x": 1}, "x": 2}},
+        "its forces stand partly by name, partly by coordinate; give names to all",
+    ),
     "a name that motion has": ({"dissipation": {"velocity": FLAT.qd**2}}, "a share is called 'velocity'"),
     "a name that is none": ({"potential": {3: FLAT.q}}, "a share is called 3; give it a name in quotes"),
     "a jump of the dissipation": ({"dissipation": sp.sign(FLAT.qd)}, "its dissipation jumps where"),
@@ -295,6 +301,11 @@ def test_what_has_no_force_is_refused_by_name(case: str) -> None:
     inputs = [LOOSE] if "input" in case else []
     with pytest.raises(LinkwiseError, match=f"^(while deriving robot 'it': )?link 'bad': {message}"):
         generate(energy_system("it", [FLAT], links, inputs=inputs), ["numpy"])
+
+
+def test_a_force_with_an_input_may_be_called_energy() -> None:
+    link = LinkEnergy("motor", FLAT.qd**2, forces={"energy": {"x": LOOSE}})
+    assert energy_system("it", [FLAT], [link], inputs=[LOOSE]).inputs == (LOOSE,)
 
 
 def test_a_weight_that_is_lifted_off_the_floor_does_not_jump() -> None:

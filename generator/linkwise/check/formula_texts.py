@@ -12,7 +12,8 @@ from linkwise.arrays import Array
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.subject import Subject
 from linkwise.emit.formula_page import Line, formula_page
-from linkwise.oracle.formula_text import NUMPY, LatexReader, TextFormula, Unreadable, parameter_values
+from linkwise.oracle.formula_text import NUMPY, TextFormula, Unreadable, parameter_values
+from linkwise.oracle.latex_reader import LatexReader
 from linkwise.oracle.reference import Reference
 from linkwise.package.formula_symbols import MOTION, motion_symbol, parameter_symbols
 from linkwise.package.manifest import Manifest

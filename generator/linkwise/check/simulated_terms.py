@@ -11,7 +11,8 @@ import numpy as np
 from linkwise.arrays import Array
 from linkwise.check.simulation_checks import SINGULAR, STEP, STEPS, TRIED, SimulatedMotion
 from linkwise.check.sum_checks import regular
-from linkwise.oracle.energies import NOISE, Terms, equations_of_motion
+from linkwise.oracle.energies import Terms, equations_of_motion
+from linkwise.oracle.noisy_numbers import NOISE
 from linkwise.oracle.reference import Reference
 
 UNDEFINED = "it moves to where something is no number"

@@ -72,7 +72,7 @@ def _written(system: EnergySystem, link: int, view: dict[str, object], uneven: b
         "degree": terms.degree if terms.degree > 2 else None,
         "imposed": IMPOSED_MOTION if imposed else None,
         "uneven": uneven or None,
-        "time": system.time.name if system.time in terms.symbols() else None,  # type: ignore[union-attr]
+        "time": system.time.name if system.time is not None and system.time in terms.symbols() else None,
     }
     kinetic, methods = _body(system, terms.kinetic), tuple(_methods(system, terms))
     lines = [*kinetic, *(line for method in methods for line in method.lines)]

@@ -1,9 +1,7 @@
 """References from the text of the energies that a manifest gives, whose Lagrangians torch differentiates."""
 
 import copy
-import operator
-import random
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,14 +10,13 @@ from linkwise_runtime.structure import IMPOSED_MOTION
 from linkwise.arrays import Array
 from linkwise.extras import extra
 from linkwise.oracle.formula_text import TextFormula, parameter_values, torch_functions
+from linkwise.oracle.noisy_numbers import NOISE, NoisyNumber, errors, noisy, plain
 from linkwise.oracle.reference import TOLERANCE, Reference, link_sizes
 from linkwise.oracle.states import Found, States, states_where
 from linkwise.package.entries import EnergyEntry, JointEntry
 
 PIECES = {"Piecewise", "Max", "Min", "Abs", "sign"}
 """Functions in pieces."""
-NOISE = 1e-9
-"""Relative error of each operation of a noisy Lagrangian: what it changes, rounding changes too."""
 
 
 class TextTerms:
@@ -79,82 +76,10 @@ class TextTerms:
         for kind, motion in (("q", q), ("qd", qd)):
             names |= {f"{kind}_{k}": motion[k - 1] for k in range(1, len(motion) + 1)}
         if self._noise is not None:
-            errors = _errors(self._noise)
-            names = {name: _Noisy(value, errors) for name, value in names.items()}
-            functions = {name: _noisy(function, errors) for name, function in functions.items()}
-        return q.new_zeros(()) + _plain(formula.value(names, functions))  # a constant is a tensor, too
-
-
-def _errors(seed: int) -> Iterator[float]:
-    chosen = random.Random(seed)
-    while True:
-        yield 1.0 + NOISE * chosen.uniform(-1.0, 1.0)
-
-
-class _Noisy:
-    """A tensor whose operations each have a small error."""
-
-    def __init__(self, value: Any, errors: Iterator[float]) -> None:
-        self.value, self._errors = value, errors
-
-    def _made(self, operation: Callable[[Any, Any], Any], one: Any, other: Any) -> "_Noisy":
-        return _Noisy(operation(_plain(one), _plain(other)) * next(self._errors), self._errors)
-
-    def __add__(self, other: Any) -> "_Noisy":
-        return self._made(operator.add, self, other)
-
-    def __radd__(self, other: Any) -> "_Noisy":
-        return self._made(operator.add, other, self)
-
-    def __sub__(self, other: Any) -> "_Noisy":
-        return self._made(operator.sub, self, other)
-
-    def __rsub__(self, other: Any) -> "_Noisy":
-        return self._made(operator.sub, other, self)
-
-    def __mul__(self, other: Any) -> "_Noisy":
-        return self._made(operator.mul, self, other)
-
-    def __rmul__(self, other: Any) -> "_Noisy":
-        return self._made(operator.mul, other, self)
-
-    def __truediv__(self, other: Any) -> "_Noisy":
-        return self._made(operator.truediv, self, other)
-
-    def __rtruediv__(self, other: Any) -> "_Noisy":
-        return self._made(operator.truediv, other, self)
-
-    def __pow__(self, other: Any) -> "_Noisy":
-        return self._made(operator.pow, self, other)
-
-    def __rpow__(self, other: Any) -> "_Noisy":
-        return self._made(operator.pow, other, self)
-
-    def __neg__(self) -> "_Noisy":
-        return _Noisy(-self.value, self._errors)
-
-    def __pos__(self) -> "_Noisy":
-        return self
-
-    def __lt__(self, other: Any) -> Any:
-        return self.value < _plain(other)
-
-    def __le__(self, other: Any) -> Any:
-        return self.value <= _plain(other)
-
-    def __gt__(self, other: Any) -> Any:
-        return self.value > _plain(other)
-
-    def __ge__(self, other: Any) -> Any:
-        return self.value >= _plain(other)
-
-
-def _noisy(function: Callable[..., Any], errors: Iterator[float]) -> Callable[..., Any]:
-    return lambda *given: _Noisy(function(*map(_plain, given)) * next(errors), errors)
-
-
-def _plain(value: Any) -> Any:
-    return value.value if isinstance(value, _Noisy) else value
+            chosen = errors(self._noise)
+            names = {name: NoisyNumber(value, chosen) for name, value in names.items()}
+            functions = {name: noisy(function, chosen) for name, function in functions.items()}
+        return q.new_zeros(()) + plain(formula.value(names, functions))  # a constant is a tensor, too
 
 
 NAMES = ("tau", "c2", "c1", "g", "c0", "h1", "shares")
@@ -168,8 +93,10 @@ GREATEST = 1e75
 inverse."""
 
 
-def energy_reference(exact: Terms, noisy: Sequence[Terms], names: Sequence[str], states: States) -> Reference:
-    """Return the quantities of links by their terms; `noisy` are the same but for errors in each operation.
+def energy_reference(
+    exact: Terms, altered: Sequence[Terms], names: Sequence[str], states: States
+) -> Reference:
+    """Return the quantities of links by their terms; `altered` are the same but for errors in each operation.
 
     What these errors, of NOISE, change, rounding of that size changes too: it measures the numbers that each
     value is summed from, whatever cancels among them.
@@ -180,7 +107,7 @@ def energy_reference(exact: Terms, noisy: Sequence[Terms], names: Sequence[str],
     values, energies, power = _values(exact, names, states)
     still, _, _ = _values(exact, names, resting)
     scales, sizes = link_sizes(values, states), np.abs(energies)
-    for terms in noisy:
+    for terms in altered:
         changed, other, _ = _values(terms, names, states)
         scales = {
             what: np.maximum(scale, np.abs(changed[what] - values[what]) / NOISE)

@@ -5,7 +5,7 @@ are there where a motion is imposed from outside, as on a turning table: the kin
 and T₁ + T₀ belong to the share `imposed motion`.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import sympy as sp
@@ -43,7 +43,7 @@ class GivenTerms:
         for name, by_joint in self.forces.items():
             yield from ((f"force{_called(name, FORCE)}", expr) for expr in by_joint.values())
 
-    def mapped(self, function) -> "GivenTerms":  # type: ignore[no-untyped-def]
+    def mapped(self, function: Callable[[sp.Expr], sp.Expr]) -> "GivenTerms":
         """Return the terms with every expression replaced."""
         return GivenTerms(
             function(self.kinetic),
@@ -60,20 +60,19 @@ def written_terms(link: LinkEnergy, motion: WrittenMotion) -> GivenTerms:
         raise LinkwiseError(
             f"its forces are {short(repr(forces))}; give a dictionary of forces by coordinate"
         )
-    by_name = forces if any(isinstance(value, Mapping) for value in forces.values()) else {FORCE: forces}
+    named = [isinstance(value, Mapping) for value in forces.values()]
+    if any(named) and not all(named):
+        raise LinkwiseError("its forces stand partly by name, partly by coordinate; give names to all")
+    by_name = forces if any(named) else {FORCE: forces}
     terms = GivenTerms(
-        _expression("kinetic energy", link.kinetic),
+        expression_of("kinetic energy", link.kinetic),
         _named("potential energy", link.potential, POTENTIAL),
         _named("dissipation", link.dissipation, DISSIPATION),
     )
     for name, given in by_name.items():
         _check_name(name)
-        if not isinstance(given, Mapping):
-            raise LinkwiseError(
-                f"its force {name!r} is {short(repr(given))}; give a dictionary by coordinate"
-            )
         by_joint = {
-            motion.index(at): _expression(f"force{_called(name, FORCE)}", q) for at, q in given.items()
+            motion.index(at): expression_of(f"force{_called(name, FORCE)}", q) for at, q in given.items()
         }
         if len(by_joint) < len(given):
             raise LinkwiseError(f"its force{_called(name, FORCE)} names a coordinate twice")
@@ -99,24 +98,26 @@ def sorted_terms(
                 "pieces, or give the force itself among `forces`"
             )
     kinetic, degree, imposed = _kinetic(terms.kinetic, motion)
-    shares: dict[str, dict[str, object]] = {}
-    for named, expr in terms.potential.items():
-        stored, moving = _potential(named, expr, motion)
-        shares.setdefault(named, {}).update(potential=stored, motion=moving)
+    potential = {named: _potential(named, expr, motion) for named, expr in terms.potential.items()}
     for named, expr in terms.dissipation.items():
         if expr != 0 and not expr.has(*motion.velocities):
             raise LinkwiseError(
                 f"its dissipation{_called(named, DISSIPATION)} depends on no velocity: its force would be 0"
             )
-        shares.setdefault(named, {})["dissipation"] = expr
-    for named, by_joint in terms.forces.items():
-        shares.setdefault(named, {})["forces"] = {i: q for i, q in sorted(by_joint.items()) if q != 0}
+    nothing = sp.S.Zero
+    shares = [
+        Share(
+            named,
+            *potential.get(named, (nothing, nothing)),
+            terms.dissipation.get(named, nothing),
+            {i: q for i, q in sorted(terms.forces.get(named, {}).items()) if q != 0},
+        )
+        for named in dict.fromkeys((*potential, *terms.dissipation, *terms.forces))
+    ]
+    found = [share for share in shares if any(share.parts())]
     if imposed != 0 or (motion.time is not None and kinetic.has(motion.time)):
-        shares[IMPOSED_MOTION] = {"motion": imposed}
-    found = (Share(named, **parts) for named, parts in shares.items())  # type: ignore[arg-type]
-    return LinkTerms(
-        name, kinetic, degree, tuple(s for s in found if s.name == IMPOSED_MOTION or any(s.parts()))
-    )
+        found.append(Share(IMPOSED_MOTION, motion=imposed))
+    return LinkTerms(name, kinetic, degree, tuple(found))
 
 
 def _kinetic(written: sp.Expr, motion: WrittenMotion) -> tuple[sp.Expr, int, sp.Expr]:
@@ -167,7 +168,7 @@ def _check_inputs(terms: GivenTerms, motion: WrittenMotion) -> None:
     """Raise LinkwiseError for an energy with an input, whose rate nobody gives."""
     for what, expr in terms.all():
         inputs = [symbol for symbol in motion.inputs if expr.has(symbol)]
-        if inputs and "energy" in what:
+        if inputs and what.startswith(("kinetic", "potential")):
             raise LinkwiseError(
                 f"its {what} has the input {inputs[0]}, whose change would change the energy; give the force "
                 "that it exerts among `forces`, or write it as a function of time"
@@ -177,10 +178,10 @@ def _check_inputs(terms: GivenTerms, motion: WrittenMotion) -> None:
 def _named(what: str, given: object, usual: str) -> dict[str, sp.Expr]:
     """Return expressions by name; one alone has the usual name."""
     if not isinstance(given, Mapping):
-        return {usual: _expression(what, given)}
+        return {usual: expression_of(what, given)}
     for name in given:
         _check_name(name)
-    return {name: _expression(f"{what}{_called(name, usual)}", expr) for name, expr in given.items()}
+    return {name: expression_of(f"{what}{_called(name, usual)}", expr) for name, expr in given.items()}
 
 
 def _check_name(name: object) -> None:
@@ -196,7 +197,8 @@ def _called(name: str, usual: str) -> str:
     return "" if name == usual else f" {name!r}"
 
 
-def _expression(what: str, given: object) -> sp.Expr:
+def expression_of(what: str, given: object) -> sp.Expr:
+    """Return what a user gives as an expression; raises LinkwiseError for anything else, by `what`."""
     try:
         expression = sp.sympify(given, strict=True)
     except sp.SympifyError:

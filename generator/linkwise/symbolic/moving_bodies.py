@@ -13,6 +13,7 @@ from sympy.simplify.fu import TR5, TR6
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
+from linkwise.symbolic.energy_terms import expression_of
 from linkwise.symbolic.system import POTENTIAL, Forces, LinkEnergy, Named
 
 Rate: TypeAlias = Callable[[sp.Expr], sp.Expr]
@@ -20,8 +21,8 @@ Rate: TypeAlias = Callable[[sp.Expr], sp.Expr]
 Values: TypeAlias = Mapping[sp.Symbol, float]
 """Values of parameters."""
 ZERO = sp.S.Zero
-ROUNDED = 1e-9
-"""Relative error that numbers of a rotation or an inertia may have."""
+ROUNDED = 1e-6
+"""Relative error of a rotation or an inertia: numbers may be written with seven digits."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ def _inertia(given: Any) -> sp.Matrix:
 
 
 def _mass(given: object, values: Values) -> sp.Expr:
-    mass = _expression("mass", given)
+    mass = expression_of("mass", given)
     value = sp.sympify(mass.xreplace(dict(values)))
     if value.is_number and value.is_negative:
         raise LinkwiseError(f"its mass is {mass}, and no body has a negative one")
@@ -175,13 +176,3 @@ def _check_inertia(inertia: sp.Matrix, values: Values) -> None:
             f"its principal inertias are {least:.3g}, {middle:.3g} and {most:.3g}, which no rigid body has: "
             "none is negative, or more than the two others together"
         )
-
-
-def _expression(what: str, given: object) -> sp.Expr:
-    try:
-        found = sp.sympify(given, strict=True)
-    except sp.SympifyError:
-        found = None
-    if not isinstance(found, sp.Expr):
-        raise LinkwiseError(f"its {what} is {short(repr(given))}; give a number or a SymPy expression")
-    return found

@@ -161,6 +161,21 @@ class ArrayBackend(PackedEngine):
         """Give run-time parameters of a separate copy these values."""
         raise NotImplementedError
 
+    def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
+        """Return the kinetic and potential energies of the links in J, (..., N) each."""
+        if self.rule:
+            return self.rule.energies(self, (q, qd), self._values(q), self._bodies(q))
+        values = self._energy_columns(q, qd)
+        return values[..., 0::3], values[..., 1::3]
+
+    def power_beside(self, q: Numbers, qd: Numbers) -> Numbers:
+        """Return R_j, the power that links written by hand get otherwise than from joints, in W, (..., N)."""
+        return self._energy_columns(q, qd)[..., 2::3]
+
+    def _energy_columns(self, q: Numbers, qd: Numbers) -> Numbers:
+        """Return K, P and R of the links, one after the other, (..., 3 N), from closed forms."""
+        raise NotImplementedError
+
     def tree_numbers(self, own: tuple[TreeArrays, Numbers], q: Numbers) -> TreeArrays:
         """Return the tree's numbers for the parameters and the bodies; see `given_numbers`."""
         assert self.tree is not None  # `frames` has checked it

@@ -149,17 +149,6 @@ class NumpyBackend(ArrayBackend):
         """Give run-time parameters of a separate copy these values."""
         self._numbers.update({name: np.asarray(value, dtype=float) for name, value in values.items()})
 
-    def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
-        """Return the kinetic and potential energies of the links in J, (..., N) each."""
-        if self.rule:
-            return self.rule.energies(self, (q, qd), self._values(q), self._bodies(q))
-        values = self._energy_columns(q, qd)
-        return values[..., 0::3], values[..., 1::3]
-
-    def power_beside(self, q: Numbers, qd: Numbers) -> Numbers:
-        """Return R_j, the power that links written by hand get otherwise than from joints, in W, (..., N)."""
-        return self._energy_columns(q, qd)[..., 2::3]
-
     def named_shares(self, q: Numbers, qd: Numbers) -> Numbers:
         """Return shares of links written by hand, (..., count), in the order of `Structure.share_rows`."""
         columns, p = _Columns(q, len(self.structure.share_rows)), self._values(q)

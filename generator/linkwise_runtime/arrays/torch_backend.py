@@ -140,17 +140,6 @@ class TorchBackend(ArrayBackend):
         tensors = {name: torch.as_tensor(value, dtype=torch.float64) for name, value in values.items()}
         cast("dict[str, Tensor]", self.parameters).update(tensors)
 
-    def energies(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
-        """Return the kinetic and potential energies of the links in J, (..., N) each."""
-        if self.rule:
-            return self.rule.energies(self, (q, qd), self._values(q), self._bodies(q))
-        values = self._energy_columns(q, qd)
-        return values[..., 0::3], values[..., 1::3]
-
-    def power_beside(self, q: Numbers, qd: Numbers) -> Numbers:
-        """Return R_j, the power that links written by hand get otherwise than from joints, in W, (..., N)."""
-        return self._energy_columns(q, qd)[..., 2::3]
-
     def named_shares(self, q: Numbers, qd: Numbers) -> Numbers:
         """Return shares of links written by hand, (..., count), in the order of `Structure.share_rows`."""
         p, links = self._values(q), cast("Sequence[EnergyForms]", self.links)

@@ -45,7 +45,7 @@ class AutogradBackend(TorchBackend):
 
     def read_beside_motion(self) -> Iterable[Tensor]:
         """Return all tensors, besides the motion, that the energies depend on: constants of links too."""
-        sources: dict[int, torch.nn.Module] = {id(self.given): self.given}
+        sources: dict[int, torch.nn.Module] = {}
         for link in self.modules:
             at: Energies | None = link
             while at is not None and id(at) not in sources:
