@@ -8,19 +8,25 @@ from linkwise_runtime.rule.calls import RigidRule
 
 TREE = JointTree(
     gravity=(0.0, -9.80665, 0.0),
-    # Parent, kind, coordinate and ratio; rotation; translation in m.
+    # Name; link that it moves; parent, kind, coordinate and ratio; rotation; translation in m.
     joints=(
-        TreeJoint(  # 'joint1'
+        TreeJoint(
+            'joint1',
+            'link1',
             None, 'revolute', 0, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
             (0.0, 0.0, 0.0),
         ),
-        TreeJoint(  # 'joint2'
+        TreeJoint(
+            'joint2',
+            'link2',
             0, 'revolute', 1, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
             (0.25, 0.0, 0.0),
         ),
-        TreeJoint(  # 'joint3'
+        TreeJoint(
+            'joint3',
+            'link3',
             1, 'revolute', 2, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
             (0.25, 0.0, 0.0),
@@ -28,22 +34,19 @@ TREE = JointTree(
     ),
     # Joint; mass in kg; centre of mass in m; inertia about it in kg m^2.
     links=(
-        TreeLink(
-            'link1',
+        TreeLink(  # 'link1'
             0,
             0.6,
             (0.125, 0.0, 0.0),
             ((0.0, 0.0, 0.0), (0.0, 0.005, 0.0), (0.0, 0.0, 0.005)),
         ),
-        TreeLink(
-            'link2',
+        TreeLink(  # 'link2'
             1,
             0.6,
             (0.125, 0.0, 0.0),
             ((0.0, 0.0, 0.0), (0.0, 0.005, 0.0), (0.0, 0.0, 0.005)),
         ),
-        TreeLink(
-            'link3',
+        TreeLink(  # 'link3'
             2,
             0.6,
             (0.125, 0.0, 0.0),

@@ -8,34 +8,46 @@ from linkwise_runtime.rule.calls import RigidRule
 
 TREE = JointTree(
     gravity=(0.0, 0.0, -9.81),
-    # Parent, kind, coordinate and ratio; rotation; translation in m.
+    # Name; link that it moves; parent, kind, coordinate and ratio; rotation; translation in m.
     joints=(
-        TreeJoint(  # 'joint1'
+        TreeJoint(
+            'joint1',
+            'link1',
             None, 'revolute', 0, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
             (0.0, 0.0, 0.0),
         ),
-        TreeJoint(  # 'joint2'
+        TreeJoint(
+            'joint2',
+            'link2',
             0, 'revolute', 1, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
             (0.0, 0.2435, 0.0),
         ),
-        TreeJoint(  # 'joint3'
+        TreeJoint(
+            'joint3',
+            'link3',
             1, 'revolute', 2, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
             (0.4318, 0.0, -0.0934),
         ),
-        TreeJoint(  # 'joint4'
+        TreeJoint(
+            'joint4',
+            'link4',
             2, 'revolute', 3, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
             (-0.0203, -0.4331, 0.0),
         ),
-        TreeJoint(  # 'joint5'
+        TreeJoint(
+            'joint5',
+            'link5',
             3, 'revolute', 4, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
             (0.0, 0.0, 0.0),
         ),
-        TreeJoint(  # 'joint6'
+        TreeJoint(
+            'joint6',
+            'link6',
             4, 'revolute', 5, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
             (0.0, 0.0, 0.0),
@@ -43,43 +55,37 @@ TREE = JointTree(
     ),
     # Joint; mass in kg; centre of mass in m; inertia about it in kg m^2.
     links=(
-        TreeLink(
-            'link1',
+        TreeLink(  # 'link1'
             0,
             0.0,
             (0.0, 0.0, 0.0),
             ((0.35, 0.0, 0.0), (0.0, 0.35, 0.0), (0.0, 0.0, 0.35)),
         ),
-        TreeLink(
-            'link2',
+        TreeLink(  # 'link2'
             1,
             17.4,
             (0.068, 0.006, -0.016),
             ((0.13, 0.0, 0.0), (0.0, 0.524, 0.0), (0.0, 0.0, 0.539)),
         ),
-        TreeLink(
-            'link3',
+        TreeLink(  # 'link3'
             2,
             4.8,
             (0.0, -0.07, 0.014),
             ((0.066, 0.0, 0.0), (0.0, 0.0125, 0.0), (0.0, 0.0, 0.086)),
         ),
-        TreeLink(
-            'link4',
+        TreeLink(  # 'link4'
             3,
             0.82,
             (0.0, 0.0, -0.019),
             ((0.0018, 0.0, 0.0), (0.0, 0.0018, 0.0), (0.0, 0.0, 0.0013)),
         ),
-        TreeLink(
-            'link5',
+        TreeLink(  # 'link5'
             4,
             0.34,
             (0.0, 0.0, 0.0),
             ((0.0003, 0.0, 0.0), (0.0, 0.0003, 0.0), (0.0, 0.0, 0.0004)),
         ),
-        TreeLink(
-            'link6',
+        TreeLink(  # 'link6'
             5,
             0.09,
             (0.0, 0.0, 0.032),

@@ -8,39 +8,53 @@ from linkwise_runtime.rule.calls import RigidRule
 
 TREE = JointTree(
     gravity=(0.0, 0.0, -9.81),
-    # Parent, kind, coordinate and ratio; rotation; translation in m.
+    # Name; link that it moves; parent, kind, coordinate and ratio; rotation; translation in m.
     joints=(
-        TreeJoint(  # 'waist_turn'
+        TreeJoint(
+            'waist_turn',
+            'lower_yoke',
             None, 'revolute', 0, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
             (0.0, 0.0, 0.11),
         ),
-        TreeJoint(  # 'waist_lean'
+        TreeJoint(
+            'waist_lean',
+            'upper_yoke',
             0, 'revolute', 1, 1.0,
             ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
             (0.0, 0.0, 0.0),
         ),
-        TreeJoint(  # 'waist_bend'
+        TreeJoint(
+            'waist_bend',
+            'chest',
             1, 'revolute', 2, 1.0,
             ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
             (0.0, 0.0, 0.0),
         ),
-        TreeJoint(  # 'left_shoulder'
+        TreeJoint(
+            'left_shoulder',
+            'left_upper_arm',
             2, 'revolute', 3, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
             (0.37, 0.0, 0.195),
         ),
-        TreeJoint(  # 'left_elbow'
+        TreeJoint(
+            'left_elbow',
+            'left_forearm',
             3, 'revolute', 4, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
             (-0.28, 0.02, 0.025),
         ),
-        TreeJoint(  # 'right_shoulder'
+        TreeJoint(
+            'right_shoulder',
+            'right_upper_arm',
             2, 'revolute', 5, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
             (0.37, 0.0, -0.195),
         ),
-        TreeJoint(  # 'right_elbow'
+        TreeJoint(
+            'right_elbow',
+            'right_forearm',
             5, 'revolute', 6, 1.0,
             ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
             (-0.28, 0.02, -0.025),
@@ -48,36 +62,31 @@ TREE = JointTree(
     ),
     # Joint; mass in kg; centre of mass in m; inertia about it in kg m^2.
     links=(
-        TreeLink(
-            'chest',
+        TreeLink(  # 'chest'
             2,
             12.5,
             (0.21, 0.012, 0.003),
             ((0.118, 0.009, -0.003), (0.009, 0.241, 0.002), (-0.003, 0.002, 0.187)),
         ),
-        TreeLink(
-            'left_upper_arm',
+        TreeLink(  # 'left_upper_arm'
             3,
             2.1,
             (-0.125, 0.008, 0.021),
             ((0.0031, 0.0006, -0.0009), (0.0006, 0.0142, 0.0002), (-0.0009, 0.0002, 0.0139)),
         ),
-        TreeLink(
-            'left_forearm',
+        TreeLink(  # 'left_forearm'
             4,
             1.4,
             (-0.132, 0.017, -0.006),
             ((0.0014, 0.0007, 0.0003), (0.0007, 0.0098, -0.0001), (0.0003, -0.0001, 0.0101)),
         ),
-        TreeLink(
-            'right_upper_arm',
+        TreeLink(  # 'right_upper_arm'
             5,
             2.1,
             (-0.125, 0.008, -0.021),
             ((0.0031, 0.0006, 0.0009), (0.0006, 0.0142, -0.0002), (0.0009, -0.0002, 0.0139)),
         ),
-        TreeLink(
-            'right_forearm',
+        TreeLink(  # 'right_forearm'
             6,
             1.4,
             (-0.132, 0.017, 0.006),

@@ -289,15 +289,15 @@ class Dynamics(RobotCalls):
         mask: shape (3, n), zeros and ones, or weights between; row m is the order: 0 position, 1 velocity, 2
         acceleration. Gravity is in no row: a mask of ones in rows 1 and 2 gives tau_ij - g_ij.
         """
-        engine, motion = self.door.read({"q": q, "qd": qd, "qdd": qdd})
-        weights = engine.weights("the mask", mask, motion[0])
+        backend, motion = self.door.read({"q": q, "qd": qd, "qdd": qdd})
+        weights = backend.weights("the mask", mask, motion[0])
         if tuple(weights.shape) != (3, self.n):
             raise ValueError(
                 f"the mask has shape {tuple(weights.shape)}; it must be (3, {self.n}): order, coordinate"
             )
         if self.door.check_finite:
             check_numbers({}, (), {"the mask": Beside(mask, (3, self.n), "order, coordinate")})
-        torque: Array = self._answer("masked", engine, motion, out, (weights,))
+        torque: Array = self._answer("masked", backend, motion, out, (weights,))
         return torque
 
     def graph(self, i: Any, j: Any = None, k: Any = None, m: int | None = None) -> Any:

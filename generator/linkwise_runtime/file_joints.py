@@ -11,7 +11,8 @@ R = Rz(yaw) Ry(pitch) Rx(roll)      w = E (yaw', pitch', roll'), w along the bod
 """
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +25,12 @@ FLOATING_ROOT = "root_joint"
 """Name that Pinocchio gives to the joint by which the whole robot floats."""
 
 
-class FileJoint(NamedTuple):
+@dataclass(frozen=True)
+class FileJoint:
     """A joint of the file that moves, and its coordinates, counted from 0."""
 
     name: str
-    kind: str
+    kind: Literal["single", "continuous", "planar", "ball", "floating"]
     """Kind of the joint, by the coordinates that it has:
 
     single      1, an angle or a length
@@ -39,6 +41,8 @@ class FileJoint(NamedTuple):
     """
     coordinates: tuple[int, ...]
     """Indices of its coordinates; fewer than the kind has where some are locked."""
+    pinocchio: int
+    """Place among the joints of Pinocchio's model."""
 
 
 COORDINATES = {"single": 1, "continuous": 1, "planar": 3, "ball": 3, "floating": 6}

@@ -71,20 +71,19 @@ class Qpos:
     def __init__(
         self,
         joints: Sequence[FileJoint],
-        pinocchio: Sequence[int],
         order: object = "mujoco",
         names: Sequence[str] | None = None,
     ) -> None:
         """Set up the conversion.
 
-        pinocchio: the joints in its order; names: those of the joints in that of qpos, if it is another.
+        names: those of the joints in the order of qpos, if it is another.
 
         Raises ValueError for another order, for names that are not those of the joints, and for a joint of
         which some coordinates are locked.
         """
         if not isinstance(order, str) or order not in POSITIONS:
             raise ValueError(f"order is {short(order)}; choose {' or '.join(POSITIONS)}")
-        own = joints if order == "mujoco" else [joints[at] for at in pinocchio]
+        own = joints if order == "mujoco" else sorted(joints, key=lambda joint: joint.pinocchio)
         self.order, self.joints = order, own if names is None else in_given_order(joints, names)
         for joint in self.joints:
             if len(joint.coordinates) < COORDINATES[joint.kind]:

@@ -99,24 +99,24 @@ class RobotCalls:
                 values = at_once(key, given)
                 if values is not None:
                     return row.record(*values) if row.record else values[0]
-            engine, motion = self.door.read(dict(zip(row.motion, given)))  # noqa: B905 - rows are as long
+            backend, motion = self.door.read(dict(zip(row.motion, given)))  # noqa: B905 - rows are as long
             if row.rigid:
-                engine.answers.check_regresses()
-            values = getattr(engine.answers, key)(*motion)
+                backend.answers.check_regresses()
+            values = getattr(backend.answers, key)(*motion)
             return row.record(*values) if row.record else values[0]
-        engine, motion = self.door.read(dict(zip(row.motion, given, strict=True)))
-        return self._answer(key, engine, motion, out)
+        backend, motion = self.door.read(dict(zip(row.motion, given, strict=True)))
+        return self._answer(key, backend, motion, out)
 
     def _answer(
         self,
         key: str,
-        engine: ArrayBackend,
+        backend: ArrayBackend,
         motion: Sequence[Numbers],
         out: object,
         beside: Sequence[Numbers] = (),
     ) -> Any:
         """Return the answer to motion that has been read, and to what the row is given beside it."""
-        row, answers = CALLS[key], engine.answers
+        row, answers = CALLS[key], backend.answers
         if row.rigid:
             answers.check_regresses()
         if out is None:
@@ -124,7 +124,7 @@ class RobotCalls:
             return row.record(*values) if row.record else values[0]
         fields: Sequence[str] = getattr(row.record, "_fields", ())
         named = dict(zip(row.motion, motion, strict=True))
-        read = engine.read_beside_motion()
+        read = backend.read_beside_motion()
         into = accepted(out, fields, answers.shapes[key], named, [*read, *beside], answers.contiguous)
         answers.compute_into(key, [*motion, *beside], into)
         return row.record(*into) if row.record else out

@@ -164,8 +164,6 @@ class Structure:
     """Limits of each joint, as in the robot's file."""
     file_joints: tuple[FileJoint, ...] = ()
     """Joints of the file, in the order of their coordinates; empty where each coordinate is one joint."""
-    pinocchio_order: tuple[int, ...] = ()
-    """Indices of these joints in the order in which Pinocchio has them."""
     shares: tuple[tuple[str, ...], ...] = ()
     """Names of the shares of each link that are not of motion, where links were written by hand."""
     degrees: tuple[int, ...] = ()
@@ -223,9 +221,8 @@ class Structure:
 
     def qpos(self, order: object = "mujoco", names: Sequence[str] | None = None) -> Qpos:
         """Return the conversion from positions of MuJoCo or Pinocchio to q; raise as `Qpos` does."""
-        single = [FileJoint(name, "single", (k,)) for k, name in enumerate(self.joint_names)]
-        joints = self.file_joints or tuple(single)
-        return Qpos(joints, self.pinocchio_order or range(len(joints)), order, names)
+        single = (FileJoint(name, "single", (k,), k) for k, name in enumerate(self.joint_names))
+        return Qpos(self.file_joints or tuple(single), order, names)
 
     def joint_index(self, given: int | str, argument: str = "joint") -> int:
         """Return index i or k of a joint, given by number from 0 or by name.

@@ -21,7 +21,7 @@ from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.result import Totals, Work
 from linkwise.analysis.result_rows import Column, ResultRows, torque_places
 from linkwise.analysis.run import analyze_to
-from linkwise.analysis.show.page import poses, report
+from linkwise.analysis.show.page import report, stick_figure
 from linkwise.analysis.term_rows import term_rows
 from linkwise.progress import silent
 from selenium.webdriver.support.wait import WebDriverWait
@@ -281,7 +281,7 @@ def crowd(place, count=14):
     names = tuple(
         f"spine_joint_{i}" if i != 4 else f"{'name_from_a_drawing_' * 4}"[:79] + "4" for i in range(14)
     )
-    robot = replace(analysis.robot, joints=names, links=names, units=("rad",) * count, bodies=None)
+    robot = replace(analysis.robot, joints=names, links=names, units=("rad",) * count, tree=None)
     pairs = [(i, k) for i in range(count) for k in range(count)]
     places = [
         ("time", ()),
@@ -455,7 +455,7 @@ def test_a_robot_that_moves_in_a_plane_is_seen_from_its_side(driver, tmp_path):
     (tmp_path / "report.html").write_text(report(analysis), encoding="utf-8")
     opened(driver, (tmp_path / "report.html").as_uri())
     assert "Drag to turn" in driver.find_element("id", "figure-caption").text
-    origins, centres = poses(analysis.robot.bodies, analysis.q)
+    origins, centres = stick_figure(analysis.robot, analysis.q)
     choose(driver, "slider", 30)
     dots = driver.execute_script(
         "return [...document.querySelectorAll('#stick circle')]"

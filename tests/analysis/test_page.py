@@ -77,5 +77,5 @@ def test_a_small_logs_page_is_small_and_has_the_whole_library_with_its_licence(a
 
 
 def test_robot_without_geometry(analysis):
-    robot = replace(analysis.robot, bodies=None)
+    robot = replace(analysis.robot, tree=None)
     assert json.loads(page_data(replace(analysis, robot=robot)))["bodies"] is None

@@ -8,16 +8,17 @@ from itertools import pairwise
 import matplotlib
 import numpy as np
 import pytest
+from helpers import urdf_text
 from helpers.motion_logs import JOINTS, PLANAR3, smooth, write_csv
+from linkwise import generate, read_system, write_package
 from linkwise.analysis import Load, Reading, analyze
 from linkwise.analysis.opened_robot import load_robot
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.show import figure_png
 from linkwise.analysis.show.drawn_curves import largest_few
-from linkwise.analysis.show.page import page_data, poses
+from linkwise.analysis.show.page import page_data, stick_figure
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
-from linkwise.package.entries import BodyEntry
 from matplotlib.figure import Figure
 
 
@@ -288,8 +289,7 @@ def test_unknown_figures_are_named(analysis):
 
 def test_poses_of_the_planar_arm():
     q = smooth(10, 3)[:, 1:]
-    bodies = load_robot(PLANAR3).bodies
-    origins, centres = poses(bodies, q)
+    origins, centres = stick_figure(load_robot(PLANAR3), q)
     angle = np.cumsum(q, axis=1)
     steps = 0.25 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
     joints = np.concatenate([np.zeros((10, 1, 3)), np.cumsum(steps, axis=1)], axis=1)
@@ -297,16 +297,15 @@ def test_poses_of_the_planar_arm():
     np.testing.assert_allclose(centres, (joints[:, :-1] + joints[:, 1:]) / 2, atol=1e-15)
 
 
-def test_poses_of_a_slide_on_a_turned_frame():
-    zero = (0.0, 0.0, 0.0)
-    turned = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))  # its z axis is the parent's x
-    upright = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    bulk = (zero, zero, zero)
-    slide = BodyEntry(
-        "a", None, "a", "prismatic", 0, 2.0, turned, (0.0, 1.0, 0.0), 1.0, (0.0, 0.0, 3.0), bulk
-    )
-    crank = BodyEntry("b", 0, "b", "revolute", 1, -1.0, upright, (0.0, 0.0, 1.0), 1.0, (1.0, 0.0, 0.0), bulk)
-    origins, centres = poses([slide, crank], np.array([[0.5, np.pi / 2]]))
+def test_poses_of_a_slide_on_a_turned_frame(tmp_path):
+    turned = {"rpy": f"{np.pi / 2} 0 {np.pi / 2}"}  # its z axis is the parent's x
+    slide = urdf_text.joint("a", "base", "a", type="prismatic", xyz="0 1 0", axis="0 0 1", **turned)
+    crank = urdf_text.joint("b", "a", "b", xyz="0 0 1", rpy="0 0 0", axis="0 0 -1")
+    places = {"base": "0 0 0", "a": "0 0 3", "b": "1 0 0"}
+    links = [urdf_text.link(name).replace("0.1 -0.02 0.05", place) for name, place in places.items()]
+    (tmp_path / "slide.urdf").write_text(urdf_text.robot(*links, slide, crank))
+    write_package(generate(read_system(tmp_path / "slide.urdf"), ["numpy"]), tmp_path / "slide")
+    origins, centres = stick_figure(load_robot(tmp_path / "slide"), np.array([[1.0, np.pi / 2]]))
     np.testing.assert_allclose(origins[0], [[1, 1, 0], [2, 1, 0]], atol=1e-15)
     np.testing.assert_allclose(centres[0], [[4, 1, 0], [2, 1, -1]], atol=1e-15)
 
@@ -314,7 +313,7 @@ def test_poses_of_a_slide_on_a_turned_frame():
 def many(analysis, count=14):
     """Return the same numbers with as many names as asked for, one of 80 letters."""
     joints = tuple(f"joint{i}" if i != 4 else f"{'a_name_from_a_drawing_' * 4}4" for i in range(count))
-    robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * count, bodies=None)
+    robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * count, tree=None)
     rows = ResultRows.of(robot, [("q", (i,)) for i in range(count)])
     return replace(analysis, robot=robot, rows=rows, values=analysis.values[1 + np.arange(count) % 9])
 

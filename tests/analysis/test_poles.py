@@ -26,7 +26,7 @@ def test_the_instant_nearest_to_a_pole_is_told_of_a_log_of_any_length(tmp_path: 
     q = np.zeros((len(time), len(box.joints)))
     pitch = q[:, box.joints.index("base_pitch")]
     pitch[[20_000, 69_000, 140_000]] = np.radians([88.0, 89.0, 87.0])
-    (told,) = pole_warnings(box.bodies, box.joints, Samples(time, q, 1000.0, (), ()))
+    (told,) = pole_warnings(box.tree, box.joints, Samples(time, q, 1000.0, (), ()))
     assert "'base_pitch' is 1 degrees from where" in told
     assert "one axis, at 69 s:" in told
 

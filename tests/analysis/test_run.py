@@ -245,7 +245,7 @@ def test_partial_torques_are_those_of_an_independent_recursion(tmp_path):
     result = analyze(path, PUMA560)
     assert result.closure.recursion_absolute > 0
     assert result.closure.recursion_relative < 1e-12
-    by_hand = replace(result.robot, recursion=None, bodies=None)
+    by_hand = replace(result.robot, recursion=None, tree=None)
     assert analyze(path, by_hand).closure.recursion_relative is None
 
 
@@ -254,8 +254,8 @@ def test_a_robot_at_odds_with_the_recursion_is_refused(tmp_path):
     path = write_csv(tmp_path / "a.csv", smooth(60, 3))
     robot = load_robot(PLANAR3)
     heavy = deepcopy(robot.recursion)
-    *others, last = heavy.bodies
-    heavy.bodies = (*others, replace(last, mass=1.001 * last.mass))
+    *others, last = heavy.links
+    heavy.links = (*others, replace(last, mass=1.001 * last.mass))
     with pytest.raises(LinkwiseError, match=r"a.csv: .* not those of the Newton-Euler recursion"):
         analyze(path, replace(robot, recursion=heavy))
 

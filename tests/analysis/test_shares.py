@@ -118,7 +118,7 @@ def crowd_of(joints: tuple[str, ...], analysis: Analysis) -> Analysis:
         for j, size in ((0, 1.0), (1, draw.uniform(-1.0, 0.5))):
             places.append((quantity, (i, j) if k is None else (i, j, k)))
             values.append(size * first)
-    robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * len(joints), bodies=None)
+    robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * len(joints), tree=None)
     none = np.zeros((len(joints), len(joints)))
     totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1))
     about: Any = {"robot": robot, "totals": totals, "work": Work(none, none), "total": 400}

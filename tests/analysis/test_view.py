@@ -8,7 +8,7 @@ import pytest
 from helpers.motion_logs import smooth, write_csv
 from linkwise import generate, read_system, write_package
 from linkwise.analysis import Analysis, analyze
-from linkwise.analysis.show.page import poses, report
+from linkwise.analysis.show.page import report, stick_figure
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.support.wait import WebDriverWait
 
@@ -57,7 +57,7 @@ def view(page: Any, analysis: Analysis) -> np.ndarray:
     """Right, up and towards the reader, as unit vectors of the world, by what the page draws."""
     at = SAMPLES // 2
     seen = dots(page, at) * [1, -1]
-    origins, centres = poses(analysis.robot.bodies, analysis.q)
+    origins, centres = stick_figure(analysis.robot, analysis.q)
     world = np.stack([origins[at], centres[at]], axis=1).reshape(-1, 3)
     (right, up), rest, *_ = (m.T for m in np.linalg.lstsq(world - world[0], seen - seen[0], rcond=None)[:2])
     assert np.sqrt(rest).max() < 0.1

@@ -99,7 +99,7 @@ def test_another_length_is_open_where_loops_close(package: Package, reference: L
 def test_a_length_with_which_loops_never_close_leaves_no_state_to_check(package: Package) -> None:
     tree = package.manifest.tree
     assert tree is not None
-    too_long = tree_with(tree, {**package.manifest.parameters, "L": 9.0})
+    too_long = tree_with(tree, package.manifest.formulas, {**package.manifest.parameters, "L": 9.0})
     assert loop_reference(package.manifest, too_long, random_states(package.manifest.joints, 60)) is None
 
 

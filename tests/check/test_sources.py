@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import DATA, needs_compiler
-from linkwise import Options, read_system
+from linkwise import Options, generate, read_system, write_package
 from linkwise.check.compare import ROUNDINGS, Entries, IndexRows, compare
 from linkwise.check.frame_checks import frame_calls, frame_reference
 from linkwise.check.parametric_tree import check_numbers, tree_with
@@ -31,7 +31,7 @@ from linkwise.oracle.reference import (
 from linkwise.oracle.states import States, random_states, states_where
 from linkwise.package.entries import EnergyEntry, JointEntry, ShareEntry
 from linkwise.package.manifest import Manifest
-from linkwise.symbolic.definition import rigid_tree
+from linkwise.symbolic.definition import formula_texts, joint_tree
 
 CART = str(DATA / "cart_pendulum.py")
 LEG, TURNTABLE = str(DATA / "leg.toml"), str(DATA / "turntable.py")
@@ -290,14 +290,17 @@ def test_latex_that_is_no_formula_is_refused(text: str) -> None:
         latex(text)
 
 
-def test_formulas_of_bodies_give_their_numbers_and_others_for_other_parameters() -> None:
+def test_formulas_of_bodies_give_their_numbers_and_others_for_other_parameters(tmp_path: Path) -> None:
     system = read_system("planar2", Options("symbolic"))
     values = {symbol.name: value for symbol, value in system.parameters.items()}
-    tree = rigid_tree(system)
+    tree, formulas = joint_tree(system), formula_texts(system)
     assert tree is not None
-    assert tree_with(tree, values) == tree
-    assert tree_with(tree, values | {"l_1": 0.4}).bodies[1].translation == (0.4, 0.0, 0.0)
-    wrong = replace(tree, formulas=tree.formulas | {"bodies[1].com[0]": "1.001*r_2"})
+    assert tree_with(tree, formulas, values) == tree
+    assert tree_with(tree, formulas, values | {"l_1": 0.4}).joints[1].translation == (0.4, 0.0, 0.0)
+    write_package(generate(system, ["numpy"]), tmp_path / "arm")
+    package = Manifest.read(tmp_path / "arm")
+    assert (package.tree, package.formulas) == (tree, formulas)
+    wrong = replace(package, formulas=formulas | {"links[1].com[0]": "1.001*r_2"})
     told = check_numbers("parameters", wrong, values)
     assert (told.failed, told.detail) == (True, "com of link 'link2'")
 

@@ -73,7 +73,7 @@ def test_generate_replaces_an_earlier_package_whole(linkwise: Run, planar2: Path
 
 def test_manifest_tells_how_to_make_the_package_again(planar2: Path) -> None:
     manifest = json.loads((planar2 / "manifest.json").read_text())
-    assert manifest["schema"] == 14
+    assert manifest["schema"] == 15
     asked = {"robot": "planar2", "backends": ["numpy"], "kernel": "auto", "derivation": "rule"}
     assert manifest["request"] == asked | {"vendor_runtime": False} | Options().request()
     assert manifest["kernel"] == "straight"

@@ -61,8 +61,8 @@ def swings(joints: int, seconds: float, rate: float, seed: int = 1) -> tuple[Any
 
 def own_parameters(robot: OpenedRobot) -> Any:
     """Parameters of the links as the robot has them."""
-    bodies = {body.link: body for body in robot.bodies or ()}
-    chosen = [bodies[link] for link in robot.links]
+    assert robot.tree is not None
+    chosen = robot.tree.links
     values = ([b.mass for b in chosen], [b.com for b in chosen], [b.inertia for b in chosen])
     return inertial_parameters(Bodies(*map(np.array, values)))
 
@@ -261,7 +261,9 @@ def test_the_urdf_file_makes_the_same_torques(robot: str, tmp_path: Path) -> Non
             strict=True,
         )
     )
-    text = urdf_text("again", tree, manifest.joints, pi, {manifest.joints[0].name: np.array([0.5, 0.25])})
+    text = urdf_text(
+        replace(manifest, name="again", tree=tree), pi, {manifest.joints[0].name: np.array([0.5, 0.25])}
+    )
     (tmp_path / "again.urdf").write_text(text)
     assert '<dynamics damping="0.5" friction="0.25"/>' in text
     write_package(generate(read_system(tmp_path / "again.urdf"), ["numpy"], "again"), tmp_path / "again")

@@ -38,7 +38,8 @@ def test_what_control_needs_is_pinocchios(robot: str, tmp_path: Path) -> None:
     path = next(ROBOTS.rglob(f"{robot}.urdf"))
     system = read_system(path, Options(**OPTIONS[robot]))
     write_package(generate(system, ["c"], "robot", kernel="loops"), tmp_path)
-    tree, library = Manifest.read(tmp_path).tree, functions(tmp_path)
+    manifest, library = Manifest.read(tmp_path), functions(tmp_path)
+    tree = manifest.tree
     oracle = WithFrames(path, system, OPTIONS[robot])
     errors: dict[str, float] = {}
 
@@ -70,11 +71,11 @@ def test_what_control_needs_is_pinocchios(robot: str, tmp_path: Path) -> None:
         mass = oracle.mass(q)
         held("mass_matrix", mass, q)
         if "allow_unphysical" not in OPTIONS[robot]:
-            alone = "forward_dynamics_of_links" if tree.passive else "forward_dynamics"
+            alone = "forward_dynamics_of_links" if manifest.passive else "forward_dynamics"
             moved = held(alone, oracle.acceleration(q, qd, tau), q, qd, tau)
             taken = float((np.abs(mass) @ np.abs(moved)).max())
             close("torques of accelerations", oracle.torque(q, qd, moved), tau, taken)
-            plant = Plant(oracle, tree, q, qd)
+            plant = Plant(oracle, manifest.passive, q, qd)
             moved = answer("forward_dynamics", tau.shape, q, qd, tau)
             taken = float((np.abs(plant.inertia) @ np.abs(moved)).max())
             asked = plant.torque(moved) + plant.friction * np.sign(qd)
@@ -85,8 +86,8 @@ def test_what_control_needs_is_pinocchios(robot: str, tmp_path: Path) -> None:
 class Plant:
     """A robot at a state, as Pinocchio and its file have it: H, C times velocities, and the rest."""
 
-    def __init__(self, oracle: WithFrames, tree: Any, q: Any, qd: Any) -> None:
-        stiffness, pull, damping, friction, armature = map(np.array, passive_sums(tree.passive, oracle.n))
+    def __init__(self, oracle: WithFrames, passive: Any, q: Any, qd: Any) -> None:
+        stiffness, pull, damping, friction, armature = map(np.array, passive_sums(passive, oracle.n))
         self.oracle, self.q, self.qd, self.rest = oracle, q, qd, 0.0 * q
         self.inertia = oracle.mass(q) + np.diag(armature)
         self.other, self.friction = oracle.gravity(q) + stiffness * q + pull + damping * qd, friction
@@ -107,7 +108,8 @@ def test_impedance_is_what_pinocchios_matrices_say(robot: str, tmp_path: Path) -
     path = next(ROBOTS.rglob(f"{robot}.urdf"))
     system = read_system(path, Options(**OPTIONS[robot]))
     write_package(generate(system, ["c"], "robot", kernel="loops"), tmp_path)
-    tree, library = Manifest.read(tmp_path).tree, functions(tmp_path)
+    manifest, library = Manifest.read(tmp_path), functions(tmp_path)
+    tree = manifest.tree
     oracle = WithFrames(path, system, OPTIONS[robot])
     assert tree is not None
     generator, n = np.random.default_rng(1), oracle.n
@@ -130,7 +132,10 @@ def test_impedance_is_what_pinocchios_matrices_say(robot: str, tmp_path: Path) -
         return a @ a.T + np.eye(size)
 
     for q, qd, q_d, qd_d, qdd_d, external in generator.uniform(-1.0, 1.0, (3, 6, n)):
-        plant, (inertia, damping, stiffness) = Plant(oracle, tree, q, qd), (positive(n) for _ in range(3))
+        plant, (inertia, damping, stiffness) = (
+            Plant(oracle, manifest.passive, q, qd),
+            (positive(n) for _ in range(3)),
+        )
         wanted = {"inertia": inertia, "damping": damping, "stiffness": stiffness}
         pull = external - plant.felt(qd - qd_d) - damping @ (qd - qd_d) - stiffness @ (q - q_d)
         qdd = qdd_d + np.linalg.solve(plant.inertia + inertia, pull)

@@ -69,8 +69,8 @@ def in_our_frames(robot: str, system: Any, package: ModuleType, rows: Any) -> An
     q = np.full(oracle.n, 0.3)
     pin.forwardKinematics(oracle.model, oracle.data, oracle._state(q, q, q)[0])
     columns, tree = [], package.tree.TREE
-    for link in tree.links:
-        owner = oracle.model.frames[oracle.model.getFrameId(link.name, pin.BODY)].parentJoint
+    for j, link in enumerate(tree.links):
+        owner = oracle.model.frames[oracle.model.getFrameId(tree.link_name(j), pin.BODY)].parentJoint
         between = np.linalg.inv(oracle.data.oMi[owner].homogeneous) @ placed(tree, link.joint, q)
         columns.append(rows[:, :, owner - 1] @ moved(between))
     return np.stack(columns, 2)

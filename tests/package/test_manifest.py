@@ -5,9 +5,11 @@ import json
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
+from conftest import DATA
 from linkwise import LinkwiseError, check_package, generate, read_system, write_package
 from linkwise.package.manifest import LARGEST, SCHEMA, Manifest
 from linkwise.package.write import check_target
@@ -38,8 +40,12 @@ def change_manifest(package: Path, change: Callable[[Any], object], checksums: b
     path.write_text(json.dumps(data))
 
 
-def bodies(data: Any) -> Any:
-    return data["tree"]["bodies"]
+def joints(data: Any) -> Any:
+    return data["tree"]["joints"]
+
+
+def links(data: Any) -> Any:
+    return data["tree"]["links"]
 
 
 TIE = {"name": "loop", "kind": "point", "first": 0, "second": 1, "length": 0.0}
@@ -57,56 +63,61 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
     "request": (lambda data: data.update(request=3), "request is not an object"),
     "gravity": (lambda data: data["tree"].pop("gravity"), "tree is not an object with gravity"),
     "tree of words": (lambda data: data.update(tree="ab"), "tree is not an object"),
-    "body": (lambda data: bodies(data).append(None), "tree.bodies[2] is not an object"),
-    "mass": (lambda data: bodies(data)[0].update(mass="a"), "tree.bodies[0].mass is not a finite number"),
+    "joint of the tree that is none": (
+        lambda data: joints(data).append(None),
+        "tree.joints[2] is not an object",
+    ),
+    "mass": (lambda data: links(data)[0].update(mass="a"), "tree.links[0].mass is not a finite number"),
     "nan": (
-        lambda data: bodies(data)[1].update(com=[float("nan"), 0, 0]),
-        "tree.bodies[1].com[0] is not a finite number",
+        lambda data: links(data)[1].update(com=[float("nan"), 0, 0]),
+        "tree.links[1].com[0] is not a finite number",
     ),
     "rotation": (
-        lambda data: bodies(data)[1].update(rotation=[[1]]),
-        "tree.bodies[1].rotation is not a list of 3",
+        lambda data: joints(data)[1].update(rotation=[[1]]),
+        "tree.joints[1].rotation is not a list of 3",
     ),
-    "coordinate": (lambda data: bodies(data)[1].update(coordinate=2), "body 1 of the tree hangs on no joint"),
-    "kind": (lambda data: bodies(data)[1].update(kind=[]), "tree.bodies[1].kind is not 'revolute' or"),
+    "coordinate": (lambda data: joints(data)[1].update(coordinate=2), "tree.joints[1].coordinate is not"),
+    "kind": (lambda data: joints(data)[1].update(kind=[]), "tree.joints[1].kind is not 'revolute' or"),
     "parent": (
-        lambda data: bodies(data)[1].update(parent=1),
-        "the parent of body 1 of the tree is",
+        lambda data: joints(data)[1].update(parent=1),
+        "tree.joints[1].parent is not an earlier joint",
     ),
     "link": (
-        lambda data: bodies(data)[1].update(link="hand"),
-        "links[1].name is 'link2', which is not in the tree",
+        lambda data: joints(data)[1].update(link="hand"),
+        "links[1].name is 'link2', and its joint in the tree moves 'hand'",
     ),
+    "link left out": (lambda data: links(data).pop(), "tree.links has 1 links, links 2"),
+    "link on no joint": (lambda data: links(data)[1].update(joint=2), "tree.links[1].joint is not there"),
     "turned link": (
         lambda data: data["links"][1].update(path=[1]),
         "the path of link 'link2' is not that of the tree",
     ),
     "passive entry": (
-        lambda data: data["tree"]["passive"].append(
+        lambda data: data["passive"].append(
             {"joint": "joint1", "coordinate": 1, "ratio": 1.0}
             | dict.fromkeys(("stiffness", "rest", "damping", "friction", "armature"), 0.5)
         ),
-        "passive entry 0 of the tree is not of a joint that moves so",
+        "passive[0] is not of a joint that moves so in the tree",
     ),
     "joint of the tree": (
-        lambda data: bodies(data)[1].update(joint="wrist"),
-        "joints[1].name is 'joint2', on which no body of the tree hangs",
+        lambda data: joints(data)[1].update(name="wrist"),
+        "joints[1].name is 'joint2', which no joint of the tree with it has",
     ),
     "unit": (
         lambda data: data["joints"][0].update(unit="m"),
         "joints[0].unit is 'm', which is not that of its kind in the tree",
     ),
     "sheared": (
-        lambda data: bodies(data)[1].update(rotation=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]),
-        "the rotation of body 1 of the tree is not a rotation",
+        lambda data: joints(data)[1].update(rotation=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]),
+        "tree.joints[1].rotation is not a rotation",
     ),
     "mirrored": (
-        lambda data: bodies(data)[1].update(rotation=[[1, 0, 0], [0, 1, 0], [0, 0, -1]]),
-        "the rotation of body 1 of the tree is not a rotation",
+        lambda data: joints(data)[1].update(rotation=[[1, 0, 0], [0, 1, 0], [0, 0, -1]]),
+        "tree.joints[1].rotation is not a rotation",
     ),
     "inertia": (
-        lambda data: bodies(data)[1].update(inertia=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]),
-        "the inertia of body 1 of the tree is not symmetric",
+        lambda data: links(data)[1].update(inertia=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]),
+        "tree.links[1].inertia is not symmetric",
     ),
     "frame twice": (
         lambda data: data["tree"]["frames"][1].update(name=data["tree"]["frames"][0]["name"]),
@@ -114,19 +125,19 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
     ),
     "frame on nothing": (
         lambda data: data["tree"]["frames"][0].update(joint=2),
-        "the joint of frame 0 of the tree is not there",
+        "tree.frames[0].joint is not there",
     ),
     "mirrored frame": (
         lambda data: data["tree"]["frames"][0].update(rotation=[[1, 0, 0], [0, 1, 0], [0, 0, -1]]),
-        "the rotation of frame 0 of the tree is not a rotation",
+        "tree.frames[0].rotation is not a rotation",
     ),
     "frame of a link": (
         lambda data: data["tree"]["frames"][2].update(joint=0),
-        "tree.frames has no frame 'link2' on the body of that link",
+        "tree.frames has no frame 'link2' on the joint of that link",
     ),
     "formula of no frame": (
-        lambda data: data["tree"]["formulas"].update({"frames[9].translation[0]": "m"}),
-        "tree.formulas has 'frames[9].translation[0]', which is not a place of the tree",
+        lambda data: data["formulas"].update({"frames[9].translation[0]": "m"}),
+        "formulas has 'frames[9].translation[0]', which is not a place of the tree",
     ),
     "joint twice": (
         lambda data: data["joints"][1].update(name="joint1"),
@@ -138,12 +149,12 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
         "energies is not of the links, one for each",
     ),
     "formula of nothing": (
-        lambda data: data["tree"]["formulas"].update({"bodies[2].mass": "m"}),
-        "tree.formulas has 'bodies[2].mass', which is not a place of the tree",
+        lambda data: data["formulas"].update({"links[2].mass": "m"}),
+        "formulas has 'links[2].mass', which is not a place of the tree",
     ),
     "formula of a rotation": (
-        lambda data: data["tree"]["formulas"].update({"bodies[0].rotation[0][0]": "m"}),
-        "tree.formulas has 'bodies[0].rotation[0][0]', which is not a place",
+        lambda data: data["formulas"].update({"joints[0].rotation[0][0]": "m"}),
+        "formulas has 'joints[0].rotation[0][0]', which is not a place",
     ),
     "tie of an unknown kind": (
         lambda data: data["tree"]["ties"].append(TIE | {"kind": "weld"}),
@@ -209,6 +220,13 @@ def test_a_damaged_manifest_is_named(case: str, package: Path) -> None:
         check_package(package)
     assert str(caught.value).startswith(f"{package / 'manifest.json'} is damaged: {message}")
     assert str(caught.value).endswith("; generate the robot again")
+
+
+@pytest.mark.parametrize("robot", ["torso", str(DATA / "fourbar.toml"), f"{DATA / 'knee.osim'} loops"])
+def test_a_package_and_its_manifest_have_the_same_tree(
+    robot: str, directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType]
+) -> None:
+    assert Manifest.read(directory_of(robot)).tree == package_of(robot).tree.TREE
 
 
 def test_a_manifest_of_another_version_is_told_apart_from_a_damaged_one(package: Path) -> None:
@@ -300,7 +318,7 @@ def test_an_entry_that_the_package_has_otherwise_fails(case: str, package: Path)
     change, message = SLIPS[case]
     change_manifest(package, change, checksums=True)
     if not message:
-        with pytest.raises(LinkwiseError, match=r"joints\[2\].name is 'wrist', on which no body"):
+        with pytest.raises(LinkwiseError, match=r"joints\[2\].name is 'wrist', which no joint"):
             check_package(package)
         return
     *_, result = check_package(package)
@@ -312,13 +330,13 @@ NUMBERED = f'"schema": {SCHEMA}'
 TEXTS: dict[str, tuple[Callable[[str], str], str]] = {
     "digits": (
         lambda t: t.replace('"mass": 0.6', f'"mass": {"9" * 400}'),
-        "tree.bodies[0].mass is not a finite",
+        "tree.links[0].mass is not a finite",
     ),
     "count": (
         lambda t: t.replace('"operations": 3', f'"operations": {"9" * 5000}'),
         "links[0].operations is not a whole",
     ),
-    "power": (lambda t: t.replace('"mass": 0.6', '"mass": 1e999'), "tree.bodies[0].mass is not a finite"),
+    "power": (lambda t: t.replace('"mass": 0.6', '"mass": 1e999'), "tree.links[0].mass is not a finite"),
     "below 0": (
         lambda t: t.replace('"operations": 3', '"operations": -3'),
         "links[0].operations is not a whole",

@@ -15,9 +15,9 @@ from linkwise import (
     read_system,
     write_package,
 )
-from linkwise.analysis.show.page import poses
+from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.show.page import stick_figure
 from linkwise.package.load import import_package
-from linkwise.package.manifest import Manifest
 from linkwise.robot.curve import Curve
 from linkwise.robot.readers.osim.functions import piecewise_linear, simm_spline
 
@@ -69,18 +69,15 @@ def test_stiffness_along_curves_is_the_slope_of_each_links_torques(
 
 
 def test_the_stick_figure_stands_where_the_robot_does(directory_of: Callable[[str], Path]) -> None:
-    manifest = Manifest.read(directory_of(KNEE))
-    robot = import_package(directory_of(KNEE)).load("numpy")
-    q = np.random.default_rng(3).uniform(-1.5, 1.5, (7, robot.n))
-    assert manifest.tree is not None
-    _, centres = poses(manifest.tree.bodies, q)
-    for body, centre in zip(manifest.tree.bodies, centres.swapaxes(0, 1), strict=True):
-        if body.link in robot.link_names:
-            own = (*body.com, 1.0)
-            frame = next(f for f in manifest.tree.frames if f.name == body.link)
-            turned = np.array(frame.rotation).T @ (np.array(own[:3]) - np.array(frame.translation))
-            place = robot.kinematics.pose(q, body.link) @ (*turned, 1.0)
-            np.testing.assert_allclose(place[:, :3], centre, atol=1e-13)
+    opened, robot = load_robot(directory_of(KNEE)), import_package(directory_of(KNEE)).load("numpy")
+    q, tree = np.random.default_rng(3).uniform(-1.5, 1.5, (7, robot.n)), opened.tree
+    assert tree is not None
+    _, centres = stick_figure(opened, q)
+    for name, link in zip(robot.link_names, tree.links, strict=True):
+        frame = next(f for f in tree.frames if f.name == name)
+        turned = np.array(frame.rotation).T @ (np.array(link.com) - np.array(frame.translation))
+        place = robot.kinematics.pose(q, name) @ (*turned, 1.0)
+        np.testing.assert_allclose(place[:, :3], centres[:, link.joint], atol=1e-13)
 
 
 @needs_compiler

@@ -7,7 +7,7 @@ import pytest
 from helpers.urdf_text import joint, link, robot
 from linkwise import Options, read_system
 from linkwise.robot.robot import Robot
-from linkwise.symbolic.definition import rigid_tree
+from linkwise.symbolic.definition import joint_tree
 from linkwise.symbolic.system import RigidSystem, rigid_system
 
 ARM = robot(
@@ -101,6 +101,6 @@ def test_a_robot_made_in_python_has_a_frame_for_each_link(tmp_path: Path) -> Non
     found = read(tmp_path / "arm.urdf", ARM)
     made = replace(found, frames=())
     assert [(frame.name, frame.link) for frame in made.named_frames] == [("b", 0), ("c", 1)]
-    tree = rigid_tree(rigid_system(made))
+    tree = joint_tree(rigid_system(made))
     assert tree is not None
     assert [frame.name for frame in tree.frames] == ["b", "c"]

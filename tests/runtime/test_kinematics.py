@@ -111,9 +111,9 @@ def centres_in_files_axes(robot: Any) -> Any:
     """Yield the centre of mass of each link, in the axes of its frame from that frame's origin."""
     tree = robot.backend.tree
     at = {frame.name: frame for frame in tree.frames}
-    for link in tree.links:
-        frame = at[link.name]
-        yield np.array(frame.rotation).T @ (np.array(link.centre) - np.array(frame.translation))
+    for j, link in enumerate(tree.links):
+        frame = at[tree.link_name(j)]
+        yield np.array(frame.rotation).T @ (np.array(link.com) - np.array(frame.translation))
 
 
 @pytest.mark.parametrize("backend", BACKENDS)

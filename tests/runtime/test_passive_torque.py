@@ -63,10 +63,9 @@ def hand(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
 
 
 def test_an_error_is_held_against_all_that_a_share_is_summed_from(tmp_path: Path) -> None:
-    tree = Manifest.read(written(tmp_path, ["numpy"])).tree
-    assert tree is not None
+    passive = Manifest.read(written(tmp_path, ["numpy"])).passive
     motion = random_states(2, 20)
-    shares, sizes = passive_reference(tree.passive, States(*motion))
+    shares, sizes = passive_reference(passive, States(*motion))
     for share, size, own in zip(shares, sizes, by_hand(*motion), strict=True):
         np.testing.assert_allclose(share, own, rtol=1e-12, atol=1e-14)
         assert (size >= abs(share) * (1 - 1e-12)).all()

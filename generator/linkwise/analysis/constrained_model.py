@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.rule.joint_tree import JointTree
 
 from linkwise.analysis.term_rows import TermArrays, mirrored
 from linkwise.arrays import Array, Index
-from linkwise.package.entries import RigidTree
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class ConstrainedModel:
     layout: TermArrays
 
     @classmethod
-    def of(cls, model: Dynamics, tree: RigidTree) -> "ConstrainedModel":
+    def of(cls, model: Dynamics, tree: JointTree) -> "ConstrainedModel":
         """Return the model with the ties of its own description."""
         constraints = model.constraints
         independent = tuple(list(model.joint_names).index(name) for name in constraints.independent)
@@ -153,20 +153,20 @@ class ConstrainedKinematics:
         return self._projected(q, _array(self._own.load_torque(q, *load, **options)))
 
 
-def movers(tree: RigidTree, n: int, independent: Sequence[int]) -> tuple[frozenset[int], ...]:
+def movers(tree: JointTree, n: int, independent: Sequence[int]) -> tuple[frozenset[int], ...]:
     """Return, for each joint, the independent joints that may move it.
 
     Dependent joints in one row of the constraints, or in rows that share a dependent joint, form a group that
     all independent joints of its rows may move.
     """
     paths: list[frozenset[int]] = []
-    for body in tree.bodies:
-        before = frozenset[int]() if body.parent is None else paths[body.parent]
-        paths.append(before | {body.coordinate})
+    for joint in tree.joints:
+        before = frozenset[int]() if joint.parent is None else paths[joint.parent]
+        paths.append(before | {joint.coordinate})
 
     def path(frame: int) -> frozenset[int]:
-        body = tree.frames[frame].joint
-        return frozenset() if body is None else paths[body]
+        carrier = tree.frames[frame].joint
+        return frozenset() if carrier is None else paths[carrier]
 
     rows = [path(tie.first) ^ path(tie.second) for tie in tree.ties]
     rows += [frozenset(k for k, _ in coupling.terms) for coupling in tree.couplings]

@@ -87,9 +87,8 @@ def _place(text: str, numbers: Sequence[str]) -> tuple[float, float, float]:
 
 def _centre(robot: OpenedRobot, kinematics: Any, q: Array, qd: Array) -> tuple[Array, Array]:
     """Return J and J̇ of the centre of mass of links and payloads, each by its mass, (S, 3, n)."""
-    manifest = robot.package.manifest
-    links = {link.name for link in manifest.links}
-    own = sum(body.mass for body in manifest.tree.bodies if body.link in links) if manifest.tree else 0.0
+    tree = robot.package.manifest.tree
+    own = sum(link.mass for link in tree.links) if tree else 0.0
     whole = own + sum(payload.mass for payload in robot.payloads)
     jacobian = own / whole * kinematics.centre_of_mass_jacobian(q)
     rate = own / whole * kinematics.centre_of_mass_jacobian_rate(q, qd)

@@ -161,7 +161,7 @@ class Job:
         values: all samples, (rows, S)
         """
         robot = self.decomposer.robot
-        poles = pole_warnings(robot.bodies, robot.joints, self.samples)
+        poles = pole_warnings(robot.tree, robot.joints, self.samples)
         warnings = (*self.samples.warnings, *self._twice_borne(), *poles, *self._never_on(done))
         return Analysis(
             **vars(done),
@@ -198,7 +198,7 @@ class Job:
         held = () if robot.contacts is None else zip(robot.ground.names, robot.ground.contacts, strict=True)
         for name, contact in held:
             for load in self.decomposer.loads:
-                if load.acts_on.frame.joint == robot.body_of(contact.frame):
+                if load.acts_on.frame.joint == robot.joint_of(contact.frame):
                     yield (
                         f"load {load.name!r} and contact {name!r} act on one body; what was measured at the"
                         " contact is given with --contact-loads"

@@ -15,7 +15,7 @@ from linkwise_runtime.chosen_names import known_as, nearest_first
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.file_joints import FileJoint, Order
 from linkwise_runtime.qpos_motion import Qpos
-from linkwise_runtime.rule.joint_tree import TreeFrame
+from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
 from linkwise_runtime.structure import PassiveJoint, Structure
 
 from linkwise.analysis.constrained_model import ConstrainedModel
@@ -25,7 +25,6 @@ from linkwise.analysis.settings import Payload
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, without_ending
 from linkwise.oracle.newton_euler import NewtonEuler
-from linkwise.package.entries import BodyEntry
 from linkwise.package.load import Package, open_package
 from linkwise.package.manifest import FILE
 from linkwise.package.share_word import share_word
@@ -47,8 +46,8 @@ class OpenedRobot:
     links: tuple[str, ...]
     backend: str
     model: Dynamics
-    bodies: tuple[BodyEntry, ...] | None
-    """Rigid bodies, parents before children; None where the energies were written by hand."""
+    tree: JointTree | None
+    """Joints, links and frames; None where the energies were written by hand."""
     up: tuple[float, float, float]
     """Direction against gravity, in the base frame; z for a robot without gravity."""
     manifest_sha256: str
@@ -101,8 +100,7 @@ class OpenedRobot:
     @property
     def file_joints(self) -> tuple[FileJoint, ...]:
         """Moving joints of the file, where some are several joints here or Pinocchio's order differs."""
-        found = self.package.manifest.file_joints
-        return tuple(FileJoint(one.name, one.kind, one.joints) for one in found)
+        return self.package.manifest.file_joints
 
     def qpos(self, order: Order, names: Sequence[str] | None) -> Qpos:
         """Return the map from a simulator's positions to the joints.
@@ -194,11 +192,10 @@ class OpenedRobot:
         assert self.contacts is not None
         return self.contacts
 
-    def body_of(self, frame: object) -> int | None:
-        """Return the number of the body that carries a frame, None for one on the ground."""
-        tree = self.package.manifest.tree
-        assert tree is not None
-        return next(one.joint for one in tree.frames if one.name == frame)
+    def joint_of(self, frame: object) -> int | None:
+        """Return the index of the tree's joint that moves a frame, None for one on the ground."""
+        assert self.tree is not None
+        return next(one.joint for one in self.tree.frames if one.name == frame)
 
     @property
     def contact_rows(self) -> slice:
@@ -229,12 +226,12 @@ def load_robot(directory: Path, backend: str | None = None) -> OpenedRobot:
         tuple(model.link_names),
         chosen,
         model if tied is None else cast(Dynamics, tied),
-        tree.bodies if tree is not None else None,
+        tree,
         _up(tree.gravity if tree is not None else None),
         hashlib.sha256((directory / FILE).read_bytes()).hexdigest(),
         package,
         NewtonEuler(manifest, tree) if tree is not None else None,
-        tree.passive if tree is not None else (),
+        manifest.passive,
         constrained=tied,
     )
 

@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
-from linkwise_runtime.rule.joint_tree import TreeFrame
+from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame, TreeJoint, TreeLink
 
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.opened_robot import OpenedRobot, body_frame, told_apart
@@ -15,20 +15,21 @@ from linkwise.analysis.term_rows import NAMES, TermArrays
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.oracle.newton_euler import NewtonEuler
-from linkwise.package.entries import BodyEntry, LinkEntry, RigidTree
+from linkwise.package.entries import LinkEntry
 from linkwise.package.load import Package
 
 UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+ORIGIN = (0.0, 0.0, 0.0)
 NOTHING = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 @dataclass(frozen=True)
 class _Placed:
-    """A payload, the link j that carries it, that link's body, and its place in that link's frame, in m."""
+    """A payload, the link j that carries it, the joint that moves that, and its place behind it, in m."""
 
     payload: Payload
     link: int
-    body: int
+    joint: int
     place: tuple[float, float, float]
 
 
@@ -53,28 +54,28 @@ def with_payloads(robot: OpenedRobot, payloads: Sequence[Payload]) -> OpenedRobo
         robot,
         links=(*robot.links, *(payload.title for payload in payloads)),
         model=cast(Dynamics, PayloadModel.of(robot.model, _models(robot.package, tree, placed))),
-        bodies=loaded.bodies,
+        tree=loaded,
         recursion=_recursion(robot.package, loaded, placed),
         payloads=tuple(payloads),
     )
 
 
-def _placed(robot: OpenedRobot, tree: RigidTree, payload: Payload) -> _Placed:
+def _placed(robot: OpenedRobot, tree: JointTree, payload: Payload) -> _Placed:
     frame: TreeFrame = body_frame("payload on", payload.body, robot)
-    body = frame.joint
-    if body is None:
+    joint = frame.joint
+    if joint is None:
         raise LinkwiseError(f"payload on {payload.body!r}: that stands on the ground; joints do not carry it")
-    link = tree.bodies[body].link
+    link = tree.joints[joint].link
     if link not in robot.links:
         raise LinkwiseError(
             f"payload on {payload.body!r}: {link!r} has no mass in the robot's file, so that it is not a"
             " link; give it one there, or name another body"
         )
     x, y, z = np.array(frame.rotation) @ np.array(payload.point) + np.array(frame.translation)
-    return _Placed(payload, robot.links.index(link), body, (float(x), float(y), float(z)))
+    return _Placed(payload, robot.links.index(link), joint, (float(x), float(y), float(z)))
 
 
-def _models(package: Package, tree: RigidTree, placed: Sequence[_Placed]) -> list[tuple[int, Dynamics]]:
+def _models(package: Package, tree: JointTree, placed: Sequence[_Placed]) -> list[tuple[int, Dynamics]]:
     """Return for each payload its link, and the package with nothing but that payload on that link."""
     backend = next((name for name in ("numpy", "torch") if name in package.backends), None)
     if backend is None:
@@ -95,31 +96,18 @@ def _models(package: Package, tree: RigidTree, placed: Sequence[_Placed]) -> lis
     return models
 
 
-def _extended(tree: RigidTree, placed: Sequence[_Placed]) -> RigidTree:
-    """Return the tree with each payload as a body on a joint that never moves, as its ratio is 0."""
-    masses = tuple(
-        BodyEntry(
-            link=at.payload.title,
-            parent=at.body,
-            joint=at.payload.title,
-            kind="revolute",
-            coordinate=tree.bodies[at.body].coordinate,
-            ratio=0.0,
-            rotation=UPRIGHT,
-            translation=at.place,
-            mass=at.payload.mass,
-            com=(0.0, 0.0, 0.0),
-            inertia=NOTHING,
-        )
-        for at in placed
-    )
-    frames = tuple(
-        TreeFrame(mass.link, at, UPRIGHT, (0.0, 0.0, 0.0)) for at, mass in enumerate(masses, len(tree.bodies))
-    )
-    return replace(tree, bodies=(*tree.bodies, *masses), frames=(*tree.frames, *frames))
+def _extended(tree: JointTree, placed: Sequence[_Placed]) -> JointTree:
+    """Return the tree with each payload as a link on a joint that never moves, as its ratio is 0."""
+    joints, links, frames = list(tree.joints), list(tree.links), list(tree.frames)
+    for at in placed:
+        name, coordinate = at.payload.title, tree.joints[at.joint].coordinate
+        frames.append(TreeFrame(name, len(joints), UPRIGHT, ORIGIN))
+        links.append(TreeLink(len(joints), at.payload.mass, ORIGIN, NOTHING))
+        joints.append(TreeJoint(name, name, at.joint, "revolute", coordinate, 0.0, UPRIGHT, at.place))
+    return replace(tree, joints=tuple(joints), links=tuple(links), frames=tuple(frames))
 
 
-def _recursion(package: Package, tree: RigidTree, placed: Sequence[_Placed]) -> NewtonEuler:
+def _recursion(package: Package, tree: JointTree, placed: Sequence[_Placed]) -> NewtonEuler:
     links = package.manifest.links
     added = (LinkEntry(at.payload.title, links[at.link].path, 0) for at in placed)
     return NewtonEuler(replace(package.manifest, links=(*links, *added), tree=tree), tree)

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 from linkwise_runtime.chosen_names import end_of_path
-from linkwise_runtime.rule.joint_tree import TreeCurve
+from linkwise_runtime.rule.joint_tree import JointTree, TreeCurve, TreeJoint
 from numpy.polynomial import polynomial
 
 from linkwise.analysis.column_matching import (
@@ -28,7 +28,6 @@ from linkwise.analysis.logs.checks import require_finite
 from linkwise.analysis.settings import Reading
 from linkwise.arrays import Array
 from linkwise.errors import within
-from linkwise.package.entries import BodyEntry
 from linkwise.package.manifest import Manifest
 from linkwise.progress import Progress
 
@@ -242,23 +241,21 @@ NEAR = 10.0
 AT_ONCE = 1 << 16
 
 
-def pole_warnings(
-    bodies: Sequence[BodyEntry] | None, joints: Sequence[str], samples: Samples
-) -> Iterator[str]:
+def pole_warnings(tree: JointTree | None, joints: Sequence[str], samples: Samples) -> Iterator[str]:
     """Yield a warning for three successive turns about one point that a log brings near their pole.
 
     With z1, z2, z3 their axes, |z1 . z2 x z3| is largest where the middle turn is a right angle away from
     the pole. Nearer, an error of an orientation is an error of the outer angles by the inverse of that
     number, as a fraction of its largest.
     """
-    for first, middle, last in _triples(bodies or ()):
+    for first, middle, last in _triples(tree) if tree else ():
         angles = samples.q[:, middle.coordinate]
         places = range(0, len(angles), AT_ONCE)
         sizes = [_apart(middle, last, np.asarray(angles[at : at + AT_ONCE])) for at in places]
         least = [(float(part.min()), at + int(part.argmin())) for at, part in zip(places, sizes, strict=True)]
         size, row = min(least, default=(1.0, 0))
         if size * NEAR < 1.0:
-            turns = [repr(joints[body.coordinate]) for body in (first, middle, last)]
+            turns = [repr(joints[joint.coordinate]) for joint in (first, middle, last)]
             yield _near(turns, size, float(samples.time[row]))
 
 
@@ -272,20 +269,20 @@ def _near(turns: Sequence[str], size: float, time: float) -> str:
     )
 
 
-def _triples(bodies: Sequence[BodyEntry]) -> Iterator[tuple[BodyEntry, BodyEntry, BodyEntry]]:
+def _triples(tree: JointTree) -> Iterator[tuple[TreeJoint, TreeJoint, TreeJoint]]:
     """Yield three turns that follow each other at one point, with no mass between."""
-    for last in bodies:
-        middle = None if last.parent is None else bodies[last.parent]
-        if middle is None or middle.parent is None:
+    heavy = {link.joint for link in tree.links}
+    for last in tree.joints:
+        middle = None if last.parent is None else tree.joints[last.parent]
+        if middle is None or middle.parent is None or heavy & {last.parent, middle.parent}:
             continue
-        first = bodies[middle.parent]
-        alike = all(body.kind == "revolute" and body.curve is None for body in (first, middle, last))
-        together = not any((*middle.translation, *last.translation, first.mass, middle.mass))
-        if alike and together:
+        first = tree.joints[middle.parent]
+        alike = all(joint.kind == "revolute" and joint.curve is None for joint in (first, middle, last))
+        if alike and not any((*middle.translation, *last.translation)):
             yield first, middle, last
 
 
-def _apart(middle: BodyEntry, last: BodyEntry, angles: Array) -> Array:
+def _apart(middle: TreeJoint, last: TreeJoint, angles: Array) -> Array:
     """Return |z1 . z2 x z3| (S,) at angles (S,) of the middle turn, as a fraction of its largest value.
 
     Axes are those of the first turn.

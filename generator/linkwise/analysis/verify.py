@@ -6,7 +6,7 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
-from linkwise_runtime.rule.joint_tree import TreeFrame
+from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
 
 from linkwise.analysis.contacts.ground import GroundContacts
 from linkwise.analysis.loads.placed import PlacedLoad
@@ -17,7 +17,6 @@ from linkwise.errors import LinkwiseError
 from linkwise.oracle.contacts import contact_rows
 from linkwise.oracle.loop_equations import LoopEquations
 from linkwise.oracle.newton_euler import NewtonEuler
-from linkwise.package.entries import RigidTree
 
 LIMIT = 1e-9
 """A relative error above this is not rounding: the package does not compute what it says."""
@@ -205,7 +204,7 @@ RANK = 1e-11
 
 def _left(
     recursion: NewtonEuler,
-    tree: RigidTree,
+    tree: JointTree,
     ground: GroundContacts,
     torque: Array,
     q: Array,

@@ -75,7 +75,7 @@ def subjects(package: Package, samples: int) -> Iterator[Subject]:
     yield first
     if values:
         # Every parameter changed a little, so that no two are equal and none is zero.
-        values = changed_values(manifest.parameters, manifest.tree)
+        values = changed_values(manifest.parameters, manifest)
         loaded = {way: package.load(way.backend, values, way.kernel) for way in loaded}
         others = ", other parameters"
         yield replace(first, label=others, parameters=values, loaded=loaded, missing=(), headers=())

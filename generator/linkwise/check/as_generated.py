@@ -164,13 +164,12 @@ def _made_otherwise(package: Package) -> Iterator[str]:
         for link, names, values in BODY.findall(found)
     ]
     links = {link.name: link.path for link in manifest.links}
-    passive = manifest.tree.passive if manifest.tree else ()
-    numbers = links, robot.nonquadratic, manifest.parameters, bodies, passive
+    numbers = links, robot.nonquadratic, manifest.parameters, bodies, manifest.passive
     names = names_text(manifest.name, manifest.joints, *numbers, manifest.file_joints, manifest.energies)
     if written("names.py", names) != found:
         yield "names.py"
     if "tree.py" in manifest.files and manifest.tree is not None:
-        text = tree_text(manifest.tree, list(links), list(manifest.parameters))
+        text = tree_text(manifest.tree, manifest.formulas, list(manifest.parameters))
         if written("tree.py", text) != (directory / "tree.py").read_bytes().decode():
             yield "tree.py"
 

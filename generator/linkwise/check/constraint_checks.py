@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.rule.joint_tree import JointTree
 
 from linkwise.arrays import Array
 from linkwise.check.compare import Entries, Result, compare, skipped
@@ -16,7 +17,6 @@ from linkwise.oracle.loop_reference import LoopReference
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.rounding import measure_rounding
 from linkwise.oracle.states import States
-from linkwise.package.entries import RigidTree
 from linkwise.package.manifest import Manifest
 
 TOLD = "in closed loops against least squares"
@@ -116,8 +116,8 @@ TRIED = 6
 class HeldContacts:
     """Contacts of each kind on the frame that most joints move, at states in which ties close."""
 
-    def __init__(self, manifest: Manifest, tree: RigidTree, states: States) -> None:
-        at = max((f for f in tree.frames if f.joint is not None), key=lambda f: _depth(tree, f.joint))
+    def __init__(self, manifest: Manifest, tree: JointTree, states: States) -> None:
+        at = max((f for f in tree.frames if f.joint is not None), key=lambda f: len(tree.chain(f.joint)))
         self.manifest, self.tree, self.frame = manifest, tree, tree.frames.index(at)
         self.states = states.at(slice(0, TRIED))
         self._kept: dict[tuple[str, tuple[int, ...]], _Expected | None] = {}
@@ -134,7 +134,7 @@ class HeldContacts:
             told = "each is next to a singular position, or to a singular mass matrix, at every state"
             yield skipped(f"{name}: contacts", told)
 
-    def equations(self, kind: str, tree: RigidTree) -> ContactEquations:
+    def equations(self, kind: str, tree: JointTree) -> ContactEquations:
         """Return the contact equations of a tree, which may be a noisy one."""
         recursion = NewtonEuler(self.manifest, tree)
         ties = LoopEquations(recursion, tree) if tree.tied else None
@@ -167,15 +167,11 @@ class HeldContacts:
         given = _Given(self.states.at(clear), list(own), rest)
         condition = condition_of(rows[clear], rest)
 
-        def answers(tree: RigidTree) -> dict[str, Array]:
+        def answers(tree: JointTree) -> dict[str, Array]:
             return _answers(self.equations(held.kind, tree), given)
 
         values, scales = measure_rounding(answers, self.tree, condition**2)
         return _Expected(given, given.moved(values["velocity"], values["acceleration"]), values, scales)
-
-
-def _depth(tree: RigidTree, body: int | None) -> int:
-    return 0 if body is None else 1 + _depth(tree, tree.bodies[body].parent)
 
 
 @dataclass(frozen=True)

@@ -57,20 +57,19 @@ def _has(manifest: Manifest, name: str) -> bool:
     tree = manifest.tree
     if tree is None or (tree.tied and name.startswith("forward_dynamics")):
         return False
-    return bool(tree.passive) or name not in ("passive_torque", "forward_dynamics_of_links")
+    return bool(manifest.passive) or name not in ("passive_torque", "forward_dynamics_of_links")
 
 
 def control_calls(
     call: Call, function: Prototype, manifest: Manifest, reference: Reference, frames: FrameReference | None
 ) -> Iterator[Entries]:
     """Yield results of one of these functions."""
-    passive = manifest.tree.passive if manifest.tree is not None else ()
     if function.short == "mass_matrix":
         yield from _masses(call, function, reference)
     elif function.short == "passive_torque":
-        yield from _passive_torques(call, function, reference, passive)
+        yield from _passive_torques(call, function, reference, manifest.passive)
     elif function.counted != "frame":
-        own = passive if function.short == "forward_dynamics" else ()
+        own = manifest.passive if function.short == "forward_dynamics" else ()
         yield from _accelerations(call, function, reference, own)
     elif frames is not None and manifest.tree is not None:
         numbers = {frame.name: f for f, frame in enumerate(manifest.tree.frames)}
@@ -190,14 +189,13 @@ def impedance_calls(
 ) -> Iterator[Entries]:
     """Yield torques of natural impedance on a motion without error: inverse dynamics and passive torques."""
     states, none = reference.states, dict.fromkeys(("wanted", "q_d", "task", "external"))
-    passive = manifest.tree.passive if manifest.tree is not None else ()
     for row in range(0, len(states.q), max(1, len(states.q) // MOST)):
         state = states.at(row)
         given: dict[str, Any] = {"q": state.q, "qd": state.qd, "qd_d": state.qd, "qdd_d": state.qdd, **none}
         found = call(function, 0, given, {"tau": state.q.shape[-1]}, row % 2)["tau"]
         value, scale = (kept["tau"][row].sum(-1) for kept in (reference.values, reference.scales))
-        if passive:
-            taken, sizes = passive_reference(passive, states.at(np.array([row])))
+        if manifest.passive:
+            taken, sizes = passive_reference(manifest.passive, states.at(np.array([row])))
             friction = SHARES.index("friction")  # its compensation is not asked for
             value = value + (taken.sum(0) - taken[friction])[0]
             scale = scale + sizes.sum(0)[0]

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.rule.joint_tree import JointTree
 
 from linkwise.arrays import Array, Index
 from linkwise.check.compare import Entries, Result, compare
@@ -17,7 +18,6 @@ from linkwise.oracle.magnitudes import Magnitudes
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import COMPLEX_STEP, TOLERANCE
 from linkwise.oracle.states import States
-from linkwise.package.entries import RigidTree
 from linkwise.package.manifest import Manifest
 
 STATES = 12
@@ -44,7 +44,7 @@ class FrameReference:
     """Centre of mass, its Jacobian and rate; None for links whose masses cancel."""
 
 
-def frame_reference(manifest: Manifest, tree: RigidTree, states: States) -> FrameReference:
+def frame_reference(manifest: Manifest, tree: JointTree, states: States) -> FrameReference:
     """Return the recursion's answers at some of the states."""
     states = states.at(chosen_rows(len(states.q)))
     count = len(tree.frames)
@@ -97,13 +97,13 @@ def _columns(
 
 
 def _centre(
-    recursion: NewtonEuler, sizes: Magnitudes, tree: RigidTree, states: States
+    recursion: NewtonEuler, sizes: Magnitudes, tree: JointTree, states: States
 ) -> tuple[Quantity, Quantity, Quantity] | None:
-    masses = np.array([tree.bodies[at].mass for at in recursion.links])
+    masses = np.array([link.mass for link in tree.links])
     total, whole = masses.sum(), np.abs(masses).sum()
     if abs(total) <= TOLERANCE * whole:
         return None
-    seen = [(at, np.array(tree.bodies[at].com)) for at in recursion.links]
+    seen = [(link.joint, np.array(link.com)) for link in tree.links]
 
     def velocity(*motion: Array) -> Array:
         speed: Array = masses @ recursion.points(seen, *motion)[0][..., 3:] / total

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.rule.joint_tree import JointTree
 from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.arrays import Array
@@ -12,7 +13,6 @@ from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.sum_checks import is_tied, passive_reference, regular
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import States
-from linkwise.package.entries import RigidTree
 
 WIDTH = 0.5
 """Width `friction_width` of the friction that is compensated."""
@@ -21,7 +21,8 @@ WIDTH = 0.5
 def impedance_calls(
     name: str,
     model: Dynamics,
-    tree: RigidTree | None,
+    tree: JointTree | None,
+    joints: Sequence[PassiveJoint],
     reference: Reference,
     natural: Callable[..., Any],
 ) -> Iterator[Result]:
@@ -37,7 +38,6 @@ def impedance_calls(
         return
     # impedance needs a positive definite M, which negative masses do not give
     positive = rows[np.linalg.eigvalsh(reference.values["c2"][rows].sum(2)).min(-1) > 0.0]
-    joints = () if tree is None else tree.passive
     entries = [_cancelled(model, joints, reference, rows)]
     if positive.size:
         links = len(model.link_names)
@@ -46,13 +46,13 @@ def impedance_calls(
     yield compare(f"{name}: controllers make the impedance that is asked for", entries, reference.tolerance)
 
 
-def _are_masses(tree: RigidTree | None) -> bool:
+def _are_masses(tree: JointTree | None) -> bool:
     """Return whether no link has a negative mass or principal moment, so that each may be kept in part."""
     if tree is None:
         return False
-    moments = np.linalg.eigvalsh([body.inertia for body in tree.bodies])
+    moments = np.linalg.eigvalsh([link.inertia for link in tree.links])
     return (
-        bool((moments[:, 0] >= -1e-9 * moments[:, 2]).all()) and min(body.mass for body in tree.bodies) >= 0.0
+        bool((moments[:, 0] >= -1e-9 * moments[:, 2]).all()) and min(link.mass for link in tree.links) >= 0.0
     )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.rule.joint_tree import JointTree
 
 from linkwise.arrays import Array, Index
 from linkwise.check.compare import Entries, Result, compare
@@ -15,7 +16,6 @@ from linkwise.oracle.magnitudes import Magnitudes
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import TOLERANCE, Reference, by_unit
 from linkwise.oracle.states import NUMBERS, States
-from linkwise.package.entries import RigidTree
 from linkwise.package.manifest import Manifest
 
 MOST = 12
@@ -24,7 +24,7 @@ MOMENTS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 """Index of Ixx, Ixy, Iyy, Ixz, Iyz, Izz, in the order of the regressor."""
 
 
-def regressor_reference(manifest: Manifest, tree: RigidTree, states: States) -> Reference:
+def regressor_reference(manifest: Manifest, tree: JointTree, states: States) -> Reference:
     """Return Y of tau, c2, c1 and g, at the first few states."""
     n, links = len(manifest.joints), len(manifest.links)
     few = states.at(slice(max(1, min(MOST, NUMBERS // (10 * n * n * links)))))
@@ -68,10 +68,10 @@ def _unit_bodies() -> Iterator[tuple[float, Any, Any]]:
         yield 0.0, (0.0, 0.0, 0.0), inertia
 
 
-def _rows(manifest: Manifest, tree: RigidTree, states: States) -> tuple[dict[str, Array], dict[str, Array]]:
+def _rows(manifest: Manifest, tree: JointTree, states: States) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return tau, c2, c1 and g, and bounds of what they are summed from, where links carry each unit body."""
     units = [
-        replace(tree.bodies[0], mass=mass, com=com, inertia=inertia) for mass, com, inertia in _unit_bodies()
+        replace(tree.links[0], mass=mass, com=com, inertia=inertia) for mass, com, inertia in _unit_bodies()
     ]
     carried = [units] * len(manifest.links)
     torque = partial(NewtonEuler(manifest, tree).torques_of, carried)

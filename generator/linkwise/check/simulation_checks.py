@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.rule.joint_tree import JointTree
 
 from linkwise.arrays import Array, Mask
 from linkwise.check.compare import Entries, Result, compare, skipped
@@ -14,7 +15,6 @@ from linkwise.oracle.magnitudes import Magnitudes
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.rounding import measure_rounding
 from linkwise.oracle.states import States
-from linkwise.package.entries import RigidTree
 from linkwise.package.manifest import Manifest
 
 TRIED = 8
@@ -53,7 +53,7 @@ class _NoMotionError(Exception):
     """Reason why there is no motion, where ties do not agree or cannot be closed."""
 
 
-def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> SimulatedMotion | str:
+def simulated_motion(manifest: Manifest, tree: JointTree, states: States) -> SimulatedMotion | str:
     """Return a motion from the calmest of the first states in which ties close, or why there is none.
 
     Its torques are those of a modest acceleration: any others would throw a light link away.
@@ -64,11 +64,11 @@ def simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Sim
         return str(error)
 
 
-def _simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> SimulatedMotion | str:
+def _simulated_motion(manifest: Manifest, tree: JointTree, states: States) -> SimulatedMotion | str:
     recursion, n = NewtonEuler(manifest, tree), states.q.shape[1]
     own = list(tree.independent) if tree.tied else list(range(n))
 
-    def motion(tree: RigidTree, tau: Array) -> Rates:
+    def motion(tree: JointTree, tau: Array) -> Rates:
         noisy = NewtonEuler(manifest, tree)
         return _tied(noisy, tree, tau) if tree.tied else _free(noisy, tau)
 
@@ -90,7 +90,7 @@ def _simulated_motion(manifest: Manifest, tree: RigidTree, states: States) -> Si
     qdd = np.random.default_rng(9).uniform(-1.0, 1.0, q.shape)  # the states' own may be zero
     tau = recursion.torque(q, qd, qdd)
 
-    def ends(tree: RigidTree) -> dict[str, Array]:
+    def ends(tree: JointTree) -> dict[str, Array]:
         found = _integrated(motion(tree, tau), (q, qd[:, own], np.zeros(1)))
         return dict(zip(("q", "qd", "work"), found, strict=True))
 
@@ -150,7 +150,7 @@ def _free(recursion: NewtonEuler, tau: Array) -> Rates:
     return motion
 
 
-def _tied(recursion: NewtonEuler, tree: RigidTree, tau: Array) -> Rates:
+def _tied(recursion: NewtonEuler, tree: JointTree, tau: Array) -> Rates:
     ties, own = LoopEquations(recursion, tree), list(tree.independent)
     rest = [k for k in range(tau.shape[1]) if k not in own]
 

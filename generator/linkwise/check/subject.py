@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from typing import NamedTuple, TypeVar
 
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.rule.joint_tree import JointTree
 from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.arrays import Array
@@ -28,7 +29,6 @@ from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import Reference, body_reference, states_of_torques, torque_reference
 from linkwise.oracle.states import States, affordable, random_states
 from linkwise.own_process import ProcessLimits, in_own_process
-from linkwise.package.entries import RigidTree
 from linkwise.package.load import Package
 from linkwise.package.manifest import Manifest
 
@@ -112,10 +112,10 @@ class Subject:
         return self.package.manifest
 
     @cached_property
-    def tree(self) -> RigidTree | None:
+    def tree(self) -> JointTree | None:
         """Rigid bodies with these parameters; None for energies."""
         tree = self.manifest.tree
-        return None if tree is None else tree_with(tree, self.parameters)
+        return None if tree is None else tree_with(tree, self.manifest.formulas, self.parameters)
 
     @property
     def tied(self) -> bool:
@@ -125,7 +125,7 @@ class Subject:
     @property
     def passive(self) -> tuple[PassiveJoint, ...]:
         """Passive properties of the joints."""
-        return () if self.tree is None else self.tree.passive
+        return self.manifest.passive
 
     @cached_property
     def functions(self) -> CFunctions | None:

@@ -125,11 +125,11 @@ def _states(name: str, s: Subject) -> Iterable[Result]:
 def _bodies(name: str, s: Subject) -> Iterable[Result]:
     unphysical = bool(s.manifest.request.get("allow_unphysical"))
     bodies = s.package.module.ROBOT.bodies
-    return [check_bodies(name, there(s.manifest.tree), bodies, s.parameters, unphysical)]
+    return [check_bodies(name, s.manifest, bodies, s.parameters, unphysical)]
 
 
 def _numbers_of_bodies(name: str, s: Subject) -> Iterable[Result]:
-    return [check_numbers(name, there(s.manifest.tree), s.parameters)]
+    return [check_numbers(name, s.manifest, s.parameters)]
 
 
 def _refused(name: str, _: BackendAnswers) -> Iterable[Result]:
@@ -160,7 +160,7 @@ def _induced(name: str, a: BackendAnswers) -> Iterable[Result]:
 
 def _controllers(name: str, a: BackendAnswers) -> Iterable[Result]:
     s = a.subject
-    return impedance_calls(name, a.model, s.tree, s.reference, s.package.module.Natural)
+    return impedance_calls(name, a.model, s.tree, s.passive, s.reference, s.package.module.Natural)
 
 
 CHECKS: tuple[Check[Any], ...] = (

@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 from typing import Annotated, Any
 
 import typer
+from linkwise_runtime.rule.joint_tree import JointTree
 
 from linkwise import pipeline
 from linkwise.cli import Json, counted
@@ -12,10 +13,9 @@ from linkwise.cli.flags import RobotName, takes, tell_run
 from linkwise.cli.inspect_page import SUBJECTS, page
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, listed, printable
-from linkwise.package.entries import RigidTree
 from linkwise.robot import Options, kept_apart, left_out
 from linkwise.robot.robot import Parameter
-from linkwise.symbolic.definition import joint_entries, rigid_tree
+from linkwise.symbolic.definition import joint_entries, joint_tree
 from linkwise.symbolic.system import EnergySystem, System
 
 LESS = "…"
@@ -46,7 +46,7 @@ def inspect(
     elif details:
         print(table(data))
     else:
-        tree = rigid_tree(system)
+        tree = joint_tree(system)
         ground = [frame.name for frame in tree.frames if frame.joint is None] if tree else None
         print(page(data, ground, _joint, _moved_link, _constraint))
 
@@ -71,12 +71,12 @@ def inspection(system: System, details: bool = False, refused: str = "") -> dict
     With `details` frames and each joint's notes are there too. `refused` says why `generate` refuses the
     robot.
     """
-    tree = rigid_tree(system)
+    tree = joint_tree(system)
     notes = system.notes
     if not details:
         others = (note for note in notes if note.kind not in ("left out", "passive"))
         notes = (*others, *kept_apart(notes), *left_out(notes))
-    mass = {body.link: body.mass for body in tree.bodies} if tree else {}
+    mass = {tree.link_name(j): link.mass for j, link in enumerate(tree.links)} if tree else {}
     return {
         "name": system.name,
         "joints": [asdict(joint) for joint in joint_entries(system)],
@@ -96,7 +96,7 @@ def inspection(system: System, details: bool = False, refused: str = "") -> dict
     }
 
 
-def _constraints(tree: RigidTree, joints: Sequence[str]) -> dict[str, Any]:
+def _constraints(tree: JointTree, joints: Sequence[str]) -> dict[str, Any]:
     """Return the constraints, and the joints that then move all others; empty without constraints."""
     if not tree.independent:
         return {}
@@ -116,10 +116,10 @@ def _constraints(tree: RigidTree, joints: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _frames(tree: RigidTree) -> list[dict[str, str | None]]:
+def _frames(tree: JointTree) -> list[dict[str, str | None]]:
     """Return the frames that kinematics knows by name, each with its moving link; None for the ground."""
     return [
-        {"name": frame.name, "link": None if frame.joint is None else tree.bodies[frame.joint].link}
+        {"name": frame.name, "link": None if frame.joint is None else tree.joints[frame.joint].link}
         for frame in tree.frames
     ]
 

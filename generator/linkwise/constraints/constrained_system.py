@@ -13,7 +13,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.notes import BESIDE, LEAST, Note
 from linkwise.robot.robot import Coupling, Robot
-from linkwise.symbolic.definition import rigid_tree
+from linkwise.symbolic.definition import joint_tree
 from linkwise.symbolic.system import RigidSystem, System
 
 
@@ -28,7 +28,7 @@ def constrained_system(system: System) -> System:
     robot = system.robot
     if not (robot.ties or robot.couplings):
         return system
-    tree = rigid_tree(system)
+    tree = joint_tree(system)
     assert tree is not None  # rigid links always have one
     loops = closed_loops(tree, len(robot.coordinates))
     chosen = _independent(robot, loops.rows)

@@ -13,15 +13,10 @@ from linkwise_runtime.constraints.chosen_constraints import (
 )
 from linkwise_runtime.constraints.closed_places import open_by
 from linkwise_runtime.constraints.held_frames import held_by
-from linkwise_runtime.rule.joint_tree import (
-    JointTree,
-    TreeJoint,
-    TreeLink,
-)
+from linkwise_runtime.rule.joint_tree import JointTree
 
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.package.entries import RigidTree
 
 FAR = 0.3
 """Positions whose least singular value of A_d is below this part of the best one's count as next to
@@ -53,14 +48,13 @@ def _share(rows: Array, dependent: Sequence[int]) -> float:
     return float(np.linalg.svd(rows[:, dependent], compute_uv=False)[-1]) / most if most else 0.0
 
 
-def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
+def closed_loops(tree: JointTree, joints: int) -> ClosedLoops:
     """Return closed positions, and A where it has its largest rank.
 
     Raises LinkwiseError, which names what stays open.
     """
-    moved = joint_tree(tree)
-    held = held_by(moved, ())
-    starts, equations = random_starts(joints), TieEquations(moved, joints, held)
+    held = held_by(tree, ())
+    starts, equations = random_starts(joints), TieEquations(tree, joints, held)
     found, closed = best_closing(equations, starts)
     couplings = [coupling.name for coupling in tree.couplings]
     owners = (*(one.name for one in held for _ in one.row_names), *couplings)
@@ -73,7 +67,7 @@ def closed_loops(tree: RigidTree, joints: int) -> ClosedLoops:
     return ClosedLoops(there, found.comparable, owners)
 
 
-def _check_slopes(tree: RigidTree, found: Closing) -> None:
+def _check_slopes(tree: JointTree, found: Closing) -> None:
     """Raise LinkwiseError for a coupling whose sum has no slope where it is zero, as a sum of squares."""
     for coupling, slope in zip(tree.couplings, found.slopes, strict=True):
         size = min(max(map(abs, factors[1:])) for _, factors in coupling.terms)
@@ -90,22 +84,4 @@ def _left_open(found: Closing, owners: tuple[str, ...], rows: list[str], tries: 
     return (
         f"constraint {owners[worst]!r} never closes: from {tries} positions that were tried, "
         f"{open_by(found.open_by, rows[worst])} are left at best; correct its places, or what it ties"
-    )
-
-
-def joint_tree(tree: RigidTree) -> JointTree:
-    """Return the tree that tree.py has, without the formulas of run-time parameters."""
-    return JointTree(
-        tree.gravity,
-        tuple(
-            TreeJoint(b.parent, b.kind, b.coordinate, b.ratio, b.rotation, b.translation, b.curve)
-            for b in tree.bodies
-        ),
-        tuple(TreeLink(b.link, at, b.mass, b.com, b.inertia) for at, b in enumerate(tree.bodies)),
-        tree.frames,
-        {},
-        tree.ties,
-        tree.couplings,
-        tree.independent,
-        tree.closed_position,
     )

@@ -27,9 +27,11 @@ from linkwise.symbolic.definition import (
     energies,
     file_joint_entries,
     follower_entries,
+    formula_texts,
     in_radians,
     joint_entries,
-    rigid_tree,
+    joint_tree,
+    passive_joints,
 )
 from linkwise.symbolic.system import RigidSystem
 
@@ -115,8 +117,6 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
     rigid = isinstance(system, RigidSystem)
     yield "__init__.py", init_text(derivation.package, loadable, parameters, about, rigid, derivation.kernel)
     links = {name: system.path(j) for j, name in enumerate(system.link_names)}
-    tree = rigid_tree(system)
-    passive = tree.passive if tree else ()
     yield (
         "names.py",
         names_text(
@@ -126,7 +126,7 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
             derivation.nonquadratic,
             parameters,
             bodies,
-            passive,
+            passive_joints(system),
             file_joint_entries(system),
             energies(system),
         ),
@@ -156,7 +156,9 @@ def manifest(derivation: Derivation, files: Mapping[str, str]) -> Manifest:
         operations,
         code_size(derivation.package, files),
         {s.name: float(v) for s, v in system.parameters.items()},
-        rigid_tree(system),
+        joint_tree(system),
+        passive_joints(system),
+        formula_texts(system),
         energies(system),
         {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(files.items())},
     )

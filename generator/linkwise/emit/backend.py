@@ -97,10 +97,11 @@ def _forms(d: Derivation) -> Iterator[tuple[str, str]]:
 
 def _tree(d: Derivation) -> Iterator[tuple[str, str]]:
     from linkwise.emit.tree_file import tree_text
-    from linkwise.symbolic.definition import rigid_tree
+    from linkwise.symbolic.definition import formula_texts, joint_tree
 
-    if (tree := rigid_tree(d.system)) is not None:
-        yield "tree.py", tree_text(tree, d.system.link_names, [s.name for s in d.system.parameters])
+    if (tree := joint_tree(d.system)) is not None:
+        names = [symbol.name for symbol in d.system.parameters]
+        yield "tree.py", tree_text(tree, formula_texts(d.system), names)
 
 
 def _energies(d: Derivation) -> Iterator[tuple[str, str]]:

@@ -7,12 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from linkwise_runtime.file_joints import FileJoint
 from linkwise_runtime.structure import JointLimits, PassiveJoint
 from linkwise_runtime.version import VERSION
 
 from linkwise.emit.backend import BackendFiles, Loading
 from linkwise.escape import python_docstring, python_literal
-from linkwise.package.entries import EnergiesEntry, FileJointEntry, JointEntry, KernelKind
+from linkwise.package.entries import EnergiesEntry, JointEntry, KernelKind
 from linkwise.render import render
 
 LINE = 100
@@ -106,7 +107,7 @@ def names_text(
     parameters: Mapping[str, float],
     bodies: Sequence[BodyText],
     passive: Sequence[PassiveJoint],
-    file_joints: Sequence[FileJointEntry],
+    file_joints: Sequence[FileJoint],
     energies: EnergiesEntry | None,
 ) -> str:
     """Return names.py: the joints, the links, and what depends on parameters.
@@ -114,7 +115,6 @@ def names_text(
     It has names, units and limits of the joints, their passive properties, the joints of the file, and names
     and paths of the links.
     """
-    places = [one.pinocchio for one in file_joints]
     view = {
         "version": VERSION,
         "name": repr(package),
@@ -128,8 +128,10 @@ def names_text(
         "parameters": [(python_literal(name), repr(value)) for name, value in parameters.items()],
         "bodies": bodies,
         "passive": [_passive_text(entry) for entry in passive],
-        "file_joints": [f"{python_literal(one.name)}, {one.kind!r}, {one.joints!r}" for one in file_joints],
-        "pinocchio_order": repr(tuple(sorted(range(len(file_joints)), key=places.__getitem__))),
+        "file_joints": [
+            f"{python_literal(one.name)}, {one.kind!r}, {one.coordinates!r}, {one.pinocchio}"
+            for one in file_joints
+        ],
         "calls_numpy": any("np." in value for body in bodies for value in body.values),
     }
     return render("package/names.py.j2", view)

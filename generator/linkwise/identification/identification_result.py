@@ -70,9 +70,9 @@ class Identification:
         """
         fitted = zip((*self.joints, *self.followers), self.bearings.rubs, self.physical.friction, strict=True)
         found = {joint: own for joint, rubs, own in fitted if rubs or joint in self.shared_friction}
-        for body in self.robot.bodies or ():
-            if self.robot.joints[body.coordinate] in found:
-                found.setdefault(body.joint, np.zeros(2))
+        for joint in self.robot.tree.joints if self.robot.tree else ():
+            if self.robot.joints[joint.coordinate] in found:
+                found.setdefault(joint.name, np.zeros(2))
         return found
 
     def errors(self, equations: JointEquations) -> dict[str, Array]:

@@ -105,9 +105,9 @@ def _random_motion(robot: OpenedRobot, read: TorqueLog) -> Motion:
 
 
 def _own_parameters(robot: OpenedRobot) -> Array:
-    if robot.bodies is None:
+    if (tree := robot.tree) is None:
         raise LinkwiseError(f"{robot.name} is made of energies; only rigid links have parameters to identify")
-    if curved := [robot.joints[body.coordinate] for body in robot.bodies if body.curve]:
+    if curved := [robot.joints[joint.coordinate] for joint in tree.joints if joint.curve]:
         raise LinkwiseError(
             f"joint {curved[0]!r} of {robot.name} moves axes by curves, and a URDF file, as identified links "
             "are written, has none; lock it"
@@ -117,9 +117,7 @@ def _own_parameters(robot: OpenedRobot) -> Array:
         raise LinkwiseError(
             f"{robot.name} has no back end with regressors; generate the robot again, with --backend numpy"
         )
-    by_name = {body.link: body for body in robot.bodies}
-    bodies = [by_name[name] for name in robot.links]
-    values = ([b.mass for b in bodies], [b.com for b in bodies], [b.inertia for b in bodies])
+    values = ([b.mass for b in tree.links], [b.com for b in tree.links], [b.inertia for b in tree.links])
     pi: Array = inertial_parameters(Bodies(*(np.array(value, dtype=float) for value in values)))
     return pi
 

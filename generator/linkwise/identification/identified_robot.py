@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from linkwise_runtime.rule.joint_tree import TreeFrame
+from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
 
 from linkwise.errors import within
 from linkwise.escape import printable
@@ -20,7 +20,7 @@ from linkwise.identification.own_sdf import OwnSdf
 from linkwise.identification.own_toml import OwnToml
 from linkwise.identification.own_urdf import OwnUrdf
 from linkwise.identification.urdf_file import lost_gravity, root_link, rpy, urdf_text
-from linkwise.package.entries import JointEntry, RigidTree
+from linkwise.package.entries import JointEntry
 from linkwise.package.manifest import Manifest
 from linkwise.robot.read import Reader, reader_of
 from linkwise.robot.readers.mjcf.reader import read_mjcf
@@ -61,21 +61,21 @@ def identified_robot(
             return {own.path.name: written}, tuple(own.lost(found.frictions))
         except NotWrittenBack as error:
             lost.append(f"{error}; {manifest.name}.urdf is a new file")
-    urdf = urdf_text(manifest.name, manifest.tree, manifest.joints, pi, found.frictions)
+    urdf = urdf_text(manifest, pi, found.frictions)
     files = {f"{manifest.name}.urdf": urdf.encode()}
     if manifest.tree.tied:
         files[f"{manifest.name}.toml"] = constraint_text(manifest.tree, manifest.joints).encode()
     return files, (*lost, *filter(None, [lost_gravity(manifest.tree)]))
 
 
-def constraint_text(tree: RigidTree, joints: Sequence[JointEntry]) -> str:
+def constraint_text(tree: JointTree, joints: Sequence[JointEntry]) -> str:
     """Return the file for `generate ROBOT.urdf --constraints`; ties end on the URDF file's links."""
     names = [joint.name for joint in joints]
     independent = ", ".join(_text(names[k]) for k in tree.independent)
     return "\n".join(["schema = 1", f"independent = [{independent}]", *_tables(tree, names), ""])
 
 
-def _tables(tree: RigidTree, names: Sequence[str]) -> Iterator[str]:
+def _tables(tree: JointTree, names: Sequence[str]) -> Iterator[str]:
     for tie in tree.ties:
         yield from ("", "[[constraint]]", f"name = {_text(tie.name)}", f"type = {_text(tie.kind)}")
         yield f"first = {_end(tree, tree.frames[tie.first])}"
@@ -88,8 +88,8 @@ def _tables(tree: RigidTree, names: Sequence[str]) -> Iterator[str]:
         yield f"terms = {{ {terms} }}"
 
 
-def _end(tree: RigidTree, frame: TreeFrame) -> str:
-    link = root_link(tree) if frame.joint is None else tree.bodies[frame.joint].link
+def _end(tree: JointTree, frame: TreeFrame) -> str:
+    link = root_link(tree) if frame.joint is None else tree.joints[frame.joint].link
     turn = rpy(np.array(frame.rotation)).tolist()
     return f"{{ frame = {_text(link)}, xyz = {list(frame.translation)!r}, rpy = {turn!r} }}"
 

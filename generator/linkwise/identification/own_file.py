@@ -8,12 +8,11 @@ from typing import NamedTuple, TypeAlias
 from xml.parsers.expat import ExpatError
 
 import numpy as np
-from linkwise_runtime.rule.joint_tree import TreeFrame
+from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
 
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.identification.pseudo_inertia import central_of, pseudo_inertia, pseudo_inertia_of, shared_mass
-from linkwise.package.entries import RigidTree
 from linkwise.robot.description import Body, Description
 from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.parameters import numeric
@@ -73,7 +72,7 @@ class OwnFile(ABC):
                 f"--out {out}: {self.path.name} in it is the robot's own file; name another folder"
             )
 
-    def identified(self, tree: RigidTree, pi: Mapping[str, Array], friction: Mapping[str, Array]) -> bytes:
+    def identified(self, tree: JointTree, pi: Mapping[str, Array], friction: Mapping[str, Array]) -> bytes:
         """Return the file, written back; raises NotWrittenBack.
 
         tree: the tree of the package that was made of it
@@ -84,9 +83,9 @@ class OwnFile(ABC):
             raise self.not_utf8()
         links = {
             link: carried
-            for number, body in enumerate(tree.bodies)
-            if body.link in pi
-            for link, carried in self._shared(tree, number, pi[body.link]).items()
+            for number, joint in enumerate(tree.joints)
+            if joint.link in pi
+            for link, carried in self._shared(tree, number, pi[joint.link]).items()
         }
         rubs = {}
         for joint in self.description.connections:
@@ -105,7 +104,7 @@ class OwnFile(ABC):
             if own.any() and not self.has_friction(joint):
                 yield f"{self.path.name} has no place for the friction of {joint}{self.without_friction}"
 
-    def _shared(self, tree: RigidTree, number: int, pi: Array) -> dict[str, LinkMass]:
+    def _shared(self, tree: JointTree, number: int, pi: Array) -> dict[str, LinkMass]:
         """Return the mass of each of the file's links that are one rigid body, except links without mass."""
         links = {body.name: body for body in numeric(self.description).bodies if not body.invented}
         frames = [frame for frame in tree.frames if frame.joint == number and frame.name in links]

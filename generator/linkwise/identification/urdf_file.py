@@ -10,13 +10,14 @@ from dataclasses import asdict
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from linkwise_runtime.rule.joint_tree import TreeFrame
+from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame, TreeJoint
 from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.arrays import Array
 from linkwise.escape import printable
 from linkwise.identification.pseudo_inertia import central
-from linkwise.package.entries import BodyEntry, JointEntry, RigidTree
+from linkwise.package.entries import JointEntry
+from linkwise.package.manifest import Manifest
 
 ENDLESS = 1e9
 """Limit that is written where there is none, as URDF requires one."""
@@ -24,7 +25,7 @@ STANDARD = 9.81
 """Gravity in m/s^2 along -z with which a URDF file, which says nothing of gravity, is read."""
 
 
-def lost_gravity(tree: RigidTree) -> str:
+def lost_gravity(tree: JointTree) -> str:
     """Return what is lost where gravity is stronger or weaker than a URDF file is read with; else ""."""
     size = float(np.linalg.norm(tree.gravity))
     if math.isclose(size, STANDARD, rel_tol=1e-9):
@@ -36,51 +37,47 @@ def lost_gravity(tree: RigidTree) -> str:
     )
 
 
-def urdf_text(
-    name: str,
-    tree: RigidTree,
-    joints: Sequence[JointEntry],
-    pi: Mapping[str, Array],
-    friction: Mapping[str, Array],
-) -> str:
-    """Return the file.
+def urdf_text(manifest: Manifest, pi: Mapping[str, Array], friction: Mapping[str, Array]) -> str:
+    """Return the file of a package with a tree.
 
     pi: inertial parameters (10,) by link
     friction: viscous and Coulomb (2,) by joint; joints that are not in it keep the package's own
     """
+    tree, joints = manifest.tree, manifest.joints
+    assert tree is not None
     root, turn = root_link(tree), _upright(tree)
     lines = [
         '<?xml version="1.0"?>',
         *([f"<!-- Gravity is lost: {lost}. -->"] if (lost := lost_gravity(tree)) else []),
-        f"<robot name={_attribute(name)}>",
+        f"<robot name={_attribute(manifest.name)}>",
     ]
     if turn is not None:
         base, mount = (
-            _unused(wanted, [*_links(tree), root, *(body.joint for body in tree.bodies)])
+            _unused(wanted, [*_links(tree), root, *(joint.name for joint in tree.joints)])
             for wanted in (f"{root}_upright", "mount")
         )
         lines += [f"  <link name={_attribute(base)}/>"]
         lines += _joint(mount, "fixed", base, root, (0.0, 0.0, 0.0), turn, [])
     lines += [f"  <link name={_attribute(root)}/>"]
     masters = [joint.name for joint in joints]
-    own = {entry.joint: np.array([entry.damping, entry.friction]) for entry in tree.passive}
-    for body in tree.bodies:
-        lines += _link(body, pi)
-        parent = root if body.parent is None else tree.bodies[body.parent].link
-        more = ['<axis xyz="0 0 1"/>', *_follows(body, masters)]
-        rubs = friction.get(body.joint, own.get(body.joint))
-        if rubs is not None and (rubs.any() or body.joint in masters):
+    own = {entry.joint: np.array([entry.damping, entry.friction]) for entry in manifest.passive}
+    for joint in tree.joints:
+        lines += _link(joint.link, pi)
+        parent = root if joint.parent is None else tree.joints[joint.parent].link
+        more = ['<axis xyz="0 0 1"/>', *_follows(joint, masters)]
+        rubs = friction.get(joint.name, own.get(joint.name))
+        if rubs is not None and (rubs.any() or joint.name in masters):
             viscous, coulomb = rubs.tolist()
             more.append(f'<dynamics damping="{viscous:.6g}" friction="{coulomb:.6g}"/>')
-        kind, limits = _limits(body, joints[body.coordinate])
-        place = body.translation, np.array(body.rotation)
-        lines += _joint(body.joint, kind, parent, body.link, *place, [*more, *limits])
+        kind, limits = _limits(joint, joints[joint.coordinate])
+        place = joint.translation, np.array(joint.rotation)
+        lines += _joint(joint.name, kind, parent, joint.link, *place, [*more, *limits])
     lines += [line for frame in _frames(tree) for line in _frame(frame, tree)]
-    lines += [line for entry in tree.passive for line in _passive(entry)]
+    lines += [line for entry in manifest.passive for line in _passive(entry)]
     return "\n".join([*lines, "</robot>", ""])
 
 
-def root_link(tree: RigidTree) -> str:
+def root_link(tree: JointTree) -> str:
     """Return the name of the file's link on the ground, in the axes of the package's base.
 
     It is the name in the robot's file, where that has one.
@@ -92,20 +89,20 @@ def root_link(tree: RigidTree) -> str:
     return _unused("base", _links(tree))
 
 
-def _links(tree: RigidTree) -> list[str]:
+def _links(tree: JointTree) -> list[str]:
     """Return the names of the file's links."""
-    return [*(body.link for body in tree.bodies), *(frame.name for frame in tree.frames)]
+    return [*(joint.link for joint in tree.joints), *(frame.name for frame in tree.frames)]
 
 
-def _frames(tree: RigidTree) -> list[TreeFrame]:
+def _frames(tree: JointTree) -> list[TreeFrame]:
     """Return the frames of the robot's file whose names no link here has."""
-    taken = [root_link(tree), *(body.link for body in tree.bodies)]
+    taken = [root_link(tree), *(joint.link for joint in tree.joints)]
     return [frame for frame in tree.frames if frame.name not in taken]
 
 
-def _frame(frame: TreeFrame, tree: RigidTree) -> list[str]:
-    parent = root_link(tree) if frame.joint is None else tree.bodies[frame.joint].link
-    joint = _unused(f"{frame.name}_fixed", [body.joint for body in tree.bodies])
+def _frame(frame: TreeFrame, tree: JointTree) -> list[str]:
+    parent = root_link(tree) if frame.joint is None else tree.joints[frame.joint].link
+    joint = _unused(f"{frame.name}_fixed", [joint.name for joint in tree.joints])
     turn = np.array(frame.rotation)
     return [
         f"  <link name={_attribute(frame.name)}/>",
@@ -113,11 +110,11 @@ def _frame(frame: TreeFrame, tree: RigidTree) -> list[str]:
     ]
 
 
-def _limits(body: BodyEntry, joint: JointEntry) -> tuple[str, list[str]]:
-    """Return the type of a body's joint, and its limits; those of a joint that follows are not known."""
-    given = asdict(joint) if joint.name == body.joint else {}
+def _limits(joint: TreeJoint, entry: JointEntry) -> tuple[str, list[str]]:
+    """Return the type of a joint, and its limits; those of a joint that follows are not known."""
+    given = asdict(entry) if entry.name == joint.name else {}
     ends = [given.get(end) for end in ("lower", "upper")]
-    kind = "prismatic" if body.kind == "prismatic" else "continuous" if ends == [None, None] else "revolute"
+    kind = "prismatic" if joint.kind == "prismatic" else "continuous" if ends == [None, None] else "revolute"
     said = {end: sign * ENDLESS for end, sign in (("lower", -1), ("upper", 1)) if kind != "continuous"}
     said |= dict.fromkeys(("effort", "velocity"), ENDLESS)
     said |= {what: value for what in said if (value := given.get(what)) is not None}
@@ -150,14 +147,14 @@ def _passive(entry: PassiveJoint) -> list[str]:
     return lines
 
 
-def _link(body: BodyEntry, pi: Mapping[str, Array]) -> list[str]:
-    if body.link not in pi:
-        return [f"  <link name={_attribute(body.link)}/>"]
-    mass, com, inertia = central(pi[body.link])
+def _link(link: str, pi: Mapping[str, Array]) -> list[str]:
+    if link not in pi:
+        return [f"  <link name={_attribute(link)}/>"]
+    mass, com, inertia = central(pi[link])
     entries = zip(("xx", "xy", "xz", "yy", "yz", "zz"), inertia[np.triu_indices(3)].tolist(), strict=True)
     moments = " ".join(f'i{key}="{value!r}"' for key, value in entries)
     return [
-        f"  <link name={_attribute(body.link)}>",
+        f"  <link name={_attribute(link)}>",
         "    <inertial>",
         f'      <origin xyz="{_row(com)}" rpy="0 0 0"/>',
         f'      <mass value="{mass!r}"/>',
@@ -186,14 +183,14 @@ def _joint(
     ]
 
 
-def _follows(body: BodyEntry, masters: Sequence[str]) -> list[str]:
-    master = masters[body.coordinate]
-    if master == body.joint:
+def _follows(joint: TreeJoint, masters: Sequence[str]) -> list[str]:
+    master = masters[joint.coordinate]
+    if master == joint.name:
         return []
-    return [f'<mimic joint={_attribute(master)} multiplier="{body.ratio!r}"/>']
+    return [f'<mimic joint={_attribute(master)} multiplier="{joint.ratio!r}"/>']
 
 
-def _upright(tree: RigidTree) -> Array | None:
+def _upright(tree: JointTree) -> Array | None:
     """Return the axes of the package's base in axes where gravity is along -z; None where they are equal."""
     g = np.array(tree.gravity)
     size = float(np.linalg.norm(g))

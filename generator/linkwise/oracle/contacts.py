@@ -62,7 +62,7 @@ class ContactEquations:
         kinds = [*(tie.kind for tie in (self.ties.tree.ties if self.ties else ())), KINDS[self.kind]]
         units = [unit for kind in kinds for unit in np.repeat([1.0, size], TURNS_AND_SHIFTS[kind])]
         units += [1.0] * (rows.shape[1] - len(units))
-        slides = [body.coordinate for body in self.recursion.bodies if body.kind == "prismatic"]
+        slides = [joint.coordinate for joint in self.recursion.joints if joint.kind == "prismatic"]
         rows = rows / np.array(units)[:, None] * np.where(np.isin(np.arange(q.shape[1]), slides), size, 1.0)
         sizes = np.linalg.svd(rows, compute_uv=False)
         found: Index = q.shape[1] - (sizes > RANK * np.maximum(sizes[:, :1], 1.0)).sum(-1)

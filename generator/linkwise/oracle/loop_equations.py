@@ -9,13 +9,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from linkwise_runtime.rule.joint_tree import TreeFrame
+from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
 from numpy.polynomial.polynomial import polyder, polyval
 
 from linkwise.arrays import Array
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import COMPLEX_STEP
-from linkwise.package.entries import RigidTree
 
 TURNS_AND_SHIFTS = {"frame": (3, 3), "hinge": (2, 3), "point": (0, 3), "distance": (0, 1)}
 """Rows of each kind of tie that hold rotations, and of those after them that hold translations."""
@@ -35,7 +34,7 @@ class LoopEquations(NamedTuple):
     """Equations of the ties and couplings of a tree."""
 
     recursion: NewtonEuler
-    tree: RigidTree
+    tree: JointTree
 
     @property
     def _ends(self) -> list[TreeFrame]:

@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from linkwise_runtime.rule.joint_tree import JointTree
 
 from linkwise.arrays import Array
 from linkwise.oracle.held_motion import (
@@ -30,7 +31,6 @@ from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import by_unit
 from linkwise.oracle.rounding import measure_rounding
 from linkwise.oracle.states import States
-from linkwise.package.entries import RigidTree
 from linkwise.package.manifest import Manifest
 
 STATES = 12
@@ -54,7 +54,7 @@ class LoopReference:
     scales: Mapping[str, Array]
 
 
-def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopReference | None:
+def loop_reference(manifest: Manifest, tree: JointTree, states: States) -> LoopReference | None:
     """Return the answers where loops close; None where none of the states leads there."""
     equations = LoopEquations(NewtonEuler(manifest, tree), tree)
     own = tree.independent
@@ -71,7 +71,7 @@ def loop_reference(manifest: Manifest, tree: RigidTree, states: States) -> LoopR
     yd, ydd = states.qd[: len(q), own], states.qdd[: len(q), own]
     tau = np.random.default_rng(5).uniform(-1.0, 1.0, q.shape)
 
-    def answers(tree: RigidTree) -> dict[str, Array]:
+    def answers(tree: JointTree) -> dict[str, Array]:
         return _answers(LoopEquations(NewtonEuler(manifest, tree), tree), (q, yd, ydd), tau)
 
     values, scales = measure_rounding(answers, tree, condition**2)

@@ -10,11 +10,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from linkwise_runtime.rule.joint_tree import JointTree, TreeJoint, TreeLink
 
 from linkwise.arrays import Array
 from linkwise.oracle.newton_euler import Points, displacement_bound, path_of
 from linkwise.oracle.rounding import rounding_growth
-from linkwise.package.entries import BodyEntry, RigidTree
 from linkwise.package.manifest import Manifest
 
 
@@ -35,32 +35,29 @@ class _Sizes:
 
 
 class Magnitudes:
-    """Upper bounds for a manifest's rigid bodies; q, qd, qdd are magnitudes of shape (samples, n)."""
+    """Upper bounds for a manifest's rigid links; q, qd, qdd are magnitudes of shape (samples, n)."""
 
-    def __init__(self, manifest: Manifest, tree: RigidTree) -> None:
-        self.bodies = tree.bodies
+    def __init__(self, manifest: Manifest, tree: JointTree) -> None:
+        self.joints, self.links = tree.joints, tree.links
         self.gravity = float(np.linalg.norm(tree.gravity))
         self.n = len(manifest.joints)
-        index = {body.link: b for b, body in enumerate(self.bodies)}
-        self.links = [index[link.name] for link in manifest.links]
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
         """Return bounds of |τ_ij|, shape (samples, n, N)."""
-        own = [[self.bodies[at]] for at in self.links]
-        return self.torques_of(own, q, qd, qdd, gravity)[..., 0]
+        return self.torques_of([[link] for link in self.links], q, qd, qdd, gravity)[..., 0]
 
     def torques_of(
-        self, carried: Sequence[Sequence[BodyEntry]], q: Array, qd: Array, qdd: Array, gravity: bool = True
+        self, carried: Sequence[Sequence[TreeLink]], q: Array, qd: Array, qdd: Array, gravity: bool = True
     ) -> Array:
-        """Return bounds of |τ_ij| (samples, n, N, X) where each link has the masses of X bodies in turn."""
+        """Return bounds of |τ_ij| (samples, n, N, X) where each link has the masses of X others in turn."""
         frames = self._frames(q, qd, qdd, self.gravity if gravity else 0.0)
         reaches = np.stack([frame.reach for frame in frames], 1)
-        slopes = np.stack([displacement_bound(body, q, 1) for body in self.bodies], 1)
+        slopes = np.stack([displacement_bound(joint, q, 1) for joint in self.joints], 1)
         tau = np.zeros((len(q), self.n, len(self.links), len(carried[0])))
-        for j, at in enumerate(self.links):
-            path, frame = path_of(self.bodies, at), frames[at]
-            turns = np.array([self.bodies[b].kind == "revolute" for b in path])
-            coordinates = [self.bodies[b].coordinate for b in path]
+        for j, link in enumerate(self.links):
+            path, frame = path_of(self.joints, link.joint), frames[link.joint]
+            turns = np.array([self.joints[f].kind == "revolute" for f in path])
+            coordinates = [self.joints[f].coordinate for f in path]
             for x, body in enumerate(carried[j]):
                 reach = frame.reach + _length(body.com)
                 turning = frame.alpha + frame.omega**2
@@ -79,11 +76,12 @@ class Magnitudes:
         """Return bounds of kinetic + |potential| energy of each link, shape (samples, N)."""
         frames = self._frames(q, qd, 0.0 * qd, 0.0)
         sizes = []
-        for at in self.links:
-            body, frame, reach = self.bodies[at], frames[at], self._com(frames, at)
+        for link in self.links:
+            frame = frames[link.joint]
+            reach = frame.reach + _length(link.com)
             speed = frame.v + frame.omega * reach
-            spin = float(np.linalg.norm(body.inertia)) * frame.omega**2
-            mass = abs(body.mass)
+            spin = float(np.linalg.norm(link.inertia)) * frame.omega**2
+            mass = abs(link.mass)
             sizes.append((0.5 * (mass * speed**2 + spin) + mass * self.gravity * reach) * frame.lost)
         return np.stack(sizes, -1)
 
@@ -110,32 +108,29 @@ class Magnitudes:
         """Yield the sizes of the frame that carries each point, and the point's distance from its origin."""
         frames, zero = self._frames(q, qd, qdd, 0.0), np.zeros(len(q))
         ground = _Sizes(zero, zero, zero, zero, zero, zero + 1.0)
-        for body, place in points:
-            yield ground if body is None else frames[body], float(np.linalg.norm(place))
-
-    def _com(self, frames: list[_Sizes], at: int) -> Array:
-        return frames[at].reach + _length(self.bodies[at].com)
+        for joint, place in points:
+            yield ground if joint is None else frames[joint], float(np.linalg.norm(place))
 
     def _frames(self, q: Array, qd: Array, qdd: Array, gravity: float) -> list[_Sizes]:
         frames: list[_Sizes] = []
         zero = np.zeros(len(q))
         ground = _Sizes(zero, zero, zero, zero, zero + gravity, zero + 1.0)
-        for body in self.bodies:
-            up = ground if body.parent is None else frames[body.parent]
-            turn, slope, bend = (displacement_bound(body, q, derivative) for derivative in range(3))
-            speed, push = qd[:, body.coordinate], qdd[:, body.coordinate]
+        for joint in self.joints:
+            up = ground if joint.parent is None else frames[joint.parent]
+            turn, slope, bend = (displacement_bound(joint, q, derivative) for derivative in range(3))
+            speed, push = qd[:, joint.coordinate], qdd[:, joint.coordinate]
             rate, change = slope * speed, slope * push + bend * speed**2
-            frames.append(_carried(body, up, turn, rate, change))
+            frames.append(_carried(joint, up, turn, rate, change))
         return frames
 
 
-def _carried(body: BodyEntry, up: _Sizes, turn: Array, rate: Array, change: Array) -> _Sizes:
+def _carried(joint: TreeJoint, up: _Sizes, turn: Array, rate: Array, change: Array) -> _Sizes:
     """Return the sizes of a frame on `up`: V + S q̇ and A + S q̈ + V × S q̇.
 
     S = (z, s), with |s| the distance of a hinge's axis.
     """
-    sliding = body.kind == "prismatic"
-    reach = up.reach + _length(body.translation) + (turn if sliding else 0.0)
+    sliding = joint.kind == "prismatic"
+    reach = up.reach + _length(joint.translation) + (turn if sliding else 0.0)
     z, s = (0.0, np.ones_like(turn)) if sliding else (1.0, reach)
     return _Sizes(
         reach,

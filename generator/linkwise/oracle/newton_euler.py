@@ -1,4 +1,4 @@
-"""Recursive Newton–Euler over a package's rigid bodies: an oracle that shares nothing with the generator.
+"""Recursive Newton–Euler over a package's rigid links: an oracle that shares nothing with the generator.
 
 Plain vectors in the world's axes, forces at centres of mass, one link at a time; the textbook recursion. It
 accepts complex motion too, as it has only sums, products, sines and cosines: complex steps differentiate it
@@ -10,16 +10,15 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from linkwise_runtime.rule.joint_tree import TreeFrame
+from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame, TreeJoint, TreeLink
 from numpy.polynomial import Polynomial
 
 from linkwise.arrays import Array, Index, Mask
 from linkwise.oracle.rounding import NoisyTree
-from linkwise.package.entries import BodyEntry, RigidTree
 from linkwise.package.manifest import Manifest
 
 Points = Sequence[tuple[int | None, Array]]
-"""Carrier of each point, a body or None for the ground, and the point in the carrier's axes, (3,)."""
+"""Joint that moves each point, None for the ground, and the point in the axes behind it, (3,)."""
 
 
 @dataclass(frozen=True)
@@ -37,55 +36,52 @@ class _FrameMotion:
     a: Array
 
 
-class _BodyMotion(NamedTuple):
-    """Motion of a body's frame, and its joint's axis."""
+class _JointMotion(NamedTuple):
+    """Motion of the frame that a joint moves, and its axis."""
 
     frame: _FrameMotion
     axis: Array
 
 
 class NewtonEuler:
-    """Partial torques of the rigid bodies of a manifest, whose `tree` is given beside it."""
+    """Partial torques of the rigid links of a manifest, whose `tree` is given beside it."""
 
-    def __init__(self, manifest: Manifest, tree: RigidTree) -> None:
-        self.bodies: tuple[BodyEntry, ...] = tree.bodies
+    def __init__(self, manifest: Manifest, tree: JointTree) -> None:
+        self.joints, self.links = tree.joints, tree.links
         self.noise = tree.rounded if isinstance(tree, NoisyTree) else None
         self.gravity = np.array(tree.gravity)
-        self.reach = max(
-            float(np.linalg.norm(x)) for body in self.bodies for x in (body.com, body.translation)
-        )
+        places = (*(link.com for link in self.links), *(joint.translation for joint in self.joints))
+        self.reach = max(float(np.linalg.norm(place)) for place in places)
         self.n = len(manifest.joints)
-        index = {body.link: b for b, body in enumerate(self.bodies)}
-        self.links = [index[link.name] for link in manifest.links]
-        self.paths = [_LinkPath.of(self.bodies, at) for at in self.links]
-        self._placed = [(np.array(body.rotation), np.array(body.translation)) for body in self.bodies]
+        self.paths = [_LinkPath.of(self.joints, link.joint) for link in self.links]
+        self._placed = [(np.array(joint.rotation), np.array(joint.translation)) for joint in self.joints]
 
     def partial_torque(self, q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
         """Return τ_ij, shape (samples, n, N), for inputs of shape (samples, n)."""
-        own = [[self.bodies[at]] for at in self.links]
-        return self.torques_of(own, q, qd, qdd, gravity)[..., 0]
+        return self.torques_of([[link] for link in self.links], q, qd, qdd, gravity)[..., 0]
 
     def torques_of(
-        self, carried: Sequence[Sequence[BodyEntry]], q: Array, qd: Array, qdd: Array, gravity: bool = True
+        self, carried: Sequence[Sequence[TreeLink]], q: Array, qd: Array, qdd: Array, gravity: bool = True
     ) -> Array:
-        """Return τ_ij (samples, n, N, X) where each link has the masses of X bodies in turn, not its own."""
+        """Return τ_ij (samples, n, N, X) where each link has the masses of X others in turn, not its own."""
         motions = self._motions(q, qd, qdd, self.gravity if gravity else 0.0 * self.gravity)
         axes, origins = (
             np.stack(parts, 1)[:, :, None]
             for parts in zip(*((motion.axis, motion.frame.origin) for motion in motions), strict=True)
         )
-        slopes = np.stack([displacement(body, q, 1) for body in self.bodies], 1)
+        slopes = np.stack([displacement(joint, q, 1) for joint in self.joints], 1)
         shape = len(q), self.n, len(self.links), len(carried[0])
         tau = np.zeros(shape, np.result_type(q, qd, qdd))
-        for j, (at, bodies, path) in enumerate(zip(self.links, carried, self.paths, strict=True)):
-            force, moment, com = (part[:, None] for part in self._wrenches(bodies, motions[at].frame))
+        for j, (link, others, path) in enumerate(zip(self.links, carried, self.paths, strict=True)):
+            wrenches = self._wrenches(others, motions[link.joint].frame)
+            force, moment, com = (part[:, None] for part in wrenches)
             # On a joint that turns, the moment about its origin; on one that slides, the force.
-            about = moment + _cross(com - origins[:, path.bodies], force)
+            about = moment + _cross(com - origins[:, path.joints], force)
             share = np.where(path.turning[:, None, None], about, force)
-            work = slopes[:, path.bodies] * (axes[:, path.bodies] * share).sum(-1)
+            work = slopes[:, path.joints] * (axes[:, path.joints] * share).sum(-1)
             if len(set(path.coordinates)) == len(path.coordinates):
                 tau[:, path.coordinates, j] = work
-            else:  # several bodies move by one coordinate
+            else:  # several joints move by one coordinate
                 np.add.at(tau[:, :, j].swapaxes(0, 1), path.coordinates, work.swapaxes(0, 1))
         return tau
 
@@ -96,19 +92,20 @@ class NewtonEuler:
         """
         motions = self._motions(q, qd, qdd, self.gravity if gravity else 0.0 * self.gravity)
         tau = np.zeros(q.shape, np.result_type(q, qd, qdd))
-        forces, moments = np.zeros((2, len(self.bodies), len(q), 3), tau.dtype)
-        for at in reversed(range(len(self.bodies))):
-            body, (frame, axis) = self.bodies[at], motions[at]
-            if at in self.links:
-                force, moment, com = (part[:, 0] for part in self._wrenches([body], frame))
-                forces[at] += force
-                moments[at] += moment + _cross(com - frame.origin, force)
-            share = moments[at] if body.kind == "revolute" else forces[at]
-            tau[:, body.coordinate] += displacement(body, q, 1)[:, 0] * (axis * share).sum(-1)
-            if body.parent is not None:
-                arm = frame.origin - motions[body.parent].frame.origin
-                forces[body.parent] += forces[at]
-                moments[body.parent] += moments[at] + _cross(arm, forces[at])
+        forces, moments = np.zeros((2, len(self.joints), len(q), 3), tau.dtype)
+        for link in self.links:
+            at, frame = link.joint, motions[link.joint].frame
+            force, moment, com = (part[:, 0] for part in self._wrenches([link], frame))
+            forces[at] += force
+            moments[at] += moment + _cross(com - frame.origin, force)
+        for at in reversed(range(len(self.joints))):
+            joint, (frame, axis) = self.joints[at], motions[at]
+            share = moments[at] if joint.kind == "revolute" else forces[at]
+            tau[:, joint.coordinate] += displacement(joint, q, 1)[:, 0] * (axis * share).sum(-1)
+            if joint.parent is not None:
+                arm = frame.origin - motions[joint.parent].frame.origin
+                forces[joint.parent] += forces[at]
+                moments[joint.parent] += moments[at] + _cross(arm, forces[at])
         return tau
 
     def energies(self, q: Array, qd: Array) -> tuple[Array, Array]:
@@ -118,13 +115,13 @@ class NewtonEuler:
         """
         motions = self._motions(q, qd, 0.0 * qd, self.gravity)
         kinetic, potential = [], []
-        for at in self.links:
-            body, frame = self.bodies[at], motions[at].frame
-            lever = frame.rotation @ np.array(body.com)
+        for link in self.links:
+            frame = motions[link.joint].frame
+            lever = frame.rotation @ np.array(link.com)
             v_com = frame.v + _cross(frame.omega, lever)
-            spin = _applied(_turned(np.array(body.inertia), frame.rotation), frame.omega)
-            kinetic.append(0.5 * (body.mass * _dot(v_com, v_com) + _dot(frame.omega, spin)))
-            potential.append(-body.mass * (frame.origin + lever) @ self.gravity)
+            spin = _applied(_turned(np.array(link.inertia), frame.rotation), frame.omega)
+            kinetic.append(0.5 * (link.mass * _dot(v_com, v_com) + _dot(frame.omega, spin)))
+            potential.append(-link.mass * (frame.origin + lever) @ self.gravity)
         return np.stack(kinetic, -1), np.stack(potential, -1)
 
     def poses(self, frames: Sequence[TreeFrame], q: Array) -> Array:
@@ -139,7 +136,7 @@ class NewtonEuler:
 
     def places(self, points: Points, q: Array) -> Array:
         """Return the places of points in the world, (samples, points, 3)."""
-        carriers = self._carriers([body for body, _ in points], q, 0.0 * q, 0.0 * q)
+        carriers = self._carriers([at for at, _ in points], q, 0.0 * q, 0.0 * q)
         found = (at.origin + at.rotation @ place for at, (_, place) in zip(carriers, points, strict=True))
         return np.stack(list(found), 1)
 
@@ -149,7 +146,9 @@ class NewtonEuler:
         There is no gravity in a.
         """
         speeds, changes = [], []
-        for at, (_, place) in zip(self._carriers([b for b, _ in points], q, qd, qdd), points, strict=True):
+        for at, (_, place) in zip(
+            self._carriers([joint for joint, _ in points], q, qd, qdd), points, strict=True
+        ):
             arm = at.rotation @ place
             speed = _cross(at.omega, arm)
             change = _cross(at.alpha, arm) + _cross(at.omega, speed)
@@ -161,13 +160,13 @@ class NewtonEuler:
             changes.append(np.concatenate([at.alpha, at.a + change], -1))
         return np.stack(speeds, 1), np.stack(changes, 1)
 
-    def _wrenches(self, bodies: Sequence[BodyEntry], frame: _FrameMotion) -> tuple[Array, Array, Array]:
-        """Return force at the centre of mass, moment about it, and its place, (samples, X, 3), of X bodies.
+    def _wrenches(self, links: Sequence[TreeLink], frame: _FrameMotion) -> tuple[Array, Array, Array]:
+        """Return force at the centre of mass, moment about it, and its place, (samples, X, 3), of X links.
 
         Noise is of the size of what both are summed from about the base, as closed forms do in one frame.
         """
         mass, com, inertia = (
-            np.array([getattr(body, name) for body in bodies]) for name in ("mass", "com", "inertia")
+            np.array([getattr(link, name) for link in links]) for name in ("mass", "com", "inertia")
         )
         rotation, origin, omega, alpha, a = (
             part[:, None] for part in (frame.rotation, frame.origin, frame.omega, frame.alpha, frame.a)
@@ -184,33 +183,33 @@ class NewtonEuler:
             moment = self.noise(moment, reach * size + sizes * rates)
         return force, moment, origin + lever
 
-    def _carriers(self, bodies: Sequence[int | None], q: Array, qd: Array, qdd: Array) -> list[_FrameMotion]:
-        """Return the frames of some bodies, or of the ground, in motion without gravity."""
+    def _carriers(self, joints: Sequence[int | None], q: Array, qd: Array, qdd: Array) -> list[_FrameMotion]:
+        """Return the frames that some joints move, or the ground, in motion without gravity."""
         motions = self._motions(q, qd, qdd, 0.0 * self.gravity)
         zero = np.zeros((len(q), 3))
         ground = _FrameMotion(np.broadcast_to(np.eye(3), (len(q), 3, 3)), zero, zero, zero, zero, zero)
-        return [ground if body is None else motions[body].frame for body in bodies]
+        return [ground if joint is None else motions[joint].frame for joint in joints]
 
-    def _motions(self, q: Array, qd: Array, qdd: Array, gravity: Array) -> list[_BodyMotion]:
-        """Return the motion of each body, from the ground outwards."""
+    def _motions(self, q: Array, qd: Array, qdd: Array, gravity: Array) -> list[_JointMotion]:
+        """Return the motion of each joint's frame, from the ground outwards."""
         zero = np.zeros((len(q), 3))
         upright = np.broadcast_to(np.eye(3), (len(q), 3, 3))
         ground = _FrameMotion(upright, zero, zero, zero, zero, zero - gravity)
-        motions: list[_BodyMotion] = []
-        for body, placed in zip(self.bodies, self._placed, strict=True):
-            up = ground if body.parent is None else motions[body.parent].frame
-            speed, push = (x[:, body.coordinate : body.coordinate + 1] for x in (qd, qdd))
-            slope = displacement(body, q, 1)
-            turn, rate = displacement(body, q), slope * speed
-            change = slope * push + displacement(body, q, 2) * speed**2
-            motions.append(_moved(body.kind, placed, up, turn, rate, change))
+        motions: list[_JointMotion] = []
+        for joint, placed in zip(self.joints, self._placed, strict=True):
+            up = ground if joint.parent is None else motions[joint.parent].frame
+            speed, push = (x[:, joint.coordinate : joint.coordinate + 1] for x in (qd, qdd))
+            slope = displacement(joint, q, 1)
+            turn, rate = displacement(joint, q), slope * speed
+            change = slope * push + displacement(joint, q, 2) * speed**2
+            motions.append(_moved(joint.kind, placed, up, turn, rate, change))
         return motions
 
 
 def _moved(
     kind: str, placed: tuple[Array, Array], up: _FrameMotion, turn: Array, rate: Array, change: Array
-) -> _BodyMotion:
-    """Return the motion of a body placed on `up`, its parent.
+) -> _JointMotion:
+    """Return the motion of the frame of a joint placed on `up`, its parent's.
 
     turn, rate and change of its joint are (samples, 1).
     """
@@ -228,31 +227,31 @@ def _moved(
         alpha = alpha + change * axis + _cross(omega, rate * axis)
         omega = omega + rate * axis
         rotation = rotation @ _about_z(turn[:, 0])
-    return _BodyMotion(_FrameMotion(rotation, up.origin + arm, v, omega, alpha, a), axis)
+    return _JointMotion(_FrameMotion(rotation, up.origin + arm, v, omega, alpha, a), axis)
 
 
 @dataclass(frozen=True)
 class _LinkPath:
-    """Path of a link, from its body to the ground: bodies, whether each turns, and its coordinate."""
+    """Path of a link to the ground: its joints, whether each turns, and the coordinate of each."""
 
-    bodies: Index
+    joints: Index
     turning: Mask
     coordinates: Index
 
     @classmethod
-    def of(cls, bodies: Sequence[BodyEntry], at: int) -> "_LinkPath":
-        """Return the path of the body at an index."""
-        path = path_of(bodies, at)
-        turning = np.array([bodies[b].kind == "revolute" for b in path])
-        return cls(np.array(path), turning, np.array([bodies[b].coordinate for b in path]))
+    def of(cls, joints: Sequence[TreeJoint], at: int) -> "_LinkPath":
+        """Return the path of the link that the joint at an index moves."""
+        path = path_of(joints, at)
+        turning = np.array([joints[f].kind == "revolute" for f in path])
+        return cls(np.array(path), turning, np.array([joints[f].coordinate for f in path]))
 
 
-def path_of(bodies: Sequence[BodyEntry], at: int) -> list[int]:
-    """Return the indices of a body, of its parent, and so on to the ground."""
-    back, path = bodies[at].parent, [at]
+def path_of(joints: Sequence[TreeJoint], at: int) -> list[int]:
+    """Return the indices of a joint, of its parent, and so on to the ground."""
+    back, path = joints[at].parent, [at]
     while back is not None:
         path.append(back)
-        back = bodies[back].parent
+        back = joints[back].parent
     return path
 
 
@@ -295,32 +294,32 @@ def _about_z(angle: Array) -> Array:
     return np.moveaxis(np.array([[c, -s, o], [s, c, o], [o, o, i]]), -1, 0)
 
 
-def displacement(body: BodyEntry, q: Array, derivative: int = 0) -> Array:
-    """Return the displacement of a body's joint, or a derivative by its coordinate, (samples, 1).
+def displacement(joint: TreeJoint, q: Array, derivative: int = 0) -> Array:
+    """Return the displacement of a joint, or a derivative by its coordinate, (samples, 1).
 
     q is (samples, n).
     """
-    x = q[:, body.coordinate : body.coordinate + 1]
-    if body.curve is None:
-        return body.ratio * (
+    x = q[:, joint.coordinate : joint.coordinate + 1]
+    if joint.curve is None:
+        return joint.ratio * (
             x if derivative == 0 else np.ones_like(x) if derivative == 1 else np.zeros_like(x)
         )
     moved = np.zeros_like(x)
-    ends = (*body.curve.starts[1:], np.inf)
+    ends = (*joint.curve.starts[1:], np.inf)
     lower = -np.inf
-    for start, upper, piece in zip(body.curve.starts, ends, body.curve.pieces, strict=True):
+    for start, upper, piece in zip(joint.curve.starts, ends, joint.curve.pieces, strict=True):
         of_piece = Polynomial(piece).deriv(derivative) if derivative else Polynomial(piece)
         within = (x.real >= lower) & (x.real < upper)
         moved = np.where(within, of_piece(x - start), moved)
         lower = upper
-    return body.ratio * moved
+    return joint.ratio * moved
 
 
-def displacement_bound(body: BodyEntry, q: Array, derivative: int = 0) -> Array:
+def displacement_bound(joint: TreeJoint, q: Array, derivative: int = 0) -> Array:
     """Return the magnitude of a joint's displacement, or of its derivative, (samples,).
 
     It is the larger one of coordinates of these magnitudes with either sign.
     """
-    either = (np.abs(displacement(body, sign * q, derivative)[:, 0]) for sign in (1.0, -1.0))
+    either = (np.abs(displacement(joint, sign * q, derivative)[:, 0]) for sign in (1.0, -1.0))
     bound: Array = np.maximum(*either)
     return bound

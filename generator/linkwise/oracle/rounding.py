@@ -11,9 +11,9 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.rule.joint_tree import JointTree
 
 from linkwise.arrays import Array
-from linkwise.package.entries import RigidTree
 
 NOISE = 1e-11
 """Relative noise; far above rounding, and small enough for matrices that lose ten digits."""
@@ -28,7 +28,7 @@ def rounding_growth(joints: int) -> float:
 
 
 def measure_rounding(
-    answers: Callable[[RigidTree], Mapping[str, Array]], tree: RigidTree, losing: Array | float = 1.0
+    answers: Callable[[JointTree], Mapping[str, Array]], tree: JointTree, losing: Array | float = 1.0
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return answers by name, samples first, and scales: each sample's largest change, for all its numbers.
 
@@ -43,7 +43,7 @@ def measure_rounding(
         for what, value in values.items():
             moved = np.abs(changed[what] - value).reshape(len(value), -1).max(-1, initial=0.0)
             scales[what] = np.maximum(scales[what], moved / NOISE)
-    losing = losing * rounding_growth(len(tree.bodies))
+    losing = losing * rounding_growth(len(tree.joints))
     scales = {what: scale * losing for what, scale in scales.items()}
     return values, {
         what: np.broadcast_to(scale.reshape(-1, *[1] * (values[what].ndim - 1)), values[what].shape)
@@ -51,8 +51,8 @@ def measure_rounding(
     }
 
 
-@dataclass(frozen=True)
-class NoisyTree(RigidTree):
+@dataclass(frozen=True, kw_only=True)
+class NoisyTree(JointTree):
     """A tree with noise in its numbers, with which the recursion puts noise in its sums too."""
 
     generator: np.random.Generator
@@ -65,7 +65,7 @@ class NoisyTree(RigidTree):
         return value + noise
 
 
-def _noisy(tree: RigidTree, generator: np.random.Generator) -> NoisyTree:
+def _noisy(tree: JointTree, generator: np.random.Generator) -> NoisyTree:
     """Return the tree with NOISE in every number, by the size of the vector or matrix that it is part of."""
 
     def off(number: float) -> float:
@@ -84,17 +84,18 @@ def _noisy(tree: RigidTree, generator: np.random.Generator) -> NoisyTree:
         noise = NOISE * generator.standard_normal((3, 3))
         return tuple(tuple(row) for row in (np.array(rows) + noise).tolist())
 
-    bodies = tuple(
+    joints = tuple(
         replace(
-            body,
-            ratio=off(body.ratio),
-            rotation=turned(body.rotation),
-            translation=vector(body.translation),
-            mass=off(body.mass),
-            com=vector(body.com),
-            inertia=matrix(body.inertia),
+            joint,
+            ratio=off(joint.ratio),
+            rotation=turned(joint.rotation),
+            translation=vector(joint.translation),
         )
-        for body in tree.bodies
+        for joint in tree.joints
+    )
+    links = tuple(
+        replace(link, mass=off(link.mass), com=vector(link.com), inertia=matrix(link.inertia))
+        for link in tree.links
     )
     frames = tuple(
         replace(frame, rotation=turned(frame.rotation), translation=vector(frame.translation))
@@ -105,6 +106,6 @@ def _noisy(tree: RigidTree, generator: np.random.Generator) -> NoisyTree:
         for coupling in tree.couplings
     )
     ties = tuple(replace(tie, length=off(tie.length)) for tie in tree.ties)
-    entries = {field.name: getattr(tree, field.name) for field in fields(RigidTree)}
-    entries |= {"bodies": bodies, "frames": frames, "couplings": couplings, "ties": ties}
+    entries = {field.name: getattr(tree, field.name) for field in fields(JointTree)}
+    entries |= {"joints": joints, "links": links, "frames": frames, "couplings": couplings, "ties": ties}
     return NoisyTree(**entries | {"gravity": vector(tree.gravity)}, generator=generator)

@@ -1,75 +1,76 @@
-"""Checks that joints, links and rigid bodies of a manifest agree with each other."""
+"""Checks that the tree of a manifest agrees with itself and with what stands beside it."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
-from linkwise_runtime.rule.joint_tree import TreeCurve
+from linkwise_runtime.rule.joint_tree import JointTree, TreeCurve, Triple
+from linkwise_runtime.structure import PassiveJoint
 
-from linkwise.package.entries import PLACE, JointEntry, LinkEntry, RigidTree, Row
+from linkwise.package.entries import PLACE, JointEntry, LinkEntry
 
 ROUNDING = 1e-6
 """Largest error of an entry of a rotation times its transpose."""
 
 
-def check_tree(tree: RigidTree, joints: Sequence[JointEntry], links: Sequence[LinkEntry]) -> None:
-    """Raise ValueError where bodies contradict each other, the joints or the paths of the links."""
+def check_tree(tree: JointTree, joints: Sequence[JointEntry], links: Sequence[LinkEntry]) -> None:
+    """Raise ValueError where joints of the tree contradict each other, the coordinates or the links."""
     paths: list[set[int]] = []
-    for index, body in enumerate(tree.bodies):
-        if not body.coordinate < len(joints):
-            raise ValueError(f"body {index} of the tree hangs on no joint")
-        if body.parent is not None and not body.parent < index:
-            raise ValueError(f"the parent of body {index} of the tree is not an earlier body")
-        paths.append({body.coordinate, *(() if body.parent is None else paths[body.parent])})
-        inertia = np.array(body.inertia)
-        if not _is_rotation(body.rotation):
-            raise ValueError(f"the rotation of body {index} of the tree is not a rotation")
-        if not np.array_equal(inertia, inertia.T):
-            raise ValueError(f"the inertia of body {index} of the tree is not symmetric")
-    by_link = {body.link: path for body, path in zip(tree.bodies, paths, strict=True)}
-    for j, link in enumerate(links):
-        if link.name not in by_link:
-            raise ValueError(f"links[{j}].name is {link.name!r}, which is not in the tree")
-        if set(link.path) != by_link[link.name]:
+    for f, joint in enumerate(tree.joints):
+        if not joint.coordinate < len(joints):
+            raise ValueError(f"tree.joints[{f}].coordinate is not there")
+        if joint.parent is not None and not joint.parent < f:
+            raise ValueError(f"tree.joints[{f}].parent is not an earlier joint")
+        if not _is_rotation(joint.rotation):
+            raise ValueError(f"tree.joints[{f}].rotation is not a rotation")
+        if joint.curve:
+            check_curve(f"tree.joints[{f}]", joint.curve)
+        paths.append({joint.coordinate, *(() if joint.parent is None else paths[joint.parent])})
+    if len(tree.links) != len(links):
+        raise ValueError(f"tree.links has {len(tree.links)} links, links {len(links)}")
+    for j, (body, link) in enumerate(zip(tree.links, links, strict=True)):
+        if not body.joint < len(tree.joints):
+            raise ValueError(f"tree.links[{j}].joint is not there")
+        if (moved := tree.link_name(j)) != link.name:
+            raise ValueError(f"links[{j}].name is {link.name!r}, and its joint in the tree moves {moved!r}")
+        if set(link.path) != paths[body.joint]:
             raise ValueError(f"the path of link {link.name!r} is not that of the tree")
-    _check_joints(tree, joints)
-    for index, body in enumerate(tree.bodies):
-        if body.curve:
-            check_curve(f"bodies[{index}]", body.curve)
-    _check_frames(tree, links)
-    _check_passive(tree)
+        if not np.array_equal(body.inertia, np.transpose(body.inertia)):
+            raise ValueError(f"tree.links[{j}].inertia is not symmetric")
+    _check_coordinates(tree, joints)
+    _check_frames(tree)
     _check_constraints(tree, len(joints))
-    for place in tree.formulas:
+
+
+def check_places(tree: JointTree, formulas: Iterable[str]) -> None:
+    """Raise ValueError for a formula of what is no number of the tree."""
+    lists = {"joints": tree.joints, "frames": tree.frames, "links": tree.links}
+    for place in formulas:
         found = PLACE.fullmatch(place)
-        known = found and (
-            int(found["frame"]) < len(tree.frames)
-            if found["frame"]
-            else int(found["body"] or found["whole"] or 0) < len(tree.bodies)
-        )
-        if not known:
-            raise ValueError(f"tree.formulas has {place[:80]!a}, which is not a place of the tree")
+        name = found and (found["list"] or (found["link"] and "links"))
+        if not found or (name and not int(found["at"] or found["link"]) < len(lists[name])):
+            raise ValueError(f"formulas has {place[:80]!a}, which is not a place of the tree")
 
 
-def _is_rotation(rows: tuple[Row, Row, Row]) -> bool:
+def _is_rotation(rows: tuple[Triple, Triple, Triple]) -> bool:
     turn = np.array(rows)
     return np.allclose(turn @ turn.T, np.eye(3), rtol=0, atol=ROUNDING) and np.linalg.det(turn) > 0
 
 
-def _check_frames(tree: RigidTree, links: Sequence[LinkEntry]) -> None:
-    """Raise ValueError for frames on missing bodies, there twice or no rotation, and links without one."""
+def _check_frames(tree: JointTree) -> None:
+    """Raise ValueError for frames on missing joints, there twice or no rotation, and links without one."""
     carriers: dict[str, int | None] = {}
     for index, frame in enumerate(tree.frames):
-        if frame.joint is not None and not frame.joint < len(tree.bodies):
-            raise ValueError(f"the joint of frame {index} of the tree is not there")
+        if frame.joint is not None and not frame.joint < len(tree.joints):
+            raise ValueError(f"tree.frames[{index}].joint is not there")
         if frame.name in carriers:
             raise ValueError(f"tree.frames has {frame.name[:80]!a} twice")
         if not _is_rotation(frame.rotation):
-            raise ValueError(f"the rotation of frame {index} of the tree is not a rotation")
+            raise ValueError(f"tree.frames[{index}].rotation is not a rotation")
         carriers[frame.name] = frame.joint
-    at = {body.link: b for b, body in enumerate(tree.bodies)}
-    for link in links:
-        if carriers.get(link.name) != at[link.name]:
-            raise ValueError(f"tree.frames has no frame {link.name[:80]!a} on the body of that link")
+    for j, link in enumerate(tree.links):
+        if carriers.get(name := tree.link_name(j)) != link.joint:
+            raise ValueError(f"tree.frames has no frame {name[:80]!a} on the joint of that link")
 
 
 def check_curve(place: str, curve: TreeCurve) -> None:
@@ -80,15 +81,15 @@ def check_curve(place: str, curve: TreeCurve) -> None:
         raise ValueError(f"{place}.curve has starts that do not ascend")
 
 
-def _check_passive(tree: RigidTree) -> None:
+def check_passive(tree: JointTree, passive: Iterable[PassiveJoint]) -> None:
     """Raise ValueError for a passive entry of no joint of the tree, or of one that moves otherwise."""
-    moved = {body.joint: (body.coordinate, body.ratio) for body in tree.bodies}
-    for index, entry in enumerate(tree.passive):
+    moved = {joint.name: (joint.coordinate, joint.ratio) for joint in tree.joints}
+    for index, entry in enumerate(passive):
         if moved.get(entry.joint) != (entry.coordinate, entry.ratio):
-            raise ValueError(f"passive entry {index} of the tree is not of a joint that moves so")
+            raise ValueError(f"passive[{index}] is not of a joint that moves so in the tree")
 
 
-def _check_constraints(tree: RigidTree, count: int) -> None:
+def _check_constraints(tree: JointTree, count: int) -> None:
     """Raise ValueError for ties and couplings that join nothing, and for impossible independent joints."""
     names = Counter([tie.name for tie in tree.ties] + [coupling.name for coupling in tree.couplings])
     for name, times in names.items():
@@ -118,11 +119,11 @@ def _check_constraints(tree: RigidTree, count: int) -> None:
         )
 
 
-def _check_joints(tree: RigidTree, joints: Sequence[JointEntry]) -> None:
+def _check_coordinates(tree: JointTree, joints: Sequence[JointEntry]) -> None:
     units = {"revolute": "rad", "prismatic": "m"}
-    for k, joint in enumerate(joints):
-        own = [body for body in tree.bodies if body.coordinate == k and body.joint == joint.name]
+    for k, entry in enumerate(joints):
+        own = [joint for joint in tree.joints if joint.coordinate == k and joint.name == entry.name]
         if not own:
-            raise ValueError(f"joints[{k}].name is {joint.name!r}, on which no body of the tree hangs")
-        if all(units[body.kind] != joint.unit for body in own):
-            raise ValueError(f"joints[{k}].unit is {joint.unit!r}, which is not that of its kind in the tree")
+            raise ValueError(f"joints[{k}].name is {entry.name!r}, which no joint of the tree with it has")
+        if all(units[joint.kind] != entry.unit for joint in own):
+            raise ValueError(f"joints[{k}].unit is {entry.unit!r}, which is not that of its kind in the tree")

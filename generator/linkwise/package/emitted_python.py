@@ -54,7 +54,8 @@ ARITHMETIC = Grammar(
         ";RUN.lagrangians.lanes: carried"
         ";RUN.file_joints: FileJoint;RUN.parameter_values: ParametricBody"
         ";RUN.structure: JointLimits PassiveJoint Structure;RUN.rule.calls: RigidRule"
-        ";RUN.rule.joint_tree: JointTree TreeCoupling TreeCurve TreeFrame TreeJoint TreeLink TreeTie"
+        ";RUN.rule.joint_tree: JointTree ParametricTree TreeCoupling TreeCurve TreeFrame TreeJoint TreeLink"
+        " TreeTie"
     ),
     whole={"torch": "torch", "numpy": "np"},
     builtins=frozenset(("tuple", "type", "int", "float", "str", "dict")),

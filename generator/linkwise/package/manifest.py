@@ -9,23 +9,25 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from linkwise_runtime.file_joints import FileJoint
+from linkwise_runtime.rule.joint_tree import JointTree
+from linkwise_runtime.structure import PassiveJoint
+
 from linkwise.errors import LinkwiseError
 from linkwise.output import sweep
-from linkwise.package.checked_tree import check_curve, check_tree
+from linkwise.package.checked_tree import check_curve, check_passive, check_places, check_tree
 from linkwise.package.decode import decode, parse_json, require
 from linkwise.package.entries import (
     CodeSize,
     EnergiesEntry,
-    FileJointEntry,
     FollowerEntry,
     JointEntry,
     KernelKind,
     LinkEntry,
-    RigidTree,
     RuntimeEntry,
 )
 
-SCHEMA = 14
+SCHEMA = 15
 LARGEST = 1 << 28
 """Most bytes of a manifest, or of any file of a package; a manifest of a robot of 1000 joints takes some 2
 MB."""
@@ -34,9 +36,9 @@ UNITS = {"angle": "rad", "length": "m", "mass": "kg", "time": "s", "torque": "N 
 CONVENTIONS = {
     "decomposition": "tau_ij = sum_k c2_ijk qdd_k + sum_k c1_ijk qd_k + g_ij: joint i, link j, coordinate k",
     "velocity": "closing: c1 = 1/2 d(tau)/d(qd) of the part quadratic in the velocities",
-    "indices": "in this file they count from 0; parent, and joint of a frame, is an index of tree.bodies, "
-    "None for the ground; first and second of a tie are of tree.frames, those of couplings' terms and "
-    "independent of joints",
+    "indices": "in this file they count from 0; parent, and joint of a link or frame, is an index of "
+    "tree.joints, None for the ground; first and second of a tie are of tree.frames; coordinate, independent "
+    "and those of couplings' terms are of joints",
     "limits": "of joints: lower and upper of the position, velocity and effort either way, as the robot's "
     "file has them; null for none",
     "operations": "additions, multiplications and divisions for one sample; sines and the like apart",
@@ -47,7 +49,7 @@ CONVENTIONS = {
 
 @dataclass(frozen=True)
 class Manifest:
-    """Contents of a package: a `tree` of rigid bodies, or `energies` that a user wrote, link by link.
+    """Contents of a package: a `tree` of rigid links, or `energies` that a user wrote, link by link.
 
     request: the options of `generate`; kernel: how its C computes
     followers: joints of the robot's file that are none here: they follow others, or are fixed
@@ -55,6 +57,9 @@ class Manifest:
     in_radians: joints and followers that logs have in radians, also where others are in degrees
     files: the SHA-256 of every other file, by its path in the package
     operations: those of a full decomposition
+    passive: springs, damping, friction and armature of joints that have any
+    formulas: by its place, such as links[2].com[0], each number of the tree that depends on run-time
+    parameters, as text in their symbols
     code_size: an estimate for C on a microcontroller; None without C
     """
 
@@ -67,12 +72,14 @@ class Manifest:
     joints: tuple[JointEntry, ...]
     links: tuple[LinkEntry, ...]
     followers: tuple[FollowerEntry, ...]
-    file_joints: tuple[FileJointEntry, ...]
+    file_joints: tuple[FileJoint, ...]
     in_radians: tuple[str, ...]
     operations: int
     code_size: CodeSize | None
     parameters: Mapping[str, float]
-    tree: RigidTree | None
+    tree: JointTree | None
+    passive: tuple[PassiveJoint, ...]
+    formulas: Mapping[str, str]
     energies: EnergiesEntry | None
     files: Mapping[str, str]
 
@@ -105,6 +112,10 @@ class Manifest:
             raise ValueError("there must be either a tree or energies")
         if self.tree is not None:
             check_tree(self.tree, self.joints, self.links)
+            check_passive(self.tree, self.passive)
+            check_places(self.tree, self.formulas)
+        elif self.passive or self.formulas:
+            raise ValueError("passive and formulas are of a tree, and there is none")
         if self.energies is not None and [e.link for e in self.energies.links] != names["links"]:
             raise ValueError("energies is not of the links, one for each, in their order")
 
@@ -135,9 +146,9 @@ class Manifest:
             raise LinkwiseError(f"{path} is damaged: {error}; generate the robot again") from error
 
 
-def _check_file_joints(entries: Sequence[FileJointEntry], count: int) -> None:
+def _check_file_joints(entries: Sequence[FileJoint], count: int) -> None:
     """Raise ValueError where joints of the file are not those of the manifest, each once."""
-    if entries and sorted(k for entry in entries for k in entry.joints) != list(range(count)):
+    if entries and sorted(k for entry in entries for k in entry.coordinates) != list(range(count)):
         raise ValueError("file_joints does not have each joint once")
     if sorted(entry.pinocchio for entry in entries) != list(range(len(entries))):
         raise ValueError("file_joints has places in Pinocchio that are not those of so many")

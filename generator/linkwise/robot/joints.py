@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, replace
 from typing import Literal
 
+from linkwise_runtime.file_joints import FileJoint
 from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.errors import LinkwiseError
@@ -23,7 +24,6 @@ from linkwise.robot.robot import (
     Coordinate,
     Follower,
     Limits,
-    MovingJoint,
     unusable,
 )
 
@@ -156,7 +156,7 @@ def followers(
 
 def moving_joints(
     joints: Sequence[tuple[Connection, tuple[Axis, ...]]], moving: Movement, ordered: bool
-) -> tuple[MovingJoint, ...]:
+) -> tuple[FileJoint, ...]:
     """Return the joints that have coordinates, in the order of these.
 
     ordered: whether Pinocchio has siblings in the file's order, and not in that of their joints' names, fixed
@@ -176,7 +176,7 @@ def moving_joints(
     places = {name: at for at, name in enumerate(walked)}
     before = sorted(found, key=lambda name: (places[found[name][0].name], found[name][1]))
     return tuple(
-        MovingJoint(name, KINDS.get(connection.type, "single"), own, before.index(name))
+        FileJoint(name, KINDS.get(connection.type, "single"), own, before.index(name))
         for name, (connection, own) in sorted(found.items(), key=lambda item: item[1][1])
     )
 

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, TypeAlias
 
 import sympy as sp
+from linkwise_runtime.file_joints import FileJoint
 from linkwise_runtime.rule.joint_tree import TreeTie
 from linkwise_runtime.structure import PassiveJoint
 
@@ -96,20 +97,6 @@ class Joint:
     """Position of the link's origin, in m, in the parent's axes."""
     ratio: float = 1.0
     curve: Curve | None = None
-
-
-@dataclass(frozen=True)
-class MovingJoint:
-    """A joint of the file that moves, and its coordinates: fewer than its kind has where some are locked.
-
-    kind: as in `FileJoint` of linkwise_runtime.file_joints
-    pinocchio: index among the joints of Pinocchio's model
-    """
-
-    name: str
-    kind: Literal["single", "continuous", "planar", "ball", "floating"]
-    coordinates: tuple[int, ...]
-    pinocchio: int
 
 
 @dataclass(frozen=True)
@@ -246,7 +233,7 @@ class Robot:
     limits: tuple[Limits, ...] = ()
     """Limits of each coordinate, or empty; limits of joints that follow another do not limit that one."""
     followers: tuple[Follower, ...] = ()
-    file_joints: tuple[MovingJoint, ...] = ()
+    file_joints: tuple[FileJoint, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.coordinates:

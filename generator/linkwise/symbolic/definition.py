@@ -5,21 +5,20 @@ from dataclasses import astuple
 from math import isfinite
 
 import sympy as sp
-from linkwise_runtime.rule.joint_tree import TreeCoupling, TreeFrame
+from linkwise_runtime.file_joints import FileJoint
+from linkwise_runtime.rule.joint_tree import JointTree, TreeCoupling, TreeFrame, TreeJoint, TreeLink
+from linkwise_runtime.structure import PassiveJoint
 from sympy.printing.str import StrPrinter
 
 from linkwise.package.entries import (
-    BodyEntry,
     EnergiesEntry,
     EnergyEntry,
-    FileJointEntry,
     FollowerEntry,
     JointEntry,
-    RigidTree,
     ShareEntry,
 )
 from linkwise.package.formula_symbols import motion_symbol, parameter_symbols
-from linkwise.robot.robot import Robot, Scalar, Vec3
+from linkwise.robot.robot import Scalar, Vec3
 from linkwise.symbolic.system import EnergySystem, RigidSystem, System
 
 LARGEST = 2**53
@@ -36,8 +35,11 @@ def joint_entries(system: System) -> tuple[JointEntry, ...]:
     )
 
 
-def rigid_tree(system: System) -> RigidTree | None:
-    """Return the bodies, frames, passive axes and constraints of a robot; None for a user's own energies."""
+def joint_tree(system: System) -> JointTree | None:
+    """Return the joints, links, frames and constraints of a robot; None for a user's own energies.
+
+    Its numbers are those of the parameters' own values.
+    """
     if not isinstance(system, RigidSystem):
         return None
     robot, values = system.robot, dict(system.parameters)
@@ -48,25 +50,30 @@ def rigid_tree(system: System) -> RigidTree | None:
     def numbers(a: Vec3) -> tuple[float, float, float]:
         return number(a[0]), number(a[1]), number(a[2])
 
-    text = _texts(system)
-    return RigidTree(
+    return JointTree(
         numbers(robot.gravity),
         tuple(
-            BodyEntry(
+            TreeJoint(
+                link.joint.name,
                 link.name,
                 link.parent,
-                link.joint.name,
                 link.joint.kind,
                 link.joint.coordinate,
                 link.joint.ratio,
                 link.joint.rotation,  # type: ignore[arg-type]  # three rows; the type has any number
                 numbers(link.joint.translation),
-                number(link.mass),
-                numbers(link.com),
-                (numbers(link.inertia[0]), numbers(link.inertia[1]), numbers(link.inertia[2])),
                 link.joint.curve,
             )
             for link in robot.links
+        ),
+        tuple(
+            TreeLink(
+                link.chain[-1],
+                number(link.mass),
+                numbers(link.com),
+                (numbers(link.inertia[0]), numbers(link.inertia[1]), numbers(link.inertia[2])),
+            )
+            for link in system.links
         ),
         tuple(
             TreeFrame(
@@ -77,17 +84,28 @@ def rigid_tree(system: System) -> RigidTree | None:
             )
             for frame in robot.named_frames
         ),
-        robot.passive,
         robot.ties,
         tuple(TreeCoupling(coupling.name, coupling.terms) for coupling in robot.couplings),
         robot.independent,
         robot.closed_position,
-        {
-            place: text(value)
-            for place, value in _places(robot)
-            if isinstance(value, sp.Expr) and value.free_symbols
-        },
     )
+
+
+def passive_joints(system: System) -> tuple[PassiveJoint, ...]:
+    """Return the joints with springs, damping, friction or armature."""
+    return system.robot.passive if isinstance(system, RigidSystem) else ()
+
+
+def formula_texts(system: System) -> dict[str, str]:
+    """Return formulas of the tree's numbers that depend on run-time parameters, by their place in it."""
+    if not isinstance(system, RigidSystem):
+        return {}
+    text = _texts(system)
+    return {
+        place: text(value)
+        for place, value in _places(system)
+        if isinstance(value, sp.Expr) and value.free_symbols
+    }
 
 
 def follower_entries(system: System) -> tuple[FollowerEntry, ...]:
@@ -106,12 +124,12 @@ def follower_entries(system: System) -> tuple[FollowerEntry, ...]:
     )
 
 
-def file_joint_entries(system: System) -> tuple[FileJointEntry, ...]:
+def file_joint_entries(system: System) -> tuple[FileJoint, ...]:
     """Return the moving joints of the robot's file; none where each is one coordinate, in the same order."""
     joints = system.robot.file_joints if isinstance(system, RigidSystem) else ()
     if all(one.kind == "single" and one.pinocchio == at for at, one in enumerate(joints)):
         return ()
-    return tuple(FileJointEntry(one.name, one.kind, one.coordinates, one.pinocchio) for one in joints)
+    return joints
 
 
 def in_radians(system: System) -> tuple[str, ...]:
@@ -150,16 +168,17 @@ def energies(system: System) -> EnergiesEntry | None:
     return EnergiesEntry(links, time, tuple(symbol.name for symbol in system.inputs))
 
 
-def _places(robot: Robot) -> Iterator[tuple[str, Scalar]]:
+def _places(system: RigidSystem) -> Iterator[tuple[str, Scalar]]:
     """Yield every number of a tree that may depend on parameters, with its place."""
-    yield from _entries("gravity", robot.gravity)
-    for b, link in enumerate(robot.links):
-        yield f"bodies[{b}].mass", link.mass
-        yield from _entries(f"bodies[{b}].translation", link.joint.translation)
-        yield from _entries(f"bodies[{b}].com", link.com)
+    yield from _entries("gravity", system.robot.gravity)
+    for f, moved in enumerate(system.robot.links):
+        yield from _entries(f"joints[{f}].translation", moved.joint.translation)
+    for j, link in enumerate(system.links):
+        yield f"links[{j}].mass", link.mass
+        yield from _entries(f"links[{j}].com", link.com)
         for i, row in enumerate(link.inertia):
-            yield from _entries(f"bodies[{b}].inertia[{i}]", row)
-    for f, frame in enumerate(robot.named_frames):
+            yield from _entries(f"links[{j}].inertia[{i}]", row)
+    for f, frame in enumerate(system.robot.named_frames):
         yield from _entries(f"frames[{f}].translation", frame.translation)
 
 

@@ -12,7 +12,7 @@ from ..interface import Numbers, is_traced, namespace, side_by_side
 from ..robot_axes import axes_of
 from ..structure import Structure, passive_torques
 from .inertia_solve import solve_inertia
-from .packed import PackedEngine, PackedTables
+from .packed import PackedBackend, PackedTables
 
 AT_ONCE = 1 << 22
 """Most packed numbers of a chunk of samples, each at n unit velocities, or of one sample at some of them."""
@@ -43,9 +43,9 @@ class Answers:
     contiguous = False
     """True if `out` must be contiguous."""
 
-    def __init__(self, engine: PackedEngine) -> None:
-        self._engine, self._structure = engine, engine.structure
-        self._tables = PackedTables(engine)
+    def __init__(self, backend: PackedBackend) -> None:
+        self._backend, self._structure = backend, backend.structure
+        self._tables = PackedTables(backend)
 
     @cached_property
     def shapes(self) -> dict[str, Shapes]:
@@ -59,23 +59,23 @@ class Answers:
 
     def packed(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return packed c2, c1, g, tau and h1, (..., count) each."""
-        return self._engine.decomposition(q, qd, qdd)
+        return self._backend.decomposition(q, qd, qdd)
 
     def packed_torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return tau on the paths, (..., count)."""
-        return (self._engine.torque(q, qd, qdd),)
+        return (self._backend.torque(q, qd, qdd),)
 
     def partial_torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return tau_ij, (..., n, N)."""
-        return (self._tables.spread(self._engine.torque(q, qd, qdd), "torque"),)
+        return (self._tables.spread(self._backend.torque(q, qd, qdd), "torque"),)
 
     def inverse_dynamics(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return tau_i, (..., n)."""
-        return (self._tables.sum_over_links(self._engine.torque(q, qd, qdd)),)
+        return (self._tables.sum_over_links(self._backend.torque(q, qd, qdd)),)
 
     def passive_torque(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return the torques for spring, damping, friction and armature, (..., n) each."""
-        return passive_torques(self._engine, self._structure.passive_sums, q, qd, qdd)
+        return passive_torques(self._backend, self._structure.passive_sums, q, qd, qdd)
 
     def coefficients(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
         """Return c2, c1 (..., n, N, n) and g (..., n, N)."""
@@ -104,11 +104,11 @@ class Answers:
         if not self._structure.shares:
             (gravity,) = self.gravity_torque_by_link(q)
             return (gravity[..., None],)
-        return (self._tables.spread(self._engine.named_shares(q, qd), "shares"),)
+        return (self._tables.spread(self._backend.named_shares(q, qd), "shares"),)
 
     def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return c0, (..., n, N, n)."""
-        return (self._tables.spread(self._engine.position_gradient(q, qd, qdd), "velocity"),)
+        return (self._tables.spread(self._backend.position_gradient(q, qd, qdd), "velocity"),)
 
     def masked(self, q: Numbers, qd: Numbers, qdd: Numbers, weights: Numbers) -> Sequence[Numbers]:
         """Return sum over m, k of w_mk c_m,ijk q_k^(m), (..., n, N), w of shape (3, n)."""
@@ -123,11 +123,11 @@ class Answers:
 
     def regressor(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return Y of tau_ij, (..., n, N, 10)."""
-        return (self._tables.spread_rows(self._engine.regressor(q, qd, qdd), "torque"),)
+        return (self._tables.spread_rows(self._backend.regressor(q, qd, qdd), "torque"),)
 
     def coefficient_regressors(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
         """Return Y of c2 and c1 (..., n, N, n, 10) and of g (..., n, N, 10)."""
-        rows = self._engine.coefficient_regressors(q, qd, self._rest(q))
+        rows = self._backend.coefficient_regressors(q, qd, self._rest(q))
         fields = ("acceleration", "velocity", "gravity")
         return tuple(self._tables.spread_rows(a, field) for a, field in zip(rows, fields, strict=True))
 
@@ -179,8 +179,8 @@ class Answers:
         if not (passive and self._structure.passive):
             return mass, force
         sums = self._structure.passive_sums
-        spring, damping, friction, _ = passive_torques(self._engine, sums, q, qd, rest)
-        armature = self._engine.constant(np.diag(sums.armature), q)
+        spring, damping, friction, _ = passive_torques(self._backend, sums, q, qd, rest)
+        armature = self._backend.constant(np.diag(sums.armature), q)
         return mass + armature, force + (spring + damping + friction)
 
     def sums(self, q: Numbers, qd: Numbers) -> tuple[Numbers, Numbers, Numbers]:
@@ -191,7 +191,7 @@ class Answers:
 
     def energy(self, q: Numbers, qd: Numbers) -> Sequence[Numbers]:
         """Return K_j and P_j, (..., N) each."""
-        return [side_by_side(values) for values in self._engine.energies(q, qd)]
+        return [side_by_side(values) for values in self._backend.energies(q, qd)]
 
     def power(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return c2_ijk qdd_k qd_i, c1_ijk qd_k qd_i (..., n, N, n) and g_ij qd_i (..., n, N)."""
@@ -209,9 +209,9 @@ class Answers:
 
     def check_regresses(self) -> None:
         """Raise ValueError where the back end lacks the calls that are for rigid links."""
-        if not self._engine.regresses:
+        if not self._backend.regresses:
             raise ValueError(
-                f"{self._structure.name} on {self._engine.name} has no regressors, which come from the rule "
+                f"{self._structure.name} on {self._backend.name} has no regressors, which come from the rule "
                 "for rigid links; load numpy, torch or native of a robot of rigid links"
             )
 
@@ -233,12 +233,12 @@ class Answers:
                 "Christoffel symbols; coefficients has c1"
             )
         n, batch, each = self._structure.n, q.shape[:-1], max(1, sum(self._structure.sizes))
-        units = self._engine.constant(np.eye(n), q)
+        units = self._backend.constant(np.eye(n), q)
         if is_traced(q):
             return (side_by_side(self._of_units(q, units, made)),)
-        if self._engine.samples:  # samples stay with their numbers
+        if self._backend.samples:  # samples stay with their numbers
             # What is not of the motion's samples is refused here: the unit velocities below are samples too.
-            self._engine.torque(q, self._rest(q), self._rest(q))
+            self._backend.torque(q, self._rest(q), self._rest(q))
             rates = max(1, AT_ONCE // (each * max(1, math.prod(batch))))
             return (side_by_side(_joined([self._of_units(q, u, made) for u in _pieces(units, rates)], -1)),)
         samples, rates = max(1, AT_ONCE // (n * each)), max(1, AT_ONCE // each)
@@ -260,7 +260,7 @@ class Answers:
         return symbols
 
     def _rest(self, q: Numbers) -> Numbers:
-        return self._engine.zeros(q, self._structure.n)
+        return self._backend.zeros(q, self._structure.n)
 
 
 def _pieces(rows: Numbers, most: int) -> list[Numbers]:

@@ -33,7 +33,7 @@ class TorqueOfOne(Protocol):
         """Return the torque (n,) for motion and targets by name; None where the function has no answer."""
 
 
-class PackedEngine(Library):
+class PackedBackend(Library):
     """Base of back ends: packed values (..., count) in the order of `Layout`, for motion (..., n)."""
 
     name: ClassVar[str]
@@ -108,9 +108,9 @@ class SumTable(NamedTuple):
 class PackedTables:
     """Tables of constants, for each device, by which packed values of one robot are spread and summed."""
 
-    def __init__(self, engine: PackedEngine) -> None:
-        structure = engine.structure
-        self._engine, self._layout, self._n = engine, structure.layout, structure.n
+    def __init__(self, backend: PackedBackend) -> None:
+        structure = backend.structure
+        self._backend, self._layout, self._n = backend, structure.layout, structure.n
         over = (structure.n, structure.N)
         self._rows: dict[str, Indices] = structure.layout._asdict()
         self._shapes = {
@@ -125,7 +125,7 @@ class PackedTables:
             self._rows["shares"] = structure.share_rows
         self._places: dict[object, Numbers] = {}
         self._sums: dict[object, SumTable] = {}
-        for like in engine.examples:
+        for like in backend.examples:
             for field in self._shapes:
                 self._table(field, like)
             for field in ("acceleration", "velocity"):
@@ -140,13 +140,13 @@ class PackedTables:
             padded[..., :-1] = values
             placed: NDArray[np.floating] = padded.take(cast(Indices, table), -1)
             return placed.reshape(*batch, *self._shapes[field])
-        entries = self._engine.concatenate([values, self._engine.zeros(values, 1)])[..., table]
+        entries = self._backend.concatenate([values, self._backend.zeros(values, 1)])[..., table]
         dense: Numbers = entries.reshape(*batch, *self._shapes[field])
         return dense
 
     def spread_rows(self, values: Numbers, field: str) -> Numbers:
         """Return rows of 10 (..., 10 count) of a field in (..., n, N[, n], 10), zeros elsewhere."""
-        padded = self._engine.concatenate([values, self._engine.zeros(values, PARAMETERS)])
+        padded = self._backend.concatenate([values, self._backend.zeros(values, PARAMETERS)])
         rows = padded.reshape(*values.shape[:-1], len(getattr(self._layout, field)) + 1, PARAMETERS)
         entries = rows[..., self._table(field, values), :]
         dense: Numbers = entries.reshape(*values.shape[:-1], *self._shapes[field], PARAMETERS)
@@ -161,7 +161,7 @@ class PackedTables:
         # Any: a table of arrays or of tensors, as the values are.
         table: Any = self._sum_table(field, values)
         size = self._n * self._n
-        sums = self._engine.zeros(values, size)
+        sums = self._backend.zeros(values, size)
         if not isinstance(values, np.ndarray):
             chosen = cast("Tensor", values).index_select(-1, table.values)
             sums = cast("Tensor", sums).index_add(-1, table.entries, chosen)
@@ -177,7 +177,7 @@ class PackedTables:
     def _table(self, field: str, like: Numbers) -> Numbers:
         key = field, getattr(like, "device", None)
         if key not in self._places:
-            self._places[key] = self._engine.index(self._positions(field), like)
+            self._places[key] = self._backend.index(self._positions(field), like)
         return self._places[key]
 
     def _joint_sums(self, like: Numbers) -> Numbers:
@@ -187,14 +187,14 @@ class PackedTables:
             rows = self._layout.torque
             sums = np.zeros((len(rows), self._n))
             sums[np.arange(len(rows)), rows[:, 0]] = 1.0
-            self._places[key] = self._engine.constant(sums, like)
+            self._places[key] = self._backend.constant(sums, like)
         return self._places[key]
 
     def _sum_table(self, field: str, like: Numbers) -> SumTable:
         key = field, getattr(like, "device", None)
         if key not in self._sums:
             listed = sum_table(self._layout, field, self._n)
-            self._sums[key] = SumTable(*(self._engine.index(a, like) for a in listed))
+            self._sums[key] = SumTable(*(self._backend.index(a, like) for a in listed))
         return self._sums[key]
 
     def _positions(self, field: str) -> Indices:

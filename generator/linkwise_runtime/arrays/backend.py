@@ -17,7 +17,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ..answers.answers import Answers
-from ..answers.packed import PackedEngine, TorqueOfOne
+from ..answers.packed import PackedBackend, TorqueOfOne
 from ..arguments import NOTHING, Beside, as_array, shape_of
 from ..interface import ClosedForms, Numbers
 from ..kinematics.frame_answers import FrameAnswers
@@ -32,8 +32,8 @@ Rows = tuple[tuple[int, int], ...]
 KERNELS = ("auto", "straight", "rule")
 
 
-class ArrayBackend(PackedEngine):
-    """Base of the back ends, each of which is a `PackedEngine` that computes with one library."""
+class ArrayBackend(PackedBackend):
+    """Base of the back ends, each of which is a `PackedBackend` that computes with one library."""
 
     takes_tensors: ClassVar[bool]
     """True if the back end computes with torch tensors."""

@@ -141,18 +141,18 @@ class Constraints(Generic[Array]):
         held_at: positions (..., n) in which contacts took hold of their frames; without them contacts have no
         violation. Rolling contacts never have one.
         """
-        engine, (at, held) = self._read(q=q, held_at=q if held_at is None else held_at)
-        return cast("Array", self.ties.rows(engine).violation(at, held))
+        backend, (at, held) = self._read(q=q, held_at=q if held_at is None else held_at)
+        return cast("Array", self.ties.rows(backend).violation(at, held))
 
     def jacobian(self, q: Array) -> Array:
         """Return the constraint Jacobian A (..., C, n), at any q."""
-        engine, (at,) = self._read(q=q)
-        return cast("Array", side_by_side(self.ties.rows(engine).at(at).positions()[..., 1:]))
+        backend, (at,) = self._read(q=q)
+        return cast("Array", side_by_side(self.ties.rows(backend).at(at).positions()[..., 1:]))
 
     def jacobian_rate(self, q: Array, qd: Array) -> Array:
         """Return dA/dt (..., C, n), at any q and qd, which are used as they are given."""
-        engine, (at, moved) = self._read(q=q, qd=qd)
-        return cast("Array", self.ties.rows(engine).rates(at, moved))
+        backend, (at, moved) = self._read(q=q, qd=qd)
+        return cast("Array", self.ties.rows(backend).rates(at, moved))
 
     @property
     def closed_position(self) -> NDArray[np.float64]:
@@ -185,23 +185,23 @@ class Constraints(Generic[Array]):
                 f"start is where joints are led from that q does not have, and q has shape {shape_of(q)}; "
                 f"leave it out, or give q the {m} independent joints alone"
             )
-        engine, (at, held) = self._read(q=q, held_at=q if held_at is None else held_at)
-        return cast("Array", self.ties.closed(engine, at, held).q)
+        backend, (at, held) = self._read(q=q, held_at=q if held_at is None else held_at)
+        return cast("Array", self.ties.closed(backend, at, held).q)
 
     def velocity_map(self, q: Array) -> Array:
         """Return the velocity map G (..., n, m) of qd = G yd."""
-        engine, (at,) = self._read(q=q)
-        return cast("Array", side_by_side(self.ties.place(engine, at).found.map))
+        backend, (at,) = self._read(q=q)
+        return cast("Array", side_by_side(self.ties.place(backend, at).found.map))
 
     def velocity(self, q: Array, yd: Array) -> Array:
         """Return qd of all joints, (..., n), for yd of the independent ones, (..., m)."""
-        engine, (at, own) = self._read(self._own("yd", yd), q=q)
-        return cast("Array", self.ties.place(engine, at).velocity(own))
+        backend, (at, own) = self._read(self._own("yd", yd), q=q)
+        return cast("Array", self.ties.place(backend, at).velocity(own))
 
     def acceleration(self, q: Array, qd: Array, ydd: Array) -> Array:
         """Return qdd of all joints, (..., n), for ydd of the independent ones, (..., m)."""
-        engine, (at, moved, own) = self._read(self._own("ydd", ydd), q=q, qd=qd)
-        place = self.ties.place(engine, at)
+        backend, (at, moved, own) = self._read(self._own("ydd", ydd), q=q, qd=qd)
+        place = self.ties.place(backend, at)
         return cast("Array", place.velocity(own) + place.bias(place.velocity(place.own(moved))))
 
     def velocity_accelerations(self, q: Array, qd: Array) -> Array:
@@ -237,13 +237,13 @@ class Constraints(Generic[Array]):
 
     def coefficients(self, q: Array, qd: Array) -> Coefficients[Array]:
         """Return c2^ and c1^ (..., m, N, m) and g^ (..., m, N) of the closing convention."""
-        place, engine, (_, moved) = self._moving(q, qd)
-        return cast("Coefficients[Array]", Coefficients(*self.ties.coefficients(engine, place, moved)))
+        place, backend, (_, moved) = self._moving(q, qd)
+        return cast("Coefficients[Array]", Coefficients(*self.ties.coefficients(backend, place, moved)))
 
     def propagation(self, q: Array, qd: Array, qdd: Array) -> Propagation[Array]:
         """Return c2^_ajb ydd_b, c1^_ajb yd_b (..., m, N, m) and g^_aj (..., m, N): they sum to tau^_aj."""
-        place, engine, (_, moved, asked) = self._moving(q, qd, qdd=qdd)
-        c2, c1, g = self.ties.coefficients(engine, place, moved)
+        place, backend, (_, moved, asked) = self._moving(q, qd, qdd=qdd)
+        c2, c1, g = self.ties.coefficients(backend, place, moved)
         yd, ydd = (place.own(a)[..., None, None, :] for a in (moved, asked))
         return cast("Propagation[Array]", Propagation(c2 * ydd, c1 * yd, g))
 
@@ -273,16 +273,16 @@ class Constraints(Generic[Array]):
         tau: torques on all joints, (..., n)
         passive: whether joints have p, as in `Dynamics.forward_dynamics`
         """
-        place, engine, (_, moved, asked) = self._moving(q, qd, tau=tau)
-        qdd, forces = self.ties.motion(engine, place, moved, asked, passive)
+        place, backend, (_, moved, asked) = self._moving(q, qd, tau=tau)
+        qdd, forces = self.ties.motion(backend, place, moved, asked, passive)
         return cast("ConstrainedMotion[Array]", ConstrainedMotion(qdd, forces))
 
     @cached_property
     def _closed_position(self) -> NDArray[np.float64]:
         chosen = self.ties.chosen.closed_position
-        engine, (q,) = self._read(q=np.broadcast_to(chosen, (*self._robot.backend.samples, len(chosen))))
+        backend, (q,) = self._read(q=np.broadcast_to(chosen, (*self._robot.backend.samples, len(chosen))))
         with without_gradient(q):
-            found = self.ties.closed(engine, q, q).q
+            found = self.ties.closed(backend, q, q).q
         return np.array(array_of(found), dtype=np.float64)
 
     def _led(self, q: object, held_at: object, start: object) -> Numbers:
@@ -295,23 +295,23 @@ class Constraints(Generic[Array]):
             name: Beside(value, (len(joints),), "all joints in a closed position", joints)
             for name, value in asked.items()
         }
-        engine, (own, begin, *last) = self._robot.door.read({"q": q}, self.independent, given)
+        backend, (own, begin, *last) = self._robot.door.read({"q": q}, self.independent, given)
         held = last[0] if last else begin
         if is_traced(own):
             raise ValueError(
                 "joints cannot be led where nobody may look at numbers, as under vmap or a compiler; give "
                 f"closed(q) all {len(joints)} joints"
             )
-        columns = self.ties.columns(engine, own)
+        columns = self.ties.columns(backend, own)
         with without_gradient(own):
             found = led(
-                lambda q: self.ties.closed_place(engine, q, held),
+                lambda q: self.ties.closed_place(backend, q, held),
                 begin,
                 own,
                 columns,
                 self._robot.joint_names,
             )
-        return self.ties.closed(engine, with_independent(found, own, columns), held).q
+        return self.ties.closed(backend, with_independent(found, own, columns), held).q
 
     def _read(
         self, beside: Mapping[str, Beside] = NOTHING, **named: object
@@ -329,24 +329,24 @@ class Constraints(Generic[Array]):
         about = Beside(torque, (len(joints),), "one for each joint; with by_link=True (..., n, X)", joints)
         if by_link:
             about = Beside(torque, (len(joints), ANY), "joints, and X that load them", joints)
-        engine, (at, values) = self._read({"torque": about}, q=q)
-        return self.ties.place(engine, at).found, values if by_link else values[..., None]
+        backend, (at, values) = self._read({"torque": about}, q=q)
+        return self.ties.place(backend, at).found, values if by_link else values[..., None]
 
     def _moving(
         self, q: object, qd: object, **more: object
     ) -> tuple[ClosedPlace, ArrayBackend, Sequence[Numbers]]:
         """Return how joints follow, the back end, and q and qd in which all follow, then other arguments."""
-        engine, (at, moved, *others) = self._read(NOTHING, q=q, qd=qd, **more)
-        place = self.ties.place(engine, at)
-        return place, engine, (at, place.velocity(place.own(moved)), *others)
+        backend, (at, moved, *others) = self._read(NOTHING, q=q, qd=qd, **more)
+        place = self.ties.place(backend, at)
+        return place, backend, (at, place.velocity(place.own(moved)), *others)
 
     def _accelerated(
         self, q: object, qd: object, qdd: object
     ) -> tuple[DependentMap, Answers, tuple[Numbers, Numbers, Numbers]]:
         """Return how joints follow, the answers for the open tree, and a motion in which they follow."""
-        place, engine, (at, moved, asked) = self._moving(q, qd, qdd=qdd)
+        place, backend, (at, moved, asked) = self._moving(q, qd, qdd=qdd)
         qdd_there = place.velocity(place.own(asked)) + place.bias(moved)
-        return place.found, engine.answers, (at, moved, qdd_there)
+        return place.found, backend.answers, (at, moved, qdd_there)
 
 
 def made_again(robot: object, call: str, arguments: tuple[object, ...]) -> object:

@@ -55,7 +55,7 @@ class TieRows:
         """Return the rows at positions (..., n); contacts are held as they are there, or as at `held_at`."""
         is_held = self._has_contacts and held_at is not None
         asked = self._asked([q, held_at] if is_held and held_at is not None else [q])
-        one = self._frames.engine.one_sample
+        one = self._frames.backend.one_sample
         if one is not None and isinstance(q, np.ndarray) and q.size == q.shape[-1] and self._ends:
             return RowsAtOne(self._frames, asked, q, self.count, self._ends, one)
         return RowsAt(self._frames, asked, q, self.count)
@@ -68,7 +68,7 @@ class TieRows:
             return violation(at.xp, at.tables, at.motion[0], _pairs(at), held)
 
         motion = [q, held_at]
-        values = in_pieces(self._frames.engine, motion, self._asked(motion), answer, self.count)
+        values = in_pieces(self._frames.backend, motion, self._asked(motion), answer, self.count)
         return side_by_side(values.reshape(*q.shape[:-1], self.count))
 
     def rates(self, q: Numbers, qd: Numbers) -> Numbers:
@@ -126,7 +126,7 @@ class RowsAt:
         return pair_changes(at.xp, at.tables, at.numbers, at.motion[1], placed)
 
     def _made(self, answer: Callable[[OnTies], Numbers], asked: OnTies, width: int) -> Numbers:
-        flat = in_pieces(self._frames.engine, asked.motion, asked, answer, self._count * width)
+        flat = in_pieces(self._frames.backend, asked.motion, asked, answer, self._count * width)
         return side_by_side(flat.reshape(*self._shape[:-1], self._count, width))
 
 

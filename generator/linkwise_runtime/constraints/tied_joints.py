@@ -40,57 +40,57 @@ class TiedJoints:
         self._columns: dict[object, JointColumns] = {}
         self._rows: dict[ArrayBackend, TieRows] = {}
 
-    def rows(self, engine: ArrayBackend) -> TieRows:
+    def rows(self, backend: ArrayBackend) -> TieRows:
         """Return the rows of the constraints on a back end."""
-        if engine not in self._rows:
-            self._rows[engine] = TieRows(engine.frames, self.chosen)
-        return self._rows[engine]
+        if backend not in self._rows:
+            self._rows[backend] = TieRows(backend.frames, self.chosen)
+        return self._rows[backend]
 
-    def columns(self, engine: ArrayBackend, q: Numbers) -> JointColumns:
+    def columns(self, backend: ArrayBackend, q: Numbers) -> JointColumns:
         """Return the indices of the joints, for taking entries of `q`."""
         key = type(q), getattr(q, "device", None)
         if key not in self._columns:
-            self._columns[key] = JointColumns(*(engine.index(a, q) for a in self._listed))
+            self._columns[key] = JointColumns(*(backend.index(a, q) for a in self._listed))
         return self._columns[key]
 
-    def place(self, engine: ArrayBackend, q: Numbers) -> ClosedPlace:
+    def place(self, backend: ArrayBackend, q: Numbers) -> ClosedPlace:
         """Return how joints follow at q (..., n), in which all ties close; raises as `Constraints` says."""
-        return closed_place(self.rows(engine), self.columns(engine, q), q, self._tolerance, self._names)
+        return closed_place(self.rows(backend), self.columns(backend, q), q, self._tolerance, self._names)
 
-    def closed(self, engine: ArrayBackend, q: Numbers, held_at: Numbers) -> TiesAt:
+    def closed(self, backend: ArrayBackend, q: Numbers, held_at: Numbers) -> TiesAt:
         """Return the ties once dependent joints close them; held_at: where contacts took hold, (..., n)."""
-        columns = self.columns(engine, q)
-        return closed(self.rows(engine), columns, q, held_at, self._tolerance, self._names)
+        columns = self.columns(backend, q)
+        return closed(self.rows(backend), columns, q, held_at, self._tolerance, self._names)
 
-    def closed_place(self, engine: ArrayBackend, q: Numbers, held_at: Numbers) -> ClosedPlace:
+    def closed_place(self, backend: ArrayBackend, q: Numbers, held_at: Numbers) -> ClosedPlace:
         """Return how joints follow once dependent joints close the ties; held_at: as in `closed`."""
-        at = self.closed(engine, q, held_at)
-        return checked_place(at, self.columns(engine, at.q), self._names)
+        at = self.closed(backend, q, held_at)
+        return checked_place(at, self.columns(backend, at.q), self._names)
 
     def motion(
-        self, engine: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool
+        self, backend: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool
     ) -> tuple[Numbers, Numbers]:
         """Return qdd (..., n) and lambda (..., C) under torques (..., n), at velocities that follow.
 
         (G^T M G) ydd = G^T (tau - h - g - M bias), then A^T lambda = M qdd + h + g - tau.
         """
-        mass, bias = engine.answers.equations(place.q, qd, passive)
+        mass, bias = backend.answers.equations(place.q, qd, passive)
         force, own = tau - bias, place.bias(qd)
         qdd = place.velocity(self._solved(place, mass, force, own)) + own
         return qdd, tie_forces(place.found, (times(mass, qdd) - force)[..., None])[..., 0]
 
     def acceleration(
-        self, engine: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool
+        self, backend: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool
     ) -> Numbers:
         """Return ydd (..., m) under torques (..., n), at velocities that follow."""
-        mass, bias = engine.answers.equations(place.q, qd, passive)
+        mass, bias = backend.answers.equations(place.q, qd, passive)
         return self._solved(place, mass, tau - bias, place.bias(qd))
 
     def coefficients(
-        self, engine: ArrayBackend, place: ClosedPlace, qd: Numbers
+        self, backend: ArrayBackend, place: ClosedPlace, qd: Numbers
     ) -> tuple[Numbers, Numbers, Numbers]:
         """Return c2^ = G^T c2 G, c1^ = G^T (c2 dG/dt + c1 G) and g^ = G^T g, for each link."""
-        c2, c1, g = engine.answers.coefficients(place.q, qd)
+        c2, c1, g = backend.answers.coefficients(place.q, qd)
         found, rate = place.found, place.map_rate(qd)[..., None, :, :]
         mapped = found.map[..., None, :, :]
         acceleration, velocity = c2 @ mapped, c2 @ rate + c1 @ mapped

@@ -62,11 +62,11 @@ class Controller:
         frame = "" if self._frame is None else f", frame {self._frame.frame!r}"
         return f"{self._robot.name} on {self._robot.backend.name}{frame}"
 
-    def _torque_of_one(self, engine: ArrayBackend, given: Given) -> Numbers | None:
+    def _torque_of_one(self, backend: ArrayBackend, given: Given) -> Numbers | None:
         """Return the torque if the back end has it for one sample without these arrays, else None."""
-        if engine not in self._of_one:
-            self._of_one[engine] = engine.controller(self._joints.targets, self._frame)
-        of_one = self._of_one[engine]
+        if backend not in self._of_one:
+            self._of_one[backend] = backend.controller(self._joints.targets, self._frame)
+        of_one = self._of_one[backend]
         return None if of_one is None else of_one.torque(given)
 
     def _arrays(
@@ -74,8 +74,8 @@ class Controller:
     ) -> tuple[ArrayBackend, dict[str, Numbers]]:
         """Return the back end and the arguments by name; motion: other arguments of shape (..., n)."""
         named = {"q": q, "qd": qd} | {name: a for name, a in motion.items() if a is not None}
-        engine, arrays = self._robot.door.read(named, beside=beside)
-        return engine, dict(zip((*named, *beside), arrays, strict=True))
+        backend, arrays = self._robot.door.read(named, beside=beside)
+        return backend, dict(zip((*named, *beside), arrays, strict=True))
 
 
 class PartialImpedance(Controller, Generic[Array]):
@@ -127,12 +127,12 @@ class PartialImpedance(Controller, Generic[Array]):
 
     def __call__(self, q: Array, qd: Array, target: object = None, external: Array | None = None) -> Array:
         """Return the torque u of the actuators, (..., n), in N m or N."""
-        engine, given = self._given(q, qd, target, external)
-        torque = self._torque_of_one(engine, given)
+        backend, given = self._given(q, qd, target, external)
+        torque = self._torque_of_one(backend, given)
         if torque is None and self._frame is None and self._joints.targets.inertia.natural:
-            state = self._joints.state(engine, given["q"], given["qd"])
-            torque = self._joints.natural_torque(engine, state, given["qd"], _errors(given))
-        return cast("Array", self._followed(engine, given)[1] if torque is None else torque)
+            state = self._joints.state(backend, given["q"], given["qd"])
+            torque = self._joints.natural_torque(backend, state, given["qd"], _errors(given))
+        return cast("Array", self._followed(backend, given)[1] if torque is None else torque)
 
     def acceleration(
         self, q: Array, qd: Array, target: object = None, external: Array | None = None
@@ -142,22 +142,22 @@ class PartialImpedance(Controller, Generic[Array]):
 
     def stored_energy(self, q: Array, qd: Array, target: object = None) -> Array:
         """Return the stored energy (ed' M* ed + e' K* e) / 2 in J, (...); with a frame, that of the frame."""
-        engine, given = self._given(q, qd, target, None)
+        backend, given = self._given(q, qd, target, None)
         at, moved = given["q"], given["qd"]
-        state = self._joints.state(engine, at, moved)
+        state = self._joints.state(backend, at, moved)
         if self._frame is None:
-            return cast("Array", self._joints.stored(engine, state, _errors(given)))
-        framed = self._frame.state(engine, state, given)
-        return cast("Array", self._frame.stored(engine, framed))
+            return cast("Array", self._joints.stored(backend, state, _errors(given)))
+        framed = self._frame.state(backend, state, given)
+        return cast("Array", self._frame.stored(backend, framed))
 
-    def _followed(self, engine: ArrayBackend, given: Given) -> tuple[Numbers, Numbers]:
+    def _followed(self, backend: ArrayBackend, given: Given) -> tuple[Numbers, Numbers]:
         """Return the acceleration that follows, and the torque for it."""
         q, qd, external = given["q"], given["qd"], given.get("external")
-        state = self._joints.state(engine, q, qd)
-        qdd = self._joints.acceleration(engine, state, _errors(given), told=self._frame is not None)
+        state = self._joints.state(backend, q, qd)
+        qdd = self._joints.acceleration(backend, state, _errors(given), told=self._frame is not None)
         if self._frame is not None:
-            framed = self._frame.state(engine, state, given)
-            qdd = self._frame.acceleration(engine, framed, qdd, external)
+            framed = self._frame.state(backend, state, given)
+            qdd = self._frame.acceleration(backend, framed, qdd, external)
         return qdd, self._joints.torque(state, qd, qdd, external)
 
     def _given(
@@ -231,13 +231,13 @@ class Cancellation(Controller, Generic[Array]):
         that follows. With all torques cancelled and a wanted acceleration, this is computed torque control,
         except for armature, which belongs to no link.
         """
-        engine, given = self._arrays(q, qd, {"task": tau, "external": external, "qdd": qdd})
+        backend, given = self._arrays(q, qd, {"task": tau, "external": external, "qdd": qdd})
         at, moved, accelerated = given["q"], given["qd"], given.pop("qdd", None)
-        if accelerated is None and (torque := self._torque_of_one(engine, given)) is not None:
+        if accelerated is None and (torque := self._torque_of_one(backend, given)) is not None:
             return cast("Array", torque)
-        state = self._joints.state(engine, at, moved)
+        state = self._joints.state(backend, at, moved)
         if accelerated is None:
-            accelerated = self._joints.acceleration(engine, state, _errors(given))
+            accelerated = self._joints.acceleration(backend, state, _errors(given))
         # tau + M_S qdd + C_S qd + g + p
         cancelled = times(state.inertia - state.target_inertia, accelerated)
         cancelled = cancelled + times(state.coriolis - state.target_damping, moved) + state.rest
@@ -247,9 +247,9 @@ class Cancellation(Controller, Generic[Array]):
         self, q: Array, qd: Array, tau: Array | None = None, external: Array | None = None
     ) -> Array:
         """Return the acceleration qdd that follows, (..., n), in rad/s^2 or m/s^2."""
-        engine, given = self._arrays(q, qd, {"task": tau, "external": external})
-        state = self._joints.state(engine, given["q"], given["qd"])
-        return cast("Array", self._joints.acceleration(engine, state, _errors(given)))
+        backend, given = self._arrays(q, qd, {"task": tau, "external": external})
+        state = self._joints.state(backend, given["q"], given["qd"])
+        return cast("Array", self._joints.acceleration(backend, state, _errors(given)))
 
 
 def partial_impedance(

@@ -112,11 +112,11 @@ class FrameTargets:
                 f"{len(joints)} joint{'s' * (len(joints) != 1)} move it; choose rows, such as rows=('x', 'y')"
             )
 
-    def state(self, engine: ArrayBackend, joints: JointState, given: Mapping[str, Numbers]) -> FrameState:
+    def state(self, backend: ArrayBackend, joints: JointState, given: Mapping[str, Numbers]) -> FrameState:
         """Return the frame's state at q and qd and for a target, which are all in `given` by name."""
-        xp, frames, q, qd = engine.xp, engine.frames, given["q"], given["qd"]
-        rows = engine.index(np.array(self.rows, np.intp), q)
-        point = engine.constant(self.point, q)
+        xp, frames, q, qd = backend.xp, backend.frames, given["q"], given["qd"]
+        rows = backend.index(np.array(self.rows, np.intp), q)
+        point = backend.constant(self.point, q)
         motion, vectors = (q, qd), {"point": xp.broadcast_to(point, (*q.shape[:-1], 3))}
         whole = frames.answer("jacobian", motion[:1], self.number, vectors)
         j = whole[..., rows, :]
@@ -124,19 +124,19 @@ class FrameTargets:
         sizes = joints.inertia.diagonal(0, -2, -1)
         vague = Told(
             "the mass matrix is nearly singular",
-            engine.structure.joint_names,
+            backend.structure.joint_names,
             beside=", and torques for a frame perhaps by fewer digits",
         )
         about = TargetInertia("the mass matrix is not positive", vague)
         moved = solve_target(about, joints.inertia, xp.swapaxes(j, -1, -2), sizes)
         compliance = j @ moved
-        ones = engine.constant(np.eye(len(self.rows)), q) + 0.0 * compliance
+        ones = backend.constant(np.eye(len(self.rows)), q) + 0.0 * compliance
         hardly = f"frame {self.frame!r} can hardly move along rows each by itself"
         about = TargetInertia(self._unmovable(), Told(hardly, self.names, of_frame=True))
         inertia = solve_target(about, compliance, ones, _reach(whole, sizes)[..., rows])
         dual = moved @ inertia
         natural = (inertia @ (xp.swapaxes(moved, -1, -2) @ joints.coriolis - rate)) @ dual
-        place, turning = self._place(engine, q, given.get("target.pose"))
+        place, turning = self._place(backend, q, given.get("target.pose"))
         velocity, wanted = (
             given[name][..., rows] if name in given else None
             for name in ("target.velocity", "target.acceleration")
@@ -147,8 +147,8 @@ class FrameTargets:
             times(rate, qd),
             inertia,
             dual,
-            self.inertia.of(engine, inertia, q),
-            self.damping.of(engine, natural, q),
+            self.inertia.of(backend, inertia, q),
+            self.damping.of(backend, natural, q),
             speed if velocity is None else speed - velocity,
             place,
             turning,
@@ -156,13 +156,13 @@ class FrameTargets:
         )
 
     def acceleration(
-        self, engine: ArrayBackend, state: FrameState, qdd: Numbers, external: Numbers | None
+        self, backend: ArrayBackend, state: FrameState, qdd: Numbers, external: Numbers | None
     ) -> Numbers:
         """Return qdd (..., n), nearest to the one given, with which the frame moves as asked."""
-        xp = engine.xp
+        xp = backend.xp
         pull = -times(state.target_damping, state.rate)
         if state.place is not None and state.turning is not None:
-            pull = pull - times(xp.swapaxes(state.turning, -1, -2), self._pull(engine, state.place))
+            pull = pull - times(xp.swapaxes(state.turning, -1, -2), self._pull(backend, state.place))
         if external is not None:
             pull = pull + times(xp.swapaxes(state.dual, -1, -2), external)
         what = f"the wanted inertia of frame {self.frame!r}"
@@ -176,12 +176,12 @@ class FrameTargets:
             moved = moved + state.wanted
         return qdd + times(state.dual, moved - state.bias - times(state.jacobian, qdd))
 
-    def stored(self, engine: ArrayBackend, state: FrameState) -> Numbers:
+    def stored(self, backend: ArrayBackend, state: FrameState) -> Numbers:
         """Return the stored energy (nu~' M_e nu~ + x' K_e x) / 2, (...), with nu~ = nu - nu_d."""
         energy = (state.rate * times(state.target_inertia, state.rate)).sum(-1) / 2.0
         if state.place is None:
             return energy
-        return energy + (state.place * self._pull(engine, state.place)).sum(-1) / 2.0
+        return energy + (state.place * self._pull(backend, state.place)).sum(-1) / 2.0
 
     def _unmovable(self) -> str:
         return f"frame {self.frame!r} cannot move along rows each by itself"
@@ -192,7 +192,7 @@ class FrameTargets:
         return times(self.stiffness.matrix(library, place), place)
 
     def _place(
-        self, engine: ArrayBackend, q: Numbers, wanted: Numbers | None
+        self, backend: ArrayBackend, q: Numbers, wanted: Numbers | None
     ) -> tuple[Numbers | None, Numbers | None]:
         """Return x and E of the chosen rows; None where nothing is stiff."""
         if self.stiffness is None:
@@ -202,19 +202,19 @@ class FrameTargets:
                 f"frame {self.frame!r} is stiff, but target has no pose; give Target(pose=...), (..., 4, 4), "
                 "such as robot.kinematics.pose(q, frame) of where it shall be"
             )
-        xp = engine.xp
-        point = engine.constant(self.point, q)
-        pose = engine.frames.answer("pose", [q], self.number)
+        xp = backend.xp
+        point = backend.constant(self.point, q)
+        pose = backend.frames.answer("pose", [q], self.number)
         places = [times(m[..., :3, :3], point) + m[..., :3, 3] for m in (pose, wanted)]
         moved = places[0] - places[1]
         if max(self.rows) < 3 or min(self.rows) < 3:
-            theta = rotation_vector(engine, pose[..., :3, :3], wanted[..., :3, :3])
+            theta = rotation_vector(backend, pose[..., :3, :3], wanted[..., :3, :3])
         else:
             theta = 0.0 * moved
-        rows = engine.index(np.array(self.rows, np.intp), q)
+        rows = backend.index(np.array(self.rows, np.intp), q)
         whole = xp.zeros_like(theta[..., :, None] * theta[..., None, :])
-        ones = whole + engine.constant(np.eye(3), q)
-        upper = xp.concat([rates_of_turning(engine, theta), whole], -1)
+        ones = whole + backend.constant(np.eye(3), q)
+        upper = xp.concat([rates_of_turning(backend, theta), whole], -1)
         turning = xp.concat([upper, xp.concat([whole, ones], -1)], -2)
         return xp.concat([theta, moved], -1)[..., rows], turning[..., rows, :][..., rows]
 

@@ -73,41 +73,41 @@ class JointImpedance:
         self.targets, self._structure = targets, structure
         self._shares = any(not isinstance(t.kept, float) for t in (targets.inertia, targets.damping))
 
-    def state(self, engine: ArrayBackend, q: Numbers, qd: Numbers) -> JointState:
+    def state(self, backend: ArrayBackend, q: Numbers, qd: Numbers) -> JointState:
         """Return the terms that the joints obey at q and qd (..., n), and their targets there."""
         targets, c2, c1 = self.targets, None, None
         if self._shares:
-            c2, c1, by_link = engine.answers.coefficients(q, qd)
+            c2, c1, by_link = backend.answers.coefficients(q, qd)
             mass, coriolis, rest = c2.sum(-2), c1.sum(-2), by_link.sum(-1)
         else:
-            mass, coriolis, rest = engine.answers.sums(q, qd)
-        inertia, wanted = mass, targets.inertia.of(engine, mass, c2, q)
+            mass, coriolis, rest = backend.answers.sums(q, qd)
+        inertia, wanted = mass, targets.inertia.of(backend, mass, c2, q)
         if targets.passive:
             sums = self._structure.passive_sums
-            armature = engine.constant(np.diag(sums.armature), q)
-            spring, damping, _, _ = passive_torques(engine, sums, q, qd, qd)
+            armature = backend.constant(np.diag(sums.armature), q)
+            spring, damping, _, _ = passive_torques(backend, sums, q, qd, qd)
             inertia, rest = mass + armature, rest + spring + damping
             if targets.friction_width is not None:
-                rest = rest + smooth_friction(engine, sums, qd, targets.friction_width)
+                rest = rest + smooth_friction(backend, sums, qd, targets.friction_width)
             # a share of the links leaves out the armature, a sum that is given whole includes it
             wanted = wanted if targets.inertia.whole else wanted + armature
-        return JointState(inertia, coriolis, rest, wanted, targets.damping.of(engine, coriolis, c1, q))
+        return JointState(inertia, coriolis, rest, wanted, targets.damping.of(backend, coriolis, c1, q))
 
-    def pull(self, engine: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
+    def pull(self, backend: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
         """Return -B* ed - K* e, (..., n)."""
         pull = -times(state.target_damping, errors.rate)
         if self.targets.stiffness is None or errors.place is None:
             return pull
-        return pull - times(self.targets.stiffness.matrix(engine, errors.place), errors.place)
+        return pull - times(self.targets.stiffness.matrix(backend, errors.place), errors.place)
 
     def acceleration(
-        self, engine: ArrayBackend, state: JointState, errors: Errors, told: bool = False
+        self, backend: ArrayBackend, state: JointState, errors: Errors, told: bool = False
     ) -> Numbers:
         """Return qdd = qdd_d + M*^-1 (f + v - B* ed - K* e), (..., n).
 
         told: whether the accuracy that a natural M* allows is reported elsewhere
         """
-        pull = self.pull(engine, state, errors)
+        pull = self.pull(backend, state, errors)
         if errors.force is not None:
             pull = pull + errors.force
         names, positive = self._structure.joint_names, self.targets.positive
@@ -122,12 +122,14 @@ class JointImpedance:
         moved = solved[..., 0]
         return moved if errors.wanted is None else errors.wanted + moved
 
-    def natural_torque(self, engine: ArrayBackend, state: JointState, qd: Numbers, errors: Errors) -> Numbers:
+    def natural_torque(
+        self, backend: ArrayBackend, state: JointState, qd: Numbers, errors: Errors
+    ) -> Numbers:
         """Return u = H qdd_d + C qd + g + p - B* ed - K* e, (..., n).
 
         f drops out where all inertia stays natural.
         """
-        torque = times(state.coriolis, qd) + state.rest + self.pull(engine, state, errors)
+        torque = times(state.coriolis, qd) + state.rest + self.pull(backend, state, errors)
         return torque if errors.wanted is None else torque + times(state.inertia, errors.wanted)
 
     def torque(self, state: JointState, qd: Numbers, qdd: Numbers, external: Numbers | None) -> Numbers:
@@ -135,12 +137,12 @@ class JointImpedance:
         torque = times(state.inertia, qdd) + times(state.coriolis, qd) + state.rest
         return torque if external is None else torque - external
 
-    def stored(self, engine: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
+    def stored(self, backend: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
         """Return the stored energy (ed' M* ed + e' K* e) / 2, (...)."""
         energy = (errors.rate * times(state.target_inertia, errors.rate)).sum(-1) / 2.0
         if self.targets.stiffness is None or errors.place is None:
             return energy
-        stiffness = self.targets.stiffness.matrix(engine, errors.place)
+        stiffness = self.targets.stiffness.matrix(backend, errors.place)
         return energy + (errors.place * times(stiffness, errors.place)).sum(-1) / 2.0
 
 

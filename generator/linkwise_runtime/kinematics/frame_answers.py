@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from ..answers.answers import answer_shapes
-from ..answers.packed import PackedEngine
+from ..answers.packed import PackedBackend
 from ..arguments import Beside
 from ..chosen_names import choice, known_as, short, whole_number
 from ..interface import Namespace, Numbers, side_by_side
@@ -177,17 +177,17 @@ class FrameAnswers:
     """Calls on frames on one back end; tables are made when first needed, for each dtype and device."""
 
     def __init__(
-        self, engine: PackedEngine, tree: JointTree, numbers: Callable[[OwnNumbers, Numbers], TreeArrays]
+        self, backend: PackedBackend, tree: JointTree, numbers: Callable[[OwnNumbers, Numbers], TreeArrays]
     ) -> None:
         """Set up the calls.
 
         numbers: returns the tree's numbers for the parameters and the bodies, to compute with some positions
         """
-        self.engine, self.tree, self._numbers = engine, tree, numbers
+        self.backend, self.tree, self._numbers = backend, tree, numbers
         self.names = tuple(frame.name for frame in self.tree.frames)
         self._own: dict[object, OwnNumbers] = {}
         self._tables: dict[object, FrameTables] = {}
-        self._shapes = answer_shapes(engine.structure, len(self.names))
+        self._shapes = answer_shapes(backend.structure, len(self.names))
 
     def shape(self, call: str) -> tuple[int, ...]:
         """Return the shape of a call's answer for one sample."""
@@ -200,7 +200,7 @@ class FrameAnswers:
 
         part: a frame by its number, all of them, or the links
         """
-        point, one = vectors.get("point"), self.engine.one_sample
+        point, one = vectors.get("point"), self.backend.one_sample
         if one is not None and isinstance(part, int) and vectors.keys() <= {"point"}:
             found = one.answer(call, motion, part, point)
             if found is not None:
@@ -208,7 +208,7 @@ class FrameAnswers:
         batch = tuple(motion[0].shape[:-1])
         asked = self.asked(self._tables, part, self._listed, motion, vectors)
         shape = self.shape(call)
-        values = in_pieces(self.engine, motion, asked, ANSWERS[call], math.prod(shape))
+        values = in_pieces(self.backend, motion, asked, ANSWERS[call], math.prod(shape))
         return side_by_side(values.reshape(*batch, *shape))
 
     def asked(
@@ -223,27 +223,27 @@ class FrameAnswers:
 
         tables: those of parts, for each dtype and device; listed: makes the one of a part, in float64
         """
-        q, xp = motion[0], self.engine.xp
+        q, xp = motion[0], self.backend.xp
         key = q.dtype, getattr(q, "device", None)
         if key not in self._own:
             own: OwnNumbers = own_numbers(self.tree), formula_sources(self.tree)
-            self._own[key] = converted(own, self.engine, q)
+            self._own[key] = converted(own, self.backend, q)
         if (part, key) not in tables:
-            tables[part, key] = converted(listed(part), self.engine, q)
+            tables[part, key] = converted(listed(part), self.backend, q)
         numbers = self._numbers(self._own[key], q)
         flat = [xp.swapaxes(a.reshape(-1, a.shape[-1]), 0, 1) for a in motion]
         placed = {name: xp.swapaxes(a.reshape(-1, 3), 0, 1)[:, None] for name, a in vectors.items()}
         return FrameRequest(xp, tables[part, key], numbers, flat, placed)
 
     def _listed(self, part: object) -> FrameTables:
-        n = self.engine.structure.n
+        n = self.backend.structure.n
         if part == LINKS:
             return link_tables(self.tree, n)
         return frame_tables(self.tree, n, [part] if isinstance(part, int) else range(len(self.names)))
 
 
 def in_pieces(
-    engine: PackedEngine,
+    backend: PackedBackend,
     motion: Sequence[Numbers],
     at: FrameRequest[Tables],
     answer: Callable[[FrameRequest[Tables]], Numbers],
@@ -251,7 +251,7 @@ def in_pieces(
 ) -> Numbers:
     """Return answers (samples, count), computed for as many samples at once as the back end wants."""
     xp, samples = at.xp, at.motion[0].shape[1]
-    size = engine.chunk(motion, max(16, CACHE // (motion[0].itemsize * (NUMBERS * at.tables.moved + count))))
+    size = backend.chunk(motion, max(16, CACHE // (motion[0].itemsize * (NUMBERS * at.tables.moved + count))))
     if size is None or samples <= size:
         return xp.swapaxes(answer(at).reshape(count, samples), 0, 1)
     whole = xp.empty((samples, count), dtype=motion[0].dtype)

@@ -11,7 +11,7 @@ from ..out_argument import accepted
 from .frame_answers import ALL, LINKS, FrameAnswers, frame_index, vectors_beside
 
 
-class FramesEngine(Library, Protocol):
+class FramesBackend(Library, Protocol):
     """A back end that answers calls on frames."""
 
     @property
@@ -26,7 +26,7 @@ class FramedRobot(Protocol):
     """Part of a robot that `Kinematics` needs."""
 
     @property
-    def door(self) -> Door[FramesEngine]:
+    def door(self) -> Door[FramesBackend]:
         """Entry at which motion is read."""
 
 
@@ -155,14 +155,14 @@ class Kinematics(Generic[Array]):
     ) -> Any:
         names = CALLS[f"kinematics.{call}"].motion
         asked = vectors_beside(beside)
-        engine, numbers = self._robot.door.read(dict(zip(names, given, strict=True)), beside=asked)
+        backend, numbers = self._robot.door.read(dict(zip(names, given, strict=True)), beside=asked)
         motion, vectors = numbers[: len(names)], dict(zip(asked, numbers[len(names) :], strict=True))
         if out is None:
-            return engine.frames.answer(call, motion, part, vectors)
+            return backend.frames.answer(call, motion, part, vectors)
         read: dict[str, Numbers] = dict(zip(names, motion, strict=True)) | vectors
-        shapes = (engine.frames.shape(call),)
-        (place,) = accepted(out, (), shapes, read, engine.read_beside_motion(), False)
-        place[...] = engine.frames.answer(call, motion, part, vectors)
+        shapes = (backend.frames.shape(call),)
+        (place,) = accepted(out, (), shapes, read, backend.read_beside_motion(), False)
+        place[...] = backend.frames.answer(call, motion, part, vectors)
         return out
 
 

@@ -38,9 +38,9 @@ NEAR = 10.0
 class TiedMotion:
     """Closed places along a motion; the last one is kept, since a step begins where the one before ended."""
 
-    def __init__(self, ties: TiedJoints, engine: ArrayBackend, start: ClosedPlace) -> None:
+    def __init__(self, ties: TiedJoints, backend: ArrayBackend, start: ClosedPlace) -> None:
         """Begin at `start`, where contacts also took hold."""
-        self._ties, self._engine, self._held_at = ties, engine, start.q
+        self._ties, self._backend, self._held_at = ties, backend, start.q
         self._last: tuple[Numbers, ClosedPlace] = start.q, start
         self._dead = 0.0 if is_traced(start.q) else DEAD * float(least_left(start.triangle).min(initial=1.0))
 
@@ -53,7 +53,7 @@ class TiedMotion:
         if asked is q:
             return place
         try:
-            found = self._ties.closed_place(self._engine, q, self._held_at)
+            found = self._ties.closed_place(self._backend, q, self._held_at)
         except ValueError as error:
             with without_gradient(q):
                 reason = self._leap(q) or self._dead_point(self._furthest(self._last[1], q), NEAR)
@@ -73,7 +73,7 @@ class TiedMotion:
     def acceleration(self, t: float, q: Numbers, qd: Numbers, tau: Numbers, passive: bool) -> Numbers:
         """Return the accelerations of the independent joints, (..., m)."""
         place = self.place(t, q)
-        return self._ties.acceleration(self._engine, place, qd, tau, passive)
+        return self._ties.acceleration(self._backend, place, qd, tau, passive)
 
     def _leap(self, q: Numbers) -> str | None:
         """Return a message if independent joints leap away from where they were, else None."""
@@ -97,7 +97,7 @@ class TiedMotion:
             # Dependent joints start from the last place that closed, not from far along the way.
             mover = place.velocity(place.own(way)) * (tried - reached)
             try:
-                place = self._ties.closed_place(self._engine, place.q + mover, self._held_at)
+                place = self._ties.closed_place(self._backend, place.q + mover, self._held_at)
             except ValueError:
                 continue
             reached = tried
@@ -112,7 +112,7 @@ class TiedMotion:
             return None
         at = np.unravel_index(left.argmin(), left.shape)
         values = array_of(place.rows[at])
-        own, names = self._ties.independent, self._engine.structure.joint_names
+        own, names = self._ties.independent, self._backend.structure.joint_names
         told = why_not_following(values.astype(float), place.found.columns, NEAR * self._dead, names, "")
         go = "goes" if len(own) == 1 else "go"
         return f"{listed(own)} {go} no further{sample_of([int(k) for k in at])}: {told}"
@@ -144,7 +144,7 @@ class ReadLoads(NamedTuple):
 class EquationsOfMotion:
     """Equations of motion of a robot on one back end."""
 
-    engine: ArrayBackend
+    backend: ArrayBackend
     tau: Numbers | Given
     """Torques (..., n), or a function that gives them."""
     loads: ReadLoads | Given
@@ -171,12 +171,12 @@ class EquationsOfMotion:
         given = tau if pull is None else tau - pull
         if not self.passive:
             work = (qd * given).sum(-1)
-            if self.engine.structure.shares:
-                work = work + self.engine.power_beside(q, qd).sum(-1)
+            if self.backend.structure.shares:
+                work = work + self.backend.power_beside(q, qd).sum(-1)
             return State(qd, self._accelerated(t, state.q, q, qd, given, False), work)
-        spring, damping, friction, _ = self.engine.answers.passive_torque(q, qd, 0.0 * qd)
+        spring, damping, friction, _ = self.backend.answers.passive_torque(q, qd, 0.0 * qd)
         work = (qd * (given - damping - friction)).sum(-1)
-        if any(self.engine.structure.passive_sums.armature):
+        if any(self.backend.structure.passive_sums.armature):
             return State(qd, self._accelerated(t, state.q, q, qd, given, True), work)
         left = given - spring - damping - friction
         return State(qd, self._accelerated(t, state.q, q, qd, left, False), work)
@@ -187,7 +187,7 @@ class EquationsOfMotion:
         """Return accelerations of all joints, or of the independent ones at the place for `asked`."""
         if self.ties is not None:
             return self.ties.acceleration(t, asked, qd, given, passive)
-        answers = self.engine.answers
+        answers = self.backend.answers
         solve = answers.forward_dynamics if passive else answers.forward_dynamics_of_links
         return solve(q, qd, given)[0]
 
@@ -199,28 +199,28 @@ class EquationsOfMotion:
         """Return the torques of the actuators, (..., n)."""
         if not callable(self.tau):
             return self.tau
-        (tau,) = read_at(self.engine, q, {"tau": self.tau(t, q, qd)})
+        (tau,) = read_at(self.backend, q, {"tau": self.tau(t, q, qd)})
         return tau
 
     def load_torque(self, t: float, q: Numbers, qd: Numbers) -> Numbers | None:
         """Return the torques that loads need from the joints, (..., n); None without loads."""
         found = self.loads
         if callable(found):
-            loads = loads_of(self.engine, found(t, q, qd))
-            found = ReadLoads(loads, read_at(self.engine, q, {}, loads.beside))
-        torques = found.loads.torques(self.engine, q, found.vectors)
+            loads = loads_of(self.backend, found(t, q, qd))
+            found = ReadLoads(loads, read_at(self.backend, q, {}, loads.beside))
+        torques = found.loads.torques(self.backend, q, found.vectors)
         return sum(torques[1:], torques[0]) if torques else None
 
     def energy(self, t: float, q: Numbers, qd: Numbers) -> Numbers:
         """Return the energy of links, springs and armature in J, (...)."""
         if self.varying is not None:
             self.varying.move(t, q, qd)
-        kinetic, potential = self.engine.answers.energy(q, qd)
+        kinetic, potential = self.backend.answers.energy(q, qd)
         total = (kinetic + potential).sum(-1)
         if self.passive:
-            sums = self.engine.structure.passive_sums
+            sums = self.backend.structure.passive_sums
             stiffness, pull, armature = (
-                self.engine.constant(a, q) for a in (sums.stiffness, sums.pull, sums.armature)
+                self.backend.constant(a, q) for a in (sums.stiffness, sums.pull, sums.armature)
             )
             total = total + ((stiffness * q / 2.0 + pull) * q + armature * qd * qd / 2.0).sum(-1)
         return total
@@ -229,31 +229,31 @@ class EquationsOfMotion:
 class Varying:
     """Time and inputs of links that were written by hand, which move with a motion."""
 
-    def __init__(self, engine: ArrayBackend, inputs: Mapping[str, object]) -> None:
+    def __init__(self, backend: ArrayBackend, inputs: Mapping[str, object]) -> None:
         """Begin with a copy of a back end, whose parameters move while the robot's own stay."""
-        self.engine, self._inputs = engine.separate(), inputs
+        self.backend, self._inputs = backend.separate(), inputs
 
     def move(self, t: float, q: Numbers, qd: Numbers) -> None:
         """Set time and inputs to what they are at an instant.
 
         Raises ValueError for an input that is no finite number, and as `weights` does.
         """
-        structure = self.engine.structure
+        structure = self.backend.structure
         values: dict[str, object] = {structure.time: t} if structure.time else {}
         for name, given in self._inputs.items():
             found = given(t, q, qd) if callable(given) else given
             if isinstance(found, float | np.ndarray) and not np.isfinite(found).all():
                 raise ValueError(f"input {name!r} is not finite at t = {t:g}")
-            values[name] = self.engine.weights(name, found, q)
-        self.engine.set_parameters(values)
+            values[name] = self.backend.weights(name, found, q)
+        self.backend.set_parameters(values)
 
 
-def varying_of(engine: ArrayBackend, inputs: object) -> Varying | None:
+def varying_of(backend: ArrayBackend, inputs: object) -> Varying | None:
     """Return time and inputs as `simulate` is given them; None where the robot depends on neither.
 
     Raises ValueError for an input that the robot does not have.
     """
-    structure = engine.structure
+    structure = backend.structure
     given = inputs if inputs is not None else {}
     if not isinstance(given, Mapping):
         raise TypeError(
@@ -263,21 +263,21 @@ def varying_of(engine: ArrayBackend, inputs: object) -> Varying | None:
         if name not in structure.inputs:
             there = f"its inputs are {listed(structure.inputs)}" if structure.inputs else "it has no inputs"
             raise ValueError(f"inputs names {short(name)}, which {structure.name} does not have; {there}")
-    return Varying(engine, given) if structure.time or given else None
+    return Varying(backend, given) if structure.time or given else None
 
 
 def read_at(
-    engine: ArrayBackend, q: Numbers, named: Mapping[str, object], beside: Mapping[str, Beside] = NOTHING
+    backend: ArrayBackend, q: Numbers, named: Mapping[str, object], beside: Mapping[str, Beside] = NOTHING
 ) -> list[Numbers]:
     """Return what a user's function gave at an instant, of the shape of q (..., n).
 
     By then the number of motions is settled. Raises ValueError for an argument with more samples, and as
     `arrays` does.
     """
-    at, *read = engine.arrays({"q": q, **named}, q.shape[-1], beside)
+    at, *read = backend.arrays({"q": q, **named}, q.shape[-1], beside)
     if at.shape != q.shape:
         raise ValueError(
             f"{', '.join((*named, *beside))}: {tuple(at.shape[:-1])} samples are more than the "
             f"{tuple(q.shape[:-1])} of q and qd; give these as many from the start"
         )
-    return [engine.weights(name, a, q) for name, a in zip((*named, *beside), read, strict=True)]
+    return [backend.weights(name, a, q) for name, a in zip((*named, *beside), read, strict=True)]

@@ -71,7 +71,7 @@ class FreeResponse:
 class TiedResponse:
     """Response of coordinates to forces under constraints."""
 
-    engine: ArrayBackend
+    backend: ArrayBackend
     mass: Numbers
     constraints: Constraints[Any]
     place: ClosedPlace
@@ -87,7 +87,7 @@ class TiedResponse:
     def actuator_torques(self, forces: Numbers) -> Numbers:
         """Return the torques of actuators at independent joints that carry forces (..., n, X)."""
         own = np.eye(self.mass.shape[-1])[:, list(self.constraints.ties.chosen.independent)]
-        return self.engine.constant(own, self.mass) @ (self.place.found.map.mT @ forces)
+        return self.backend.constant(own, self.mass) @ (self.place.found.map.mT @ forces)
 
     def of_velocities(self) -> Numbers:
         """Return the accelerations of the constraints' own source, by cause (..., n, n)."""
@@ -103,13 +103,13 @@ Response = FreeResponse | TiedResponse
 
 
 def response_of(
-    engine: ArrayBackend, constraints: Constraints[Any] | None, q: Numbers, qd: Numbers, mass: Numbers
+    backend: ArrayBackend, constraints: Constraints[Any] | None, q: Numbers, qd: Numbers, mass: Numbers
 ) -> Response:
     """Return how coordinates respond at a state that has been read, with these constraints or none."""
     if constraints is None:
-        return FreeResponse(engine.structure, mass)
-    place = constraints.ties.place(engine, q)
-    return TiedResponse(engine, mass, constraints, place, place.bias_by_cause(place.velocity(place.own(qd))))
+        return FreeResponse(backend.structure, mass)
+    place = constraints.ties.place(backend, q)
+    return TiedResponse(backend, mass, constraints, place, place.bias_by_cause(place.velocity(place.own(qd))))
 
 
 def constraints_of(robot: DrivenRobot, given: object) -> Constraints[Any] | None:
@@ -153,7 +153,7 @@ class Driven(NamedTuple):
 class DrivenSources(NamedTuple):
     """Motion, the forces of all sources, and the response to them."""
 
-    engine: ArrayBackend
+    backend: ArrayBackend
     q: Numbers
     qd: Numbers
     point: dict[str, Numbers]
@@ -195,28 +195,28 @@ def _sources(robot: DrivenRobot, asked: Driven, point: object) -> DrivenSources:
         )
     named = {"q": asked.q, "qd": asked.qd} | ({"qdd": qdd} if tau is None else {"tau": tau})
     loads, points = loads_of(robot.backend, asked.loads), vectors_beside({"point": point})
-    engine, (q, qd, last, *vectors) = robot.door.read(named, beside={**loads.beside, **points})
+    backend, (q, qd, last, *vectors) = robot.door.read(named, beside={**loads.beside, **points})
     constraints = constraints_of(robot, asked.constraints)
-    pulls = loads.torques(engine, q, vectors[: len(loads.beside)])
-    place = None if constraints is None else constraints.ties.place(engine, q)
+    pulls = loads.torques(backend, q, vectors[: len(loads.beside)])
+    place = None if constraints is None else constraints.ties.place(backend, q)
     if place is not None:
         qd = place.velocity(place.own(qd))
-    others = source_forces(engine, q, qd, pulls, asked.passive)
+    others = source_forces(backend, q, qd, pulls, asked.passive)
     response: Response = FreeResponse(robot.structure, others.mass)
     if constraints is not None and place is not None:
-        response = TiedResponse(engine, others.mass, constraints, place, place.bias_by_cause(qd))
+        response = TiedResponse(backend, others.mass, constraints, place, place.bias_by_cause(qd))
     if tau is None:
         if place is not None:
             last = place.velocity(place.own(last)) + place.bias(qd)
         needed = (others.mass @ last[..., None])[..., 0] - others.columns.sum(-1)
         last = response.actuator_torques(needed[..., None])[..., 0]
-    identity = engine.constant(np.eye(robot.n), q)
+    identity = backend.constant(np.eye(robot.n), q)
     placed = dict(zip(points, vectors[len(loads.beside) :], strict=True))
-    return DrivenSources(engine, q, qd, placed, with_actuators(others, last, identity), response)
+    return DrivenSources(backend, q, qd, placed, with_actuators(others, last, identity), response)
 
 
 def _jacobians(at: DrivenSources, frame: object) -> tuple[Numbers, Numbers]:
-    frames, motion = at.engine.frames, [at.q, at.qd]
+    frames, motion = at.backend.frames, [at.q, at.qd]
     if isinstance(frame, str) and frame == CENTRE_OF_MASS and frame not in frames.names:
         if at.point:
             raise ValueError("point is given for the centre of mass, which has none; leave it away")

@@ -132,7 +132,7 @@ def simulate_motion(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
     if asked.tau is not None and not callable(asked.tau):
         named["tau"] = asked.tau
     loads = loads_of(robot.backend, () if callable(asked.loads) else asked.loads)
-    engine, numbers = robot.door.read(named, beside=loads.beside)
+    backend, numbers = robot.door.read(named, beside=loads.beside)
     motion = dict(zip(named, numbers[: len(named)], strict=True))
     check_numbers(motion, robot.joint_names)
     start, rate = motion["q"], motion["qd"]
@@ -142,12 +142,12 @@ def simulate_motion(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
     times = _instants(asked.time)
     step = None if asked.step is None else _positive("step", asked.step)
     tolerances = _positive("rtol", asked.rtol), _positive("atol", asked.atol)
-    passive = asked.passive and bool(engine.structure.passive)
-    varying = varying_of(engine, asked.inputs)
+    passive = asked.passive and bool(backend.structure.passive)
+    varying = varying_of(backend, asked.inputs)
     if varying is not None:
-        engine = varying.engine
+        backend = varying.backend
     equations, state = _started(
-        EquationsOfMotion(engine, tau, given, passive, None, varying), start, rate, constraints
+        EquationsOfMotion(backend, tau, given, passive, None, varying), start, rate, constraints
     )
     if asked.method == "RK4":
         states = in_fixed_steps(equations.rates, equations.close_ties, state, times, step)
@@ -180,8 +180,8 @@ def _started(
     work = 0.0 * q.sum(-1)
     if constraints is None:
         return free, State(q, qd, work)
-    place = constraints.ties.closed_place(free.engine, q, q)
-    ties = TiedMotion(constraints.ties, free.engine, place)
+    place = constraints.ties.closed_place(free.backend, q, q)
+    ties = TiedMotion(constraints.ties, free.backend, place)
     return replace(free, ties=ties), State(place.q, place.own(qd), work)
 
 
@@ -208,7 +208,7 @@ def _collected(
     like = rows[0][0]
     xp = namespace(like)
     columns = (xp.stack(column) for column in zip(*rows, strict=True))
-    return Trajectory(equations.engine.weights("time", list(times), like), *columns)
+    return Trajectory(equations.backend.weights("time", list(times), like), *columns)
 
 
 def _instants(time: object) -> list[float]:

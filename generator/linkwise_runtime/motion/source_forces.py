@@ -41,23 +41,23 @@ class SourceForces(NamedTuple):
 
 
 def source_forces(
-    engine: ArrayBackend, q: Numbers, qd: Numbers, pulls: Sequence[Numbers], passive: bool
+    backend: ArrayBackend, q: Numbers, qd: Numbers, pulls: Sequence[Numbers], passive: bool
 ) -> SourceForces:
     """Return the forces of all sources but actuators.
 
     In this order: velocity (N, n), gravity (N), passive (3, n), loads (L).
     pulls: torques that each load needs from the joints, (..., n)
     """
-    structure = engine.structure
+    structure = backend.structure
     n, links, own = structure.n, structure.N, structure.passive_sums
-    c2, c1, gravity = engine.answers.coefficients(q, qd)
+    c2, c1, gravity = backend.answers.coefficients(q, qd)
     kinds = [-(c1 * qd[..., None, None, :]).reshape(*q.shape, links * n), -gravity]
     mass, rest = c2.sum(-2), 0.0 * q
-    identity = engine.constant(np.eye(n), q)
+    identity = backend.constant(np.eye(n), q)
     shares: Sequence[Numbers] = (rest,) * 3
     if passive and structure.passive:
-        shares = engine.answers.passive_torque(q, qd, rest)[:3]
-        mass = mass + engine.constant(np.diag(own.armature), q)
+        shares = backend.answers.passive_torque(q, qd, rest)[:3]
+        mass = mass + backend.constant(np.diag(own.armature), q)
     kinds += [-identity * share[..., None, :] for share in shares]
     kinds += [-torque[..., None] for torque in pulls]
     return SourceForces(
@@ -87,7 +87,7 @@ class AppliedLoads:
     """Forces and moments of each load."""
     beside: Mapping[str, Beside]
 
-    def torques(self, engine: ArrayBackend, q: Numbers, vectors: Sequence[Numbers]) -> list[Numbers]:
+    def torques(self, backend: ArrayBackend, q: Numbers, vectors: Sequence[Numbers]) -> list[Numbers]:
         """Return the torques that each load adds to those that joints need, (..., n).
 
         vectors: values read for `beside`
@@ -96,7 +96,7 @@ class AppliedLoads:
 
         def torque(frame: int, names: Mapping[str, str]) -> Numbers:
             own = {what: named[name] for what, name in names.items()}
-            return engine.frames.answer("load_torque", [q], frame, own)
+            return backend.frames.answer("load_torque", [q], frame, own)
 
         return [sum((torque(*one) for one in load), 0.0 * q) for load in self.each]
 

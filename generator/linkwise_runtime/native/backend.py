@@ -34,13 +34,13 @@ class NativeAnswers(Answers):
 
     contiguous = True
 
-    def __init__(self, engine: ArrayBackend, quick: QuickCalls, control: ControlCalls | None) -> None:
+    def __init__(self, backend: ArrayBackend, quick: QuickCalls, control: ControlCalls | None) -> None:
         """Keep the compiled calls for arrays.
 
         control: C functions that take one sample; None for links that are given by their energies.
         """
-        super().__init__(engine)
-        self._quick, self._control, self._tied = quick, control, engine.ties_joints
+        super().__init__(backend)
+        self._quick, self._control, self._tied = quick, control, backend.ties_joints
 
     def compute_into(self, call: str, motion: Sequence[Numbers], into: Sequence[Numbers]) -> None:
         """Compute a call's results and write them to the arrays `into`."""

@@ -61,7 +61,7 @@ class RigidRule:
         links = self.tree.links
         return Bodies(
             np.array([link.mass for link in links]),
-            np.array([link.centre for link in links]),
+            np.array([link.com for link in links]),
             np.array([link.inertia for link in links]),
         )
 

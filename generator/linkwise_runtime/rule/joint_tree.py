@@ -6,7 +6,7 @@ the frame at `translation` in the frame of its parent, turned by `rotation` Rz(r
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Generic, Literal, NamedTuple, TypeVar
 
 from ..interface import Numbers
@@ -31,10 +31,12 @@ class TreeCurve:
 class TreeJoint:
     """Joint and the frame that it moves; joints that follow one coordinate share it, as mimic joints do."""
 
+    name: str
+    link: str
+    """Name of the link that it moves, which may have no mass."""
     parent: int | None
     """Index of the joint that carries it, None for the ground."""
-    kind: str
-    """Kind of joint: revolute or prismatic."""
+    kind: Literal["revolute", "prismatic"]
     coordinate: int
     """Index of the coordinate in q."""
     ratio: float
@@ -47,14 +49,13 @@ class TreeJoint:
 
 @dataclass(frozen=True)
 class TreeLink:
-    """Rigid body, in the axes of the frame that its joint moves."""
+    """Rigid body, in the axes of the frame that its joint moves, and about the origin of that."""
 
-    name: str
     joint: int
     """Index of the joint that moves it."""
     mass: float
     """Mass in kg."""
-    centre: Triple
+    com: Triple
     """Centre of mass in m."""
     inertia: tuple[Triple, Triple, Triple]
     """Inertia about the centre of mass, in kg m^2."""
@@ -109,15 +110,13 @@ class TreeCoupling:
 class JointTree:
     """Joints, parents first, links in the order of j, and gravity in m/s^2 in the axes of the base.
 
-    The numbers are those of the parameters' own values; numbers that depend on parameters have formulas, by
-    their place, such as links[2].mass or joints[0].translation[1].
+    The numbers are those of the run-time parameters' own values.
     """
 
     gravity: Triple
     joints: tuple[TreeJoint, ...]
     links: tuple[TreeLink, ...]
     frames: tuple[TreeFrame, ...] = ()
-    formulas: Mapping[str, Formula] = field(default_factory=dict)
     ties: tuple[TreeTie, ...] = ()
     """Ties that close loops, which the joints leave open."""
     couplings: tuple[TreeCoupling, ...] = ()
@@ -125,6 +124,10 @@ class JointTree:
     """Coordinates that the others follow by the ties and couplings, in order; empty where none was chosen."""
     closed_position: tuple[float, ...] = ()
     """Position where ties and couplings hold, at the tree's own numbers; empty without any."""
+
+    def link_name(self, j: int) -> str:
+        """Return the name of link j."""
+        return self.joints[self.links[j].joint].link
 
     @property
     def tied(self) -> bool:
@@ -138,6 +141,19 @@ class JointTree:
             chain.append(joint)
             joint = self.joints[joint].parent
         return tuple(reversed(chain))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParametricTree(JointTree):
+    """Tree some of whose numbers depend on run-time parameters."""
+
+    formulas: Mapping[str, Formula]
+    """Formulas of these numbers, by their place, such as links[2].mass or joints[0].translation[1]."""
+
+
+def formulas_of(tree: JointTree) -> Mapping[str, Formula]:
+    """Return the formulas of a tree's numbers, by their place; none where no number has one."""
+    return tree.formulas if isinstance(tree, ParametricTree) else {}
 
 
 class Bodies(NamedTuple, Generic[Own]):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..arguments import precision
 from ..interface import Namespace, Numbers
 from ..parameter_values import fits
-from .joint_tree import Bodies, JointTree, Own
+from .joint_tree import Bodies, JointTree, Own, formulas_of
 
 SHAPES = {"masses": (), "centres": (3,), "inertias": (3, 3)}
 """Shape of each field of `Bodies` for one link."""
@@ -47,7 +47,7 @@ def own_numbers(tree: JointTree) -> TreeArrays:
         np.array(tree.gravity)[:, None, None],
         np.array([*(joint.translation for joint in tree.joints), (0.0, 0.0, 0.0)]).T[..., None],
         np.array([link.mass for link in tree.links])[:, None],
-        np.array([link.centre for link in tree.links]).T[..., None],
+        np.array([link.com for link in tree.links]).T[..., None],
         np.array([link.inertia for link in tree.links]).transpose(1, 2, 0)[..., None],
         np.array([frame.translation for frame in tree.frames]).reshape(-1, 3).T[..., None],
     )
@@ -57,7 +57,7 @@ def formula_sources(tree: JointTree) -> NDArray[np.intp]:
     """Return for every number its position in all listed ones followed by those of the formulas, flat."""
     listed = {place: at for at, place in enumerate(_places(tree))}
     sources = np.arange(len(listed))
-    for number, place in enumerate(tree.formulas):
+    for number, place in enumerate(formulas_of(tree)):
         sources[listed[place]] = len(listed) + number
     return sources
 
@@ -68,7 +68,7 @@ def _places(tree: JointTree) -> Iterator[str]:
     yield from (f"gravity[{i}]" for i in range(3))
     yield from (f"joints[{f}].translation[{i}]" for i in range(3) for f in frames)
     yield from (f"links[{j}].mass" for j in links)
-    yield from (f"links[{j}].centre[{i}]" for i in range(3) for j in links)
+    yield from (f"links[{j}].com[{i}]" for i in range(3) for j in links)
     yield from (f"links[{j}].inertia[{i}][{k}]" for i in range(3) for k in range(3) for j in links)
     yield from (f"frames[{f}].translation[{i}]" for i in range(3) for f in range(len(tree.frames)))
 
@@ -82,9 +82,10 @@ def _with_formulas(
     batch: tuple[int, ...],
 ) -> TreeArrays:
     """Return the numbers for values of the parameters, each one for all samples or one for each, (...)."""
-    if not tree.formulas:
+    formulas = formulas_of(tree)
+    if not formulas:
         return own
-    values = [formula(xp, p) for formula in tree.formulas.values()]
+    values = [formula(xp, p) for formula in formulas.values()]
     if any(value.ndim for value in values):
         columns = xp.stack([xp.broadcast_to(value, batch).reshape(-1) for value in values], 0)
     else:

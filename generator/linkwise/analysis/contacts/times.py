@@ -184,7 +184,7 @@ def _by_contact(robot: OpenedRobot, loads: Sequence[PlacedLoad]) -> tuple[tuple[
 
     Raises LinkwiseError for a load on another body, or on a body with two contacts.
     """
-    bodies = [robot.body_of(contact.frame) for contact in robot.ground.contacts]
+    bodies = [robot.joint_of(contact.frame) for contact in robot.ground.contacts]
     found: list[list[PlacedLoad]] = [[] for _ in bodies]
     for load in loads:
         there = [number for number, body in enumerate(bodies) if body == load.acts_on.frame.joint]

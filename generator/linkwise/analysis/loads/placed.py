@@ -11,13 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
-from linkwise_runtime.rule.joint_tree import TreeFrame
+from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
 
 from linkwise.analysis.loads import FORCE, MOMENT, POINT, WORLD
 from linkwise.analysis.opened_robot import OpenedRobot, body_frame
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.package.entries import RigidTree
 
 Pose = Callable[[TreeFrame, Array], Array]
 """Function that returns the homogeneous matrices (S, 4, 4) of a frame at q (S, n)."""
@@ -121,7 +120,7 @@ def load_frame_of(load: str, body: str, axes: str, point_in: str | None, robot: 
     return LoadFrame(frame, _seen_in(what, axes, robot, tree), seen, moving_joints(tree, frame.joint))
 
 
-def _seen_in(what: str, name: str, robot: OpenedRobot, tree: RigidTree) -> TreeFrame | None:
+def _seen_in(what: str, name: str, robot: OpenedRobot, tree: JointTree) -> TreeFrame | None:
     """Return the frame of a name, None for the world, which OpenSim calls ground."""
     own = next((frame for frame in tree.frames if frame.name == name), None)
     if name in (WORLD, "ground") and (own is None or own.joint is None):
@@ -129,10 +128,6 @@ def _seen_in(what: str, name: str, robot: OpenedRobot, tree: RigidTree) -> TreeF
     return own or body_frame(f"{what}, given in the axes of", name, robot)
 
 
-def moving_joints(tree: RigidTree, body: int | None) -> tuple[int, ...]:
-    """Return the coordinates that move a body of the tree, in ascending order; none move the ground."""
-    found = set()
-    while body is not None:
-        found.add(tree.bodies[body].coordinate)
-        body = tree.bodies[body].parent
-    return tuple(sorted(found))
+def moving_joints(tree: JointTree, joint: int | None) -> tuple[int, ...]:
+    """Return the coordinates that move what a joint of the tree moves, ascending; none for the ground."""
+    return tuple(sorted({tree.joints[f].coordinate for f in tree.chain(joint)}))

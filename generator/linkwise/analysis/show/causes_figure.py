@@ -86,7 +86,7 @@ def asked_phases(result: AnalysisResult, i: int) -> tuple[PlacedPhase, ...]:
     loads = [one for one in result.loads if i in one.acts_on.joints]
     held: list[int] = []
     if robot.contacts is not None and tree is not None:
-        moved = [moving_joints(tree, robot.body_of(one.frame)) for one in robot.contacts.contacts]
+        moved = [moving_joints(tree, robot.joint_of(one.frame)) for one in robot.contacts.contacts]
         held = [number for number, joints in enumerate(moved) if i in joints]
     if len(loads) + len(held) != 1:
         return ()

@@ -119,14 +119,10 @@ def _components(result: AnalysisResult, peaks: Array) -> list[int]:
 def _joints(result: AnalysisResult, contact: int) -> list[int]:
     """Return the driven joints between the base and a contact, the nearest to the contact first."""
     robot, ground = result.robot, result.robot.ground
-    bodies, body = robot.bodies or (), robot.body_of(ground.contacts[contact].frame)
-    found: list[int] = []
-    while body is not None:
-        own = bodies[body].coordinate
-        if own in robot.driven and own not in (*ground.unactuated, *found):
-            found.append(own)
-        body = bodies[body].parent
-    return found[:JOINTS]
+    assert robot.tree is not None
+    chain = robot.tree.chain(robot.joint_of(ground.contacts[contact].frame))
+    moving = dict.fromkeys(robot.tree.joints[f].coordinate for f in reversed(chain))
+    return [k for k in moving if k in robot.driven and k not in ground.unactuated][:JOINTS]
 
 
 def _draw_force(

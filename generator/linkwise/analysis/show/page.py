@@ -8,6 +8,7 @@ import numpy as np
 
 from linkwise.analysis.joint_causes import are_motions_whole
 from linkwise.analysis.loads.placed import model_pose
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import FORCES, GROUND, INDUCED, MOTION, TORQUE_OF
 from linkwise.analysis.result_rows import Column, ResultRows
@@ -25,8 +26,6 @@ from linkwise.analysis.show.page_curves import (
 )
 from linkwise.arrays import Array
 from linkwise.escape import printable, script_data
-from linkwise.oracle.newton_euler import displacement
-from linkwise.package.entries import BodyEntry
 from linkwise.plotstyle import COLOURS, GRAVITY, ON_DARK
 from linkwise.render import render
 
@@ -140,23 +139,20 @@ def _joints(result: AnalysisResult) -> list[dict[str, str]]:
 
 
 def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
-    """Return the poses at every sample shown: origins and centres of mass, (samples, bodies, 3) each, in m.
-
-    It is None for a robot without bodies.
-    """
-    bodies = result.robot.bodies
-    if not bodies:
+    """Return where joints and centres of mass are at every sample shown; None for a robot without a tree."""
+    tree = result.robot.tree
+    if tree is None:
         return None
-    origins, centres = poses(bodies, result.q)
+    origins, centres = stick_figure(result.robot, result.q)
     place = {link: j for j, link in enumerate(result.robot.links)}
     order = [
         *result.robot.driven,
         *(i for i in range(len(result.robot.joints)) if i not in result.robot.driven),
     ]
     return {
-        "parents": [-1 if body.parent is None else body.parent for body in bodies],
-        "links": [place.get(body.link, -1) for body in bodies],
-        "coordinates": [order.index(body.coordinate) if body.ratio else -1 for body in bodies],
+        "parents": [-1 if joint.parent is None else joint.parent for joint in tree.joints],
+        "links": [place.get(joint.link, -1) for joint in tree.joints],
+        "coordinates": [order.index(joint.coordinate) if joint.ratio else -1 for joint in tree.joints],
         "up": list(result.robot.up),
         "origins": encoded(origins),
         "centres": encoded(centres),
@@ -261,37 +257,18 @@ def _work(result: AnalysisResult) -> list[dict[str, float]]:
     ]
 
 
-def poses(bodies: Sequence[BodyEntry], q: Array) -> tuple[Array, Array]:
-    """Return origins and centres of mass in the base frame, each (S, bodies, 3) in m.
+def stick_figure(robot: OpenedRobot, q: Array) -> tuple[Array, Array]:
+    """Return where joints are, and the centre of mass of what each moves, (S, joints, 3) each, in m.
 
+    Without mass, the latter is where the joint is.
     q: coordinates (S, n) in rad or m
     """
-    turns: list[Array] = []
-    origins: list[Array] = []
-    centres: list[Array] = []
-    for body in bodies:
-        if body.parent is None:
-            turn, origin = np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3))
-        else:
-            turn, origin = turns[body.parent], origins[body.parent]
-        move = displacement(body, q)[:, 0]
-        shift, rotation = np.broadcast_to(body.translation, (len(q), 3)), np.array(body.rotation)
-        if body.kind == "prismatic":
-            shift = shift + move[:, None] * rotation[:, 2]
-        origin = origin + np.einsum("sab,sb->sa", turn, shift)
-        turn = turn @ rotation
-        if body.kind == "revolute":
-            turn = turn @ _about_z(move)
-        turns.append(turn)
-        origins.append(origin)
-        centres.append(origin + turn @ np.array(body.com))
-    return np.stack(origins, axis=1), np.stack(centres, axis=1)
-
-
-def _about_z(angle: Array) -> Array:
-    turn = np.zeros((len(angle), 3, 3))
-    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
-    turn[:, 1, 0] = np.sin(angle)
-    turn[:, 0, 1] = -turn[:, 1, 0]
-    turn[:, 2, 2] = 1.0
-    return turn
+    tree, recursion = robot.tree, robot.recursion
+    assert tree is not None
+    assert recursion is not None
+    coms = {link.joint: np.array(link.com) for link in tree.links}
+    joints = range(len(tree.joints))
+    places = recursion.places(
+        [*((f, np.zeros(3)) for f in joints), *((f, coms.get(f, np.zeros(3))) for f in joints)], q
+    )
+    return places[:, : len(joints)], places[:, len(joints) :]

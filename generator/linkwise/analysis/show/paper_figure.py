@@ -97,7 +97,10 @@ def own_joints(result: AnalysisResult) -> tuple[int, ...]:
     If that joint follows others, the last of these counts.
     """
     robot = result.robot
-    known = {body.link: robot.joints_supporting([body.coordinate])[-1:] for body in robot.bodies or ()}
+    known = {
+        joint.link: robot.joints_supporting([joint.coordinate])[-1:]
+        for joint in (robot.tree.joints if robot.tree else ())
+    }
     last = [(0,)] * len(robot.links)
     for i, j in result.rows["tau_link"].at.tolist():
         last[j] = max(last[j], (i,))
