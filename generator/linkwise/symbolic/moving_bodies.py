@@ -78,8 +78,9 @@ class RigidBody:
         turned, inertia = _matrix("rotation", self.rotation), _inertia(self.inertia)
         _check_rotation(turned, values)
         _check_inertia(inertia, values)
-        spin = sp.simplify(turned.T * turned.applyfunc(rate))
-        omega = sp.Matrix([spin[2, 1], spin[0, 2], spin[1, 0]])
+        turning = turned.applyfunc(rate)
+        # omega along the own axes: the entries (3, 2), (1, 3) and (2, 1) of R^T dR/dt
+        omega = sp.Matrix([_shorter(turned[:, i].dot(turning[:, k])) for i, k in ((2, 1), (0, 2), (1, 0))])
         moving = mass * _square(rate(x) for x in place) / 2
         return _link(self, moving + (omega.T * inertia * omega)[0] / 2, mass, place)
 
@@ -89,8 +90,17 @@ BODIES = (Particle, RigidBody)
 
 
 def _square(velocity: Iterable[sp.Expr]) -> sp.Expr:
-    """Return v·v without sin² + cos², where that is shorter: of what turns, no angle is left then."""
-    found = sp.expand(sum((component**2 for component in velocity), ZERO))
+    """Return v·v, such that of what turns no angle is left."""
+    return _shorter(sum((component**2 for component in velocity), ZERO))
+
+
+def _shorter(given: sp.Expr) -> sp.Expr:
+    """Return a sum without sin² + cos² where that is shorter.
+
+    With cos² for 1 - sin², or the other way round, whatever cancels does: sp.simplify needs hundreds of times
+    as long to find no more.
+    """
+    found = sp.expand(given)
     others = (sp.expand(rule(found)) for rule in (TR5, TR6))  # by cosines, by sines
     return min(found, *others, key=sp.count_ops)
 
