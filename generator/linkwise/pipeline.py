@@ -31,7 +31,7 @@ from linkwise.package.entries import KernelKind
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, read_robot, told_name
 from linkwise.robot.robot import Robot
-from linkwise.symbolic.energy_file import read_energies
+from linkwise.symbolic.energy_file import read_energies, with_line
 from linkwise.symbolic.system import System, rigid_system
 
 PYTHON = ".py"
@@ -56,7 +56,11 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
                     f"energies in Python do not accept {', '.join(rigid)}; change the energies"
                 )
             energies = read_energies(Path(spec), options.parameters != "numeric")
-            return replace(energies, request={"robot": told_name(spec), **options.request()})
+            written = replace(energies, request={"robot": told_name(spec), **options.request()})
+            try:
+                return constrained_system(written)
+            except LinkwiseError as error:
+                raise LinkwiseError(with_line(str(error), Path(spec))) from error
     system = rigid_system(read_robot(spec, options))
     with within(str(spec)):
         return constrained_system(system)

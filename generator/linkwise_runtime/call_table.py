@@ -262,7 +262,6 @@ MOTIONS = (
         options=DRIVEN | {"constraints": None},
         own="passive",
         ties="kept",
-        rigid=True,
         out=False,
     ),
     Call(
@@ -388,7 +387,6 @@ def _kept(
         options,
         own,
         ties="kept",
-        rigid=True,
         out=False,
     )
 

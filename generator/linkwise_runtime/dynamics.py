@@ -67,8 +67,8 @@ class Dynamics(RobotCalls):
 
     def __dir__(self) -> Iterable[str]:
         """Return the names of this robot's attributes: torch.jit reads each of them, and none may raise."""
-        tree = self.backend.tree
-        absent = {"kinematics", "constraints"} if tree is None else set() if tree.tied else {"constraints"}
+        absent = {"kinematics"} if self.backend.tree is None else set()
+        absent |= set() if self.backend.ties_joints else {"constraints"}
         return sorted(set(super().__dir__()) - absent)
 
     @property

@@ -11,7 +11,7 @@ coordinate ratio times as much; joints of one coordinate sum up:
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,6 +98,23 @@ class PassiveJoint:
     """Inertia of what turns behind a gear, as seen by the joint, in kg m^2 or kg."""
 
 
+@dataclass(frozen=True, eq=False)
+class WrittenConstraints:
+    """Constraints that a user wrote: phi(q) = 0, or a sum A(q) qd = 0 of velocities alone, whose phi is 0."""
+
+    names: tuple[str, ...]
+    holonomic: tuple[bool, ...]
+    """True for each that is a phi(q)."""
+    independent: tuple[int, ...]
+    """Coordinates that the others follow, in order."""
+    closed_position: tuple[float, ...]
+    """Position where the constraints hold, at the parameters' own values."""
+    positions: Callable[[Any, Any, Any], Sequence[Any]]
+    """Function of xp, q and parameters: phi and A, row by row."""
+    rates: Callable[[Any, Any, Any, Any], Sequence[Any]]
+    """Function of xp, q, qd and parameters: dA/dt, row by row."""
+
+
 class PassiveSums(NamedTuple):
     """Passive properties summed up by coordinate, n numbers each."""
 
@@ -172,6 +189,8 @@ class Structure:
     """Name of the parameter that is time; empty where nothing depends on it."""
     inputs: tuple[str, ...] = ()
     """Names of the parameters that are given from outside, sample by sample."""
+    written: WrittenConstraints | None = None
+    """Constraints that were written with the links; None without any."""
 
     @cached_property
     def n(self) -> int:

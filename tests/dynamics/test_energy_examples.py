@@ -100,8 +100,73 @@ SYSTEMS: dict[str, Callable[[Any, Any, Any], Any]] = {
 }
 
 
+def turning(turn: Any, contact: Any, inertia: Any, m: float, omega: Any) -> Any:
+    """d(omega)/dt in the body's axes of a body that rolls, by Newton and Euler.
+
+    turn: rotation to the world's axes; contact: function of the vertical in the body's axes and its rate,
+    that returns the place where the body touches the ground, from its centre of mass, and that place's rate
+
+    F = m (a + g n)    a = d(r x omega)/dt + omega x (r x omega)    I d(omega)/dt + omega x I omega = r x F
+    """
+    up = turn.T @ [0, 0, 1]
+    r, rate = contact(up, np.cross(up, omega))
+    own = np.cross(rate, omega) + np.cross(omega, np.cross(r, omega)) + 9.81 * up
+    across = np.array([np.cross(r, np.cross(r, axis)) for axis in np.eye(3)]).T
+    return np.linalg.solve(inertia - m * across, m * np.cross(r, own) - np.cross(omega, inertia @ omega))
+
+
+def rolling_disc(up: Any, rate: Any) -> Any:
+    across, change = up * [1, 0, 1], rate * [1, 0, 1]  # y is the disc's axis
+    size = np.linalg.norm(across)
+    way, moved = across / size, change / size - across * (across @ change) / size**3
+    return -0.15 * way, -0.15 * moved
+
+
+def rattleback(up: Any, rate: Any) -> Any:
+    squares = np.diag([0.2, 0.03, 0.02]) ** 2
+    height = np.sqrt(up @ squares @ up)
+    place = -squares @ up / height
+    moved = -squares @ rate / height + squares @ up * (up @ squares @ rate) / height**3
+    return place + 0.01 * np.eye(3)[2], moved
+
+
+ROLLING = {
+    "rolling_disc": (rolling_disc, 0.3, np.diag([1, 2, 1]) * 0.3 * 0.15**2 / 4, [3, 1, 2]),
+    "rattleback": (rattleback, 1.0, [[2e-4, -2e-5, 0], [-2e-5, 1.6e-3, 0], [0, 0, 1.7e-3]], [3, 2, 1]),
+}
+"""Contact, mass, inertia, and the axes about which the last three coordinates turn, one after the other."""
+
+
 def test_every_example_has_an_oracle() -> None:
-    assert {path.stem for path in FOLDER.glob("*.py")} - {"draw"} == SYSTEMS.keys()
+    assert {path.stem for path in FOLDER.glob("*.py")} - {"draw"} == {*SYSTEMS, *ROLLING}
+
+
+@pytest.mark.parametrize("name", ROLLING)
+def test_what_rolls_turns_as_newton_and_euler_say(name: str, tmp_path: Path) -> None:
+    contact, m, inertia, axes = ROLLING[name]
+    write_package(generate(read_system(FOLDER / f"{name}.py"), ["numpy"]), tmp_path / name)
+    robot = import_package(tmp_path / name).load()
+    angles, rates, changes = dynamicsymbols("a b c"), sp.symbols("u v w"), sp.symbols("d e f")
+    turns = {1: sp.rot_axis1, 2: sp.rot_axis2, 3: sp.rot_axis3}
+    turn = sp.eye(3)
+    for axis, angle in zip(axes, angles, strict=True):
+        turn = turn * turns[axis](-angle)
+    spun = turn.T * turn.diff(T)
+    omega = sp.Matrix([spun[2, 1], spun[0, 2], spun[1, 0]])
+    known = {f.diff(T, 2): a for f, a in zip(angles, changes, strict=True)}
+    known |= {f.diff(T): v for f, v in zip(angles, rates, strict=True)}
+    made = sp.lambdify(
+        [angles, rates, changes], [part.xreplace(known) for part in (turn, omega, omega.diff(T))]
+    )
+    tied = robot.constraints
+    for q, rate, _ in zip(*random_states(5, 6), strict=True):
+        q = 0.4 * q  # a disc that leans by more than a right angle touches the ground elsewhere
+        qd = tied.velocity(q, rate[2:])
+        air = 1e-4 * qd[2:] if name == "rattleback" else 0.0 * qd[2:]
+        qdd = tied.forward_dynamics(q, qd, np.concatenate([[0.0, 0.0], air])).qdd
+        frame, spin, change = (np.squeeze(part) for part in made(q[2:], qd[2:], qdd[2:]))
+        expected = turning(frame, contact, np.array(inertia), m, spin)
+        np.testing.assert_allclose(change, expected, atol=1e-12 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("name", SYSTEMS)

@@ -118,10 +118,11 @@ def test_a_file_may_hold_a_whole_system(tmp_path: Path) -> None:
         read_system(tmp_path / "two.py")
 
 
-def test_constraints_are_refused() -> None:
+def test_what_is_no_system_is_refused() -> None:
     system, values = cart_pole()
     system.add_holonomic_constraints(X - sp.sin(THETA))
-    with pytest.raises(LinkwiseError, match="the system has holonomic constraints, which are not read yet"):
+    system.velocity_constraints = [X.diff() - 2 * THETA.diff()]
+    with pytest.raises(LinkwiseError, match="the system has velocity_constraints of its own in place of"):
         from_sympy(system, values)
     with pytest.raises(
         LinkwiseError, match=r"from_sympy takes a sympy\.physics\.mechanics\.System, and got 3"

@@ -13,7 +13,15 @@ from helpers import urdf_text
 from helpers.urdf_text import joint
 from linkwise import Coordinate, LinkEnergy, Options, energy_system, generate, read_system
 from linkwise import render as rendering
-from linkwise.emit import autograd, closed_forms, formula_page, legend, shared_texts, tree_file
+from linkwise.emit import (
+    autograd,
+    closed_forms,
+    constraint_forms,
+    formula_page,
+    legend,
+    shared_texts,
+    tree_file,
+)
 from linkwise.emit.c import loops, sources
 from linkwise.render import render, variables
 
@@ -22,6 +30,7 @@ ROBOTS = (
     ("planar2", Options("symbolic")),
     (DATA / "skew.toml", Options()),
     (DATA / "turntable.py", Options()),
+    (DATA / "bead_on_wire.py", Options()),
 )
 
 
@@ -35,7 +44,7 @@ def views() -> dict[str, list[set[str]]]:
         return render(template, view)
 
     with pytest.MonkeyPatch.context() as patch:
-        python = autograd, closed_forms, shared_texts, tree_file
+        python = autograd, closed_forms, constraint_forms, shared_texts, tree_file
         for module in (rendering, loops, sources, formula_page, legend, *python):
             patch.setattr(module, "render", recording)
         for robot, options in ROBOTS:

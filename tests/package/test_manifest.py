@@ -49,6 +49,13 @@ def links(data: Any) -> Any:
     return data["tree"]["links"]
 
 
+NOTHING_BESIDE: dict[str, Any] = {
+    "time": "",
+    "inputs": [],
+    "constraints": [],
+    "independent": [],
+    "closed_position": [],
+}
 TIE = {"name": "loop", "kind": "point", "first": 0, "second": 1, "length": 0.0}
 
 DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
@@ -146,7 +153,7 @@ DAMAGES: dict[str, tuple[Callable[[Any], object], str]] = {
     ),
     "neither bodies nor energies": (lambda data: data.update(tree=None), "there must be either a tree or"),
     "energies of other links": (
-        lambda data: data.update(tree=None, energies={"links": [], "time": "", "inputs": []}),
+        lambda data: data.update(tree=None, energies={"links": [], **NOTHING_BESIDE}),
         "energies is not of the links, one for each",
     ),
     "formula of nothing": (
@@ -290,7 +297,7 @@ def test_every_entry_is_held_by_name(package: Path) -> None:
 def as_energies(data: Any) -> None:
     """A manifest of energies that a user wrote in place of bodies."""
     rows = [{"link": link["name"], "kinetic": "0", "degree": 2, "shares": []} for link in data["links"]]
-    data.update(tree=None, energies={"links": rows, "time": "", "inputs": []})
+    data.update(tree=None, energies={"links": rows, **NOTHING_BESIDE})
 
 
 SLIPS: dict[str, tuple[Callable[[Any], object], str]] = {

@@ -59,6 +59,10 @@ TEXTS = {
 }
 CART = str(DATA / "cart_pendulum.py")
 """Cart with a pendulum, whose links are energies."""
+WIRE = str(DATA / "bead_on_wire.py")
+"""Bead on a wire, whose links are energies with a constraint."""
+SIZES = {CART: (2, 0), WIRE: (2, 1)}
+"""Number of joints of such a robot, and of its independent ones."""
 KINDS = [
     *(("numpy", False), ("torch", True), ("autograd", True)),
     *(pytest.param("native", tensors, marks=needs_compiler) for tensors in (False, True)),
@@ -101,15 +105,16 @@ def of(row: Call) -> str:
     return "free" if row.ties == "refused" else "tied"
 
 
-def given(load: Load, row: Call, batch: tuple[int, ...] = (), rigid: bool = True) -> dict[str, Any]:
+def given(load: Load, row: Call, batch: tuple[int, ...] = (), which: str = "tied") -> dict[str, Any]:
     """Return a row's arguments, in arrays: the motion, in which the loop closes, and what has to be given
     too."""
-    draw, (n, m) = np.random.default_rng(2), (4, 2) if rigid else (2, 0)
+    draw, (n, m) = np.random.default_rng(2), SIZES.get(which, (4, 2))
     sizes = {"q": n, "qd": n, "qdd": n, "tau": n, "yd": m, "ydd": m}
     motion = {name: draw.uniform(-1.0, 1.0, (*batch, size)) for name, size in sizes.items()}
-    if rigid:
-        near = np.array([0.9, -1.1, 1.3, 0.2]) + 0.1 * motion["q"]
-        motion["q"] = load("tied").constraints.closed(near)
+    if m:
+        known = WIRE if which == WIRE else "tied"
+        near = [0.4, 0.3] if which == WIRE else [0.9, -1.1, 1.3, 0.2]
+        motion["q"] = load(known).constraints.closed(np.array(near) + 0.1 * motion["q"])
     hand = {"force": np.array([3.0, -2.0, 0.5]), "point": np.array([0.1, 0.2, -0.3])}
     torque = draw.uniform(-1.0, 1.0, (*batch, n, PARTS))
     beside = {
@@ -120,7 +125,7 @@ def given(load: Load, row: Call, batch: tuple[int, ...] = (), rigid: bool = True
         "time": INSTANTS,
         "torque": torque if row.chosen.get("by_link") else torque[..., 0],
         "tau": motion["tau"],
-        "loads": [AppliedLoad("hand", **hand)] if rigid else [],
+        "loads": [] if which in SIZES else [AppliedLoad("hand", **hand)],
     }
     left = () if row.options.get("frame") else ("frame", "point")
     asked = {name: beside[name] for name in row.options if name in beside and name not in left}
@@ -159,9 +164,9 @@ def shape_of(
     """Return the shape of a quantity by the axes that the row has for it."""
     axes = axes_of(robot.joint_names, robot.joint_units, robot.link_names, robot.share_names)
     sizes = dict(zip(PACKED, robot.structure.sizes, strict=True)) | {"part": PARTS, "load": loads}
+    ties = robot.constraints if row.ties == "kept" and robot.backend.ties_joints else None
+    axes |= tied_axes(ties.independent, ties.independent, ties.rows, ties.rows) if ties else {}
     if row.rigid:
-        ties = robot.constraints if row.ties == "kept" else None
-        axes |= tied_axes(ties.independent, ties.independent, ties.rows, ties.rows) if ties else {}
         sizes["frame"] = len(robot.kinematics.frames)
     sizes |= {name: len(axis.names) for name, axis in axes.items() if name != "part"}
     sizes["moved"] = sizes["constraint" if row.key == "induced_reactions" else "joint"]
@@ -179,7 +184,7 @@ def check_answers(
     load: Load, which: str, row: Call, backend: str, tensors: bool, batch: tuple[int, ...], dtype: str
 ) -> None:
     """Hold an answer to NumPy's numbers, and its shapes, kind and dtype to the row and the motion."""
-    robot, asked = load(which, backend), given(load, row, batch, which != CART)
+    robot, asked = load(which, backend), given(load, row, batch, which)
     expected = answered(load(which), row, taken(taken(asked, False, dtype), False))
     found = answered(robot, row, taken(asked, tensors, dtype))
     loads = len(asked.get("loads", ()))
@@ -239,11 +244,13 @@ def test_every_back_end_answers_with_the_same_numbers(
 def test_links_of_energies_answer_what_needs_no_rigid_links(
     row: Call, backend: str, tensors: bool, load: Load
 ) -> None:
+    of_constraints = row.name.startswith("constraints.") or row.key == "induced_reactions"
     if not row.rigid:
-        check_answers(load, CART, row, backend, tensors, (2,), "float64")
-        return
-    asked = taken(given(load, row, (), False), tensors)
-    refused(lambda: answered(load(CART, backend), row, asked), "rigid links|nothing reacts")
+        check_answers(load, WIRE if of_constraints else CART, row, backend, tensors, (2,), "float64")
+    if row.rigid or of_constraints:
+        asked = taken(given(load, row, (), CART), tensors)
+        told = "rigid links|nothing reacts|write constraints with the energies"
+        refused(lambda: answered(load(CART, backend), row, asked), told)
 
 
 @on_every_back_end
@@ -359,7 +366,7 @@ def test_ties_are_cut_kept_or_refused_as_the_row_says(row: Call, load: Load) -> 
         refused(lambda: answered(tied, row, asked), r"call constraints\.forward_dynamics\(")
     elif row.ties == "cut":
         assert same(answered(tied, row, asked), answered(free, row, asked))
-    elif "constraints" in row.options and not row.rigid:
+    elif "constraints" in row.options and row.key != "induced_reactions":
         cut = answered(free, row, asked)
         assert same(answered(tied, row, asked, constraints=False), cut)
         assert not same(answered(tied, row, asked), cut)

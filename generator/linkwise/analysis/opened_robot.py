@@ -237,13 +237,18 @@ def load_robot(directory: Path, backend: str | None = None) -> OpenedRobot:
 
 
 def refuse_varying(package: Package) -> None:
-    """Raise LinkwiseError for a robot that depends on time or inputs, which logs are not read for."""
+    """Raise LinkwiseError for time, inputs and constraints of written energies: logs are not for them."""
     energies = package.manifest.energies
     varying = [] if energies is None else [*filter(None, (energies.time, *energies.inputs))]
     if varying:
         raise LinkwiseError(
             f"{package.directory}: its torques depend on {listed(varying)}, beside its joints' motion, and "
             "logs are not read for that; ask for them in Python, sample by sample, with robot.at(...)"
+        )
+    if energies is not None and energies.constraints:
+        raise LinkwiseError(
+            f"{package.directory}: constraints that were written with its energies tie its joints, and logs "
+            "are not read for that; ask for its torques in Python, with robot.constraints"
         )
 
 

@@ -53,8 +53,12 @@ def _velocities(model: Dynamics, reference: LoopReference) -> Iterator[Entries]:
     (q, qd, qdd), own = reference.states.motion, list(reference.independent)
     constraints = model.constraints
     # Closing stops once steps no longer matter: a position is only so near, not as near as rounding allows.
-    size = np.broadcast_to(1.0 + np.abs(q).max(-1, keepdims=True), q.shape)
-    yield Entries("closed", constraints.closed(q + _away(reference)), q, size * SETTLED / np.finfo(float).eps)
+    closed, size = constraints.closed(q + _away(reference)), 1.0 + np.abs(q).max(-1, keepdims=True)
+    if reference.leads_back:
+        yield Entries("closed", closed, q, np.broadcast_to(size, q.shape) * SETTLED / np.finfo(float).eps)
+    else:
+        left = np.asarray(constraints.violation(closed))
+        yield Entries("closed", left, 0.0 * left, size * SETTLED / np.finfo(float).eps + 0.0 * left)
     found = {
         "violation": constraints.violation(q),
         "jacobian": constraints.jacobian(q),

@@ -158,7 +158,7 @@ NOT_CALLED = "frame_partial_impedance"
 def impedance_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Prototype]:
     """Return impedance functions of one number type: of free joints, and of frames of rigid links."""
     tree, kind = manifest.tree, f"{manifest.name}_impedance{suffix}"
-    if tree is not None and tree.tied:
+    if manifest.tied:
         return []
     state = ("q", "qd", *(["p"] if manifest.parameters else []))
     joints = Prototype(

@@ -8,6 +8,7 @@ from functools import cached_property
 from importlib.util import find_spec
 from typing import NamedTuple, TypeVar
 
+import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.rule.joint_tree import JointTree
 from linkwise_runtime.structure import PassiveJoint
@@ -22,12 +23,14 @@ from linkwise.check.parametric_tree import tree_with
 from linkwise.check.regressor_checks import regressor_reference
 from linkwise.check.simulated_terms import simulated_terms
 from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion
+from linkwise.check.sum_checks import regular
 from linkwise.oracle.energies import TextTerms, energy_reference, states_of_energies
 from linkwise.oracle.loop_reference import LoopReference, loop_reference
 from linkwise.oracle.magnitudes import Magnitudes
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.reference import Reference, body_reference, states_of_torques, torque_reference
 from linkwise.oracle.states import States, affordable, random_states
+from linkwise.oracle.written_constraints import TextConstraints, written_reference
 from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.package.load import Package
 from linkwise.package.manifest import Manifest
@@ -63,6 +66,11 @@ def there(what: T | None) -> T:
     """Return `what`, which is not None: a check that concerns a subject finds it there."""
     assert what is not None
     return what
+
+
+NEAR_NONE = "loops close near none of the states that were tried"
+SEEDS = (None, 1, 2, 3)
+"""Seeds of errors in each operation of what a user wrote; None for none."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +127,8 @@ class Subject:
 
     @property
     def tied(self) -> bool:
-        """True if loops of the open tree are closed."""
-        return self.tree is not None and self.tree.tied
+        """True if loops of the open tree are closed, or constraints were written with the links."""
+        return self.manifest.tied
 
     @property
     def passive(self) -> tuple[PassiveJoint, ...]:
@@ -154,8 +162,10 @@ class Subject:
     @cached_property
     def loops(self) -> LoopReference | None:
         """Reference for constraints; None without ties, or where no state leads to closed loops."""
-        if self.tree is None or not self.tied:
+        if not self.tied:
             return None
+        if self.tree is None:
+            return self._written_constraints()
         return loop_reference(self.manifest, self.tree, self.reference.states)
 
     @property
@@ -174,7 +184,12 @@ class Subject:
     def simulation(self) -> SimulatedMotion | str:
         """A short motion, or the reason why there is none."""
         if self.terms is not None:
-            return simulated_terms(self.terms, there(self.manifest.energies).inputs, self.reference)
+            inputs, tried = there(self.manifest.energies).inputs, self.reference.states
+            if not self.tied:
+                tried = tried.at(np.flatnonzero(regular(self.reference)))
+                return simulated_terms(self.terms, inputs, tried, None)
+            closed = self.closed_states
+            return NEAR_NONE if closed is None else simulated_terms(self.terms, inputs, closed, self.ties)
         return simulated_motion(self.manifest, there(self.tree), there(self.closed_states))
 
     @cached_property
@@ -186,8 +201,22 @@ class Subject:
         joints = [joint.name for joint in self.manifest.joints]
         return [
             [TextTerms(one, joints, written.time, self.parameters, noise) for one in written.links]
-            for noise in (None, 1, 2, 3)
+            for noise in SEEDS
         ]
+
+    def _written_constraints(self) -> LoopReference | None:
+        """Return the reference for constraints that a user wrote; None where nothing can read their text."""
+        if self.terms is None:
+            return None
+        position = np.array(there(self.manifest.energies).closed_position)
+        names = self.package.module.ROBOT.share_names
+        return written_reference(self.ties, self.terms, names, position, self.reference.states)
+
+    @cached_property
+    def ties(self) -> Sequence[TextConstraints]:
+        """Constraints that a user wrote, exact, then with errors in each operation."""
+        written, joints = there(self.manifest.energies), [joint.name for joint in self.manifest.joints]
+        return [TextConstraints(written, joints, self.parameters, noise) for noise in SEEDS]
 
     @cached_property
     def tried_reference(self) -> tuple[Reference | None, int]:

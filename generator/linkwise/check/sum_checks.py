@@ -143,9 +143,8 @@ def _accelerations(model: Dynamics, reference: Reference, at: Any) -> Iterator[E
 
 
 def is_tied(model: Dynamics) -> bool:
-    """Return whether ties or couplings close loops of the open tree."""
-    tree = model.backend.tree
-    return tree is not None and tree.tied
+    """Return whether constraints tie the joints."""
+    return model.backend.ties_joints
 
 
 def acceleration_scales(

@@ -101,7 +101,7 @@ def _in_loops(a: BackendAnswers) -> bool:
 
 
 def _moving_on(a: BackendAnswers) -> bool:
-    return _by_forms(a) and a.subject.closed_states is not None
+    return _by_forms(a) and a.subject.tree is not None and a.subject.closed_states is not None
 
 
 def _simulated(a: BackendAnswers) -> bool:

@@ -88,11 +88,32 @@ def inspection(system: System, details: bool = False, refused: str = "") -> dict
             }
             for j, name in enumerate(system.link_names)
         ],
-        **(_constraints(tree, [c.name for c in system.coordinates]) if tree else {}),
+        **(
+            _constraints(tree, [c.name for c in system.coordinates]) if tree else _written_constraints(system)
+        ),
         **({"frames": _frames(tree)} if details and tree else {}),
         "parameters": [asdict(parameter) for parameter in parameters(system)],
         "notes": [asdict(note) for note in notes],
         "refused": refused,
+    }
+
+
+def _written_constraints(system: System) -> dict[str, Any]:
+    """Return the constraints that a user wrote, as `_constraints` does; empty without any."""
+    if not isinstance(system, EnergySystem) or not system.constraints:
+        return {}
+    joints = [c.name for c in system.coordinates]
+    return {
+        "constraints": [
+            {
+                "name": one.name,
+                "kind": "positions" if one.holonomic else "velocities",
+                "expression": f"{one.expression} = 0",
+            }
+            for one in system.constraints
+        ],
+        "independent": [joints[k] for k in system.independent],
+        "dependent": [joint for k, joint in enumerate(joints) if k not in system.independent],
     }
 
 
@@ -201,6 +222,8 @@ def _limits(joint: dict[str, Any]) -> str:
 
 def _held(constraint: dict[str, Any]) -> str:
     """Return what a constraint holds, in words."""
+    if "expression" in constraint:
+        return f"of {constraint['kind']}: {constraint['expression']}"
     if constraint["kind"] == "coupling":
         return f"coupling of {', '.join(constraint['terms'])}"
     length = f" of {constraint['length']:g} m" if "length" in constraint else ""

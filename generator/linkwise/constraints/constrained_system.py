@@ -1,20 +1,20 @@
 """The coordinates of a robot that move all others under its constraints: as asked for, or by pivoting."""
 
 import shlex
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from linkwise_runtime.constraints.independent_joints import chosen_independent, rank_of, redundant_names
 from linkwise_runtime.rule.joint_tree import TreeTie
 
 from linkwise.arrays import Array
-from linkwise.constraints.loop_closing import closed_loops
+from linkwise.constraints.loop_closing import ClosedLoops, closed_constraints, closed_loops
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.notes import BESIDE, LEAST, Note
 from linkwise.robot.robot import Coupling, Robot
 from linkwise.symbolic.definition import joint_tree
-from linkwise.symbolic.system import RigidSystem, System
+from linkwise.symbolic.system import EnergySystem, System
 
 
 def constrained_system(system: System) -> System:
@@ -23,7 +23,9 @@ def constrained_system(system: System) -> System:
     Raises LinkwiseError for constraints that never close, that hold nothing or all that moves, and for
     requested coordinates that the others do not follow.
     """
-    if not isinstance(system, RigidSystem) or system.robot.independent:
+    if isinstance(system, EnergySystem):
+        return _constrained_energies(system) if system.constraints and not system.independent else system
+    if system.robot.independent:
         return system
     robot = system.robot
     if not (robot.ties or robot.couplings):
@@ -31,30 +33,51 @@ def constrained_system(system: System) -> System:
     tree = joint_tree(system)
     assert tree is not None  # rigid links always have one
     loops = closed_loops(tree, len(robot.coordinates))
-    chosen = _independent(robot, loops.rows)
+    names = [coordinate.name for coordinate in robot.coordinates]
+    requested = [names.index(name) for name in robot.requested_independent]
+    chosen = _independent(loops, names, _proposed(robot, loops.rows), requested)
     position = loops.position(chosen)
-    notes = [Note("constraint", name, about, BESIDE) for name, about in constraints_of(robot)]
+    notes = [Note("constraint", name, about, BESIDE) for name, about in constraints_of(system)]
     notes += [Note("redundant", name, "", LEAST) for name in redundant_names(loops.rows, loops.owners)]
     held = replace(robot, independent=chosen, closed_position=position, notes=(*robot.notes, *notes))
     return replace(system, robot=held)
 
 
-def constraints_of(robot: Robot) -> Iterator[tuple[str, str]]:
+def _constrained_energies(system: EnergySystem) -> EnergySystem:
+    names = [coordinate.name for coordinate in system.coordinates]
+    loops = closed_constraints(system)
+    slides = [(float(coordinate.unit == "m"),) for coordinate in system.coordinates]
+    proposed = chosen_independent(loops.rows, (), slides)
+    chosen = _independent(loops, names, proposed, system.requested_independent, "independent=")
+    return replace(system, independent=chosen, closed_position=loops.position(chosen))
+
+
+def constraints_of(system: System) -> Iterator[tuple[str, str]]:
     """Yield the name of each constraint of the joints, and what it holds, in words; none of an open tree."""
+    if isinstance(system, EnergySystem):
+        yield from ((one.name, f"{one.expression} = 0") for one in system.constraints)
+        return
+    robot = system.robot
     yield from ((tie.name, _about_tie(tie, robot)) for tie in robot.ties)
     yield from ((coupling.name, _about_coupling(coupling, robot)) for coupling in robot.couplings)
 
 
-def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
-    """Return the independent coordinates: those asked for, or those that pivoting leaves, driven ones first.
+def _independent(
+    loops: ClosedLoops,
+    names: Sequence[str],
+    proposed: Sequence[int],
+    requested: Sequence[int],
+    option: str = "--independent",
+) -> tuple[int, ...]:
+    """Return the independent coordinates: those asked for, or those proposed.
 
     Raises LinkwiseError for constraints that hold nothing or all that moves, and for coordinates asked for
     that are too many or too few, or that the others do not follow.
     """
-    names = [coordinate.name for coordinate in robot.coordinates]
+    rows = loops.rows
     rank = rank_of(rows)
     free = len(names) - rank
-    constraints = listed([*(repr(tie.name) for tie in robot.ties), *(repr(c.name) for c in robot.couplings)])
+    constraints = listed(map(repr, dict.fromkeys(loops.owners)))
     if not rank:
         raise LinkwiseError(
             f"the constraints {constraints} hold however the joints move, or where these are at a dead point "
@@ -65,21 +88,21 @@ def _independent(robot: Robot, rows: Array) -> tuple[int, ...]:
             f"the constraints {constraints} leave nothing to move, so the robot stands still; remove one, or "
             "let it tie less"
         )
-    proposed = _proposed(robot, rows)
-    if not robot.requested_independent:
-        return proposed
-    chosen = sorted(names.index(name) for name in robot.requested_independent)
-    others = _asked(names[k] for k in proposed)
+    if not requested:
+        return tuple(proposed)
+    chosen = sorted(requested)
+    others = [names[k] for k in proposed]
+    told = f"{option}{others!r}" if option.endswith("=") else _asked(others)
     if len(chosen) != free:
         raise LinkwiseError(
             f"{_count(len(chosen))} given as independent, and the constraints leave {free} to choose; "
-            f"choose {others}, say"
+            f"choose {told}, say"
         )
     rest = [k for k in range(len(names)) if k not in chosen]
     if rank_of(rows[:, rest]) < rank:
         raise LinkwiseError(
-            f"{listed(robot.requested_independent)} cannot be independent, for the other joints do not "
-            f"follow from them; choose {others}, say"
+            f"{listed(names[k] for k in chosen)} cannot be independent, for the other joints do not "
+            f"follow from them; choose {told}, say"
         )
     return tuple(chosen)
 

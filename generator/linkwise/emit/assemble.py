@@ -15,6 +15,7 @@ from linkwise.emit.backend import BackendFiles
 from linkwise.emit.bodies import body_texts, parameter_rules
 from linkwise.emit.c import loop_costs
 from linkwise.emit.c.flash import code_size
+from linkwise.emit.constraint_forms import constraint_files
 from linkwise.emit.derivation import Derivation
 from linkwise.emit.shared_texts import init_text, names_text
 from linkwise.emit.vendored_runtime import with_runtime
@@ -33,7 +34,7 @@ from linkwise.symbolic.definition import (
     joint_tree,
     passive_joints,
 )
-from linkwise.symbolic.system import RigidSystem
+from linkwise.symbolic.system import EnergySystem, RigidSystem
 
 LONGEST_NAME = 60
 DEVICES = {"aux", "con", "nul", "prn", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
@@ -131,6 +132,8 @@ def shared_files(derivation: Derivation, chosen: Iterable[BackendFiles]) -> Iter
             energies(system),
         ),
     )
+    if isinstance(system, EnergySystem):
+        yield from constraint_files(system)
     yield "py.typed", ""
 
 

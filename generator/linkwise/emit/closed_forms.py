@@ -11,7 +11,7 @@ from linkwise.emit.printer import PythonPrinter
 from linkwise.emit.straight_line import fetched, straight_line
 from linkwise.escape import python_literal
 from linkwise.expression.count import count_operations, in_words
-from linkwise.expression.expression_graph import Node
+from linkwise.expression.expression_graph import Graph, Node
 from linkwise.render import render
 from linkwise.symbolic.system import System
 
@@ -40,13 +40,15 @@ class FormFunction:
 def closed_form_files(system: System, links: Sequence[LinkForms]) -> Iterator[tuple[str, str]]:
     """Yield paths inside the package and texts."""
     for j, forms in enumerate(links):
+        functions = list(_functions(system, forms, j + 1))
         view = {
             "number": j + 1,
             "version": VERSION,
             "name": python_literal(system.link_names[j]),
             "path": repr(forms.path),
             "frame": forms.frame,
-            "functions": list(_functions(system, forms, j + 1)),
+            "operations": [(one.name, one.operations) for one in functions],
+            "functions": functions_text(functions),
         }
         yield f"forms/link_{j + 1}.py", render("closed_forms/link.py.j2", view)
     numbers = range(1, len(links) + 1)
@@ -55,22 +57,27 @@ def closed_form_files(system: System, links: Sequence[LinkForms]) -> Iterator[tu
     yield "forms/__init__.py", render("closed_forms/init.py.j2", view)
 
 
+def functions_text(functions: Sequence[FormFunction]) -> str:
+    """Return the text of functions, one below the other."""
+    return render("closed_forms/functions.py.j2", {"functions": functions})
+
+
 def _functions(system: System, forms: LinkForms, j: int) -> Iterator[FormFunction]:
     groups = labelled(forms, j)
     whole = [groups[name] for name in ("c2", "c1", "g", "tau", "h1") if groups[name]]
     doc = "Return c2 (for i <= k: it is symmetric), c1, g and tau"
     if groups["h1"]:
         doc += ", and h1 = 2 c1 - d(tau)/d(qd)"
-    yield _function(system, forms, "decomposition", doc, whole)
-    yield _function(system, forms, "torque", "Return tau", [groups["torque"]])
-    yield _function(system, forms, "position_gradient", "Return c0 = d(tau)/d(q)", [groups["c0"]])
+    yield form_function(system, forms.graph, "decomposition", doc, whole)
+    yield form_function(system, forms.graph, "torque", "Return tau", [groups["torque"]])
+    yield form_function(system, forms.graph, "position_gradient", "Return c0 = d(tau)/d(q)", [groups["c0"]])
     if forms.energy:
         energies = [(f"{'KPR'[at]}({j})", node) for at, node in forms.energy.items()]
         doc = "Return kinetic energy K and potential energy P in J, and R in W: d(K + P)/dt = tau . qd + R"
-        yield _function(system, forms, "energy", doc, [energies], MOTION[:2])
+        yield form_function(system, forms.graph, "energy", doc, [energies], MOTION[:2])
         shares = [(f"{name}, {i + 1}", node) for (i, name), node in forms.shares.items()]
         doc = "Return the shares with names of their own, which sum to g, name by name"
-        yield _function(system, forms, "named_shares", doc, [shares], MOTION[:2])
+        yield form_function(system, forms.graph, "named_shares", doc, [shares], MOTION[:2])
 
 
 def labelled(forms: LinkForms, j: int) -> dict[str, Rows]:
@@ -93,17 +100,18 @@ def labelled(forms: LinkForms, j: int) -> dict[str, Rows]:
     }
 
 
-def _function(
+def form_function(
     system: System,
-    forms: LinkForms,
+    graph: Graph,
     name: str,
     doc: str,
     groups: Sequence[Rows],
     motion: Sequence[str] = MOTION,
 ) -> FormFunction:
+    """Return a function of the motion, in groups of results."""
     nodes = [node for rows in groups for _, node in rows]
-    code = straight_line(forms.graph, nodes, PythonPrinter("xp"))
-    cost = count_operations(forms.graph, nodes)
+    code = straight_line(graph, nodes, PythonPrinter("xp"))
+    cost = count_operations(graph, nodes)
     texts = iter(code.outputs)
     results = tuple(tuple((next(texts), label) for label, _ in rows) for rows in groups)
     inputs = fetched(system, code, "[..., {}]")

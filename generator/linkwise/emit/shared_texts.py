@@ -144,6 +144,12 @@ def _written_texts(energies: EnergiesEntry) -> dict[str, Any]:
         "degrees": repr(tuple(link.degree for link in energies.links)),
         "time": python_literal(energies.time) if energies.time else "",
         "inputs": _names_text(energies.inputs) if energies.inputs else "",
+        "constraints": _names_text([one.name for one in energies.constraints])
+        if energies.constraints
+        else "",
+        "holonomic": repr(tuple(one.holonomic for one in energies.constraints)),
+        "independent": repr(energies.independent),
+        "closed_position": repr(energies.closed_position),
     }
 
 

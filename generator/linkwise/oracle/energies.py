@@ -19,11 +19,39 @@ PIECES = {"Piecewise", "Max", "Min", "Abs", "sign"}
 """Functions in pieces."""
 
 
-class TextTerms:
-    """Terms of one link, for q and qd of shape (n,); raises Unreadable for no formula.
+class TextValues:
+    """Values of formulas in q and qd of shape (n,), time and parameters.
 
     noise: a seed for errors of up to NOISE in each operation, the same ones in each call; None for none
     """
+
+    def __init__(self, parameters: Mapping[str, float], time: str, noise: int | None = None) -> None:
+        torch = extra("torch")
+        self._noise = noise
+        self._parameters = {
+            name: torch.tensor(value, dtype=torch.float64)
+            for name, value in parameter_values(parameters).items()
+        }
+        self._symbols = dict(zip(parameters, parameter_values(parameters), strict=True))
+        self._time = self._symbols.get(time, "")
+        self.now = self._parameters.get(self._time, torch.zeros((), dtype=torch.float64))
+
+    def value(self, formula: TextFormula, q: Any, qd: Any, time: Any) -> Any:
+        """Return the value of one of the formulas, without an axis."""
+        names, functions = dict(self._parameters), dict(torch_functions())
+        if self._time:
+            names[self._time] = time
+        for kind, motion in (("q", q), ("qd", qd)):
+            names |= {f"{kind}_{k}": motion[k - 1] for k in range(1, len(motion) + 1)}
+        if self._noise is not None:
+            chosen = errors(self._noise)
+            names = {name: NoisyNumber(value, chosen) for name, value in names.items()}
+            functions = {name: noisy(function, chosen) for name, function in functions.items()}
+        return q.new_zeros(()) + plain(formula.value(names, functions))  # a constant is a tensor, too
+
+
+class TextTerms(TextValues):
+    """Terms of one link; raises Unreadable for no formula."""
 
     def __init__(
         self,
@@ -33,8 +61,7 @@ class TextTerms:
         parameters: Mapping[str, float],
         noise: int | None = None,
     ) -> None:
-        torch = extra("torch")
-        self._noise = noise
+        super().__init__(parameters, time, noise)
         self.kinetic = TextFormula(entry.kinetic)
         self.shares = [
             (
@@ -46,13 +73,6 @@ class TextTerms:
             )
             for share in entry.shares
         ]
-        self._parameters = {
-            name: torch.tensor(value, dtype=torch.float64)
-            for name, value in parameter_values(parameters).items()
-        }
-        self._symbols = dict(zip(parameters, parameter_values(parameters), strict=True))
-        self._time = self._symbols.get(time, "")
-        self.now = self._parameters.get(self._time, torch.zeros((), dtype=torch.float64))
 
     @property
     def has_pieces(self) -> bool:
@@ -67,19 +87,6 @@ class TextTerms:
         given = {self._symbols[name]: torch.tensor(v, dtype=torch.float64) for name, v in inputs.items()}
         moved._parameters = {**self._parameters, **given}
         return moved
-
-    def value(self, formula: TextFormula, q: Any, qd: Any, time: Any) -> Any:
-        """Return the value of one of the formulas, without an axis."""
-        names, functions = dict(self._parameters), dict(torch_functions())
-        if self._time:
-            names[self._time] = time
-        for kind, motion in (("q", q), ("qd", qd)):
-            names |= {f"{kind}_{k}": motion[k - 1] for k in range(1, len(motion) + 1)}
-        if self._noise is not None:
-            chosen = errors(self._noise)
-            names = {name: NoisyNumber(value, chosen) for name, value in names.items()}
-            functions = {name: noisy(function, chosen) for name, function in functions.items()}
-        return q.new_zeros(()) + plain(formula.value(names, functions))  # a constant is a tensor, too
 
 
 NAMES = ("tau", "c2", "c1", "g", "c0", "h1", "shares")
@@ -163,6 +170,11 @@ def _values(terms: Terms, names: Sequence[str], states: States) -> tuple[dict[st
     values = {name: np.stack(parts, 2) for name, parts in zip(NAMES, quantities, strict=True)}
     kinds = (kinetic, potential, lagrangian)
     return values, np.stack([np.stack(kind, 1) for kind in kinds]), np.stack(power, 1)
+
+
+def quantities_of(terms: Terms, names: Sequence[str], states: States) -> dict[str, Array]:
+    """Return tau, c2, c1, g and the other quantities of all links, samples first; names: of the shares."""
+    return _values(terms, names, states)[0]
 
 
 def equations_of_motion(terms: Terms, q: Array, qd: Array) -> tuple[Array, Array, float, float]:

@@ -12,6 +12,7 @@ and U^T dA/dt for U^T lambda, which are as good as all of them where loops close
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from linkwise_runtime.rule.joint_tree import JointTree
@@ -39,19 +40,28 @@ SMALL = 1e-7
 """Singular values below this part of the largest belong to rows that follow from others."""
 
 
+class RowsOf(Protocol):
+    """Interface of equations with rows."""
+
+    def rows(self, q: Array) -> Array:
+        """Return A (samples, C, n)."""
+
+
 @dataclass(frozen=True)
 class LoopReference:
     """Answers at `states`, in which loops close, by name, samples first, and the scales of their rounding.
 
     tau: torques on all joints, (samples, n)
+    leads_back: positions of the independent joints tell those of the others, nearby
     """
 
-    equations: LoopEquations
+    equations: RowsOf
     independent: tuple[int, ...]
     states: States
     tau: Array
     values: Mapping[str, Array]
     scales: Mapping[str, Array]
+    leads_back: bool = True
 
 
 def loop_reference(manifest: Manifest, tree: JointTree, states: States) -> LoopReference | None:

@@ -1,4 +1,4 @@
-"""Checks that the tree of a manifest agrees with itself and with what stands beside it."""
+"""Checks that the tree or the energies of a manifest agree with themselves and with what stands beside."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -7,7 +7,7 @@ import numpy as np
 from linkwise_runtime.rule.joint_tree import JointTree, TreeCurve, Triple
 from linkwise_runtime.structure import PassiveJoint
 
-from linkwise.package.entries import PLACE, JointEntry, LinkEntry
+from linkwise.package.entries import PLACE, EnergiesEntry, JointEntry, LinkEntry
 
 ROUNDING = 1e-6
 """Largest error of an entry of a rotation times its transpose."""
@@ -40,6 +40,26 @@ def check_tree(tree: JointTree, joints: Sequence[JointEntry], links: Sequence[Li
     _check_coordinates(tree, joints)
     _check_frames(tree)
     _check_constraints(tree, len(joints))
+
+
+def check_energies(energies: EnergiesEntry, links: Sequence[str], joints: int) -> None:
+    """Raise ValueError for energies of other links, and for impossible constraints or independent joints."""
+    if [entry.link for entry in energies.links] != [*links]:
+        raise ValueError("energies is not of the links, one for each, in their order")
+    names = [entry.name for entry in energies.constraints]
+    if len(set(names)) < len(names):
+        raise ValueError("energies.constraints has a name twice")
+    free = energies.independent
+    if list(free) != sorted(set(free)) or not all(k < joints for k in free):
+        raise ValueError("energies.independent is not of joints, in ascending order")
+    if bool(names) != bool(free) or (names and len(free) == joints):
+        raise ValueError(
+            "energies.independent is not of some joints where there are constraints, else of none"
+        )
+    if len(energies.closed_position) != (joints if names else 0):
+        raise ValueError(
+            "energies.closed_position is not of all joints where there are constraints, else of none"
+        )
 
 
 def check_places(tree: JointTree, formulas: Iterable[str]) -> None:

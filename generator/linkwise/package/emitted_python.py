@@ -53,7 +53,8 @@ ARITHMETIC = Grammar(
         ";RUN.lagrangians.frame_motion: GROUND Axes JointCurve along_z potential_at velocity_at"
         ";RUN.lagrangians.lanes: carried"
         ";RUN.file_joints: FileJoint;RUN.parameter_values: ParametricBody"
-        ";RUN.structure: JointLimits PassiveJoint Structure;RUN.rule.calls: RigidRule"
+        ";RUN.structure: JointLimits PassiveJoint Structure WrittenConstraints"
+        ";constraints: positions rates;RUN.rule.calls: RigidRule"
         ";RUN.rule.joint_tree: JointTree ParametricTree TreeCoupling TreeCurve TreeFrame TreeJoint TreeLink"
         " TreeTie"
     ),
@@ -261,6 +262,6 @@ CHECKS: Mapping[type[ast.AST], Callable[..., str]] = {
 def _may_import(grammar: Grammar, module: str, name: str, level: int) -> bool:
     if level and not module:
         return re.fullmatch(r"link_\d+", name) is not None
-    own = module in ("names", "tree", "forms", "energies")
+    own = module in ("names", "tree", "forms", "energies", "constraints")
     right = module.startswith(f"{RUNTIME}.") or (level > 0) == own
     return name in grammar.imports.get(module, ()) and right

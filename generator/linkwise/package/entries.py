@@ -96,9 +96,25 @@ class EnergyEntry:
 
 
 @dataclass(frozen=True)
+class ConstraintEntry:
+    """A constraint that a user wrote, as text that is zero: of q_k, or, not holonomic, linear in qd_k."""
+
+    name: str
+    expression: str
+    holonomic: bool
+
+
+@dataclass(frozen=True)
 class EnergiesEntry:
-    """Terms that a user wrote for all links; which of the parameters are time, empty for none, and inputs."""
+    """Terms that a user wrote for all links; which of the parameters are time, empty for none, and inputs.
+
+    independent: joints that all others follow by the constraints; closed_position: of all joints, where these
+    hold; both are empty without constraints
+    """
 
     links: tuple[EnergyEntry, ...]
     time: str
     inputs: tuple[str, ...]
+    constraints: tuple[ConstraintEntry, ...]
+    independent: tuple[int, ...]
+    closed_position: tuple[float, ...]

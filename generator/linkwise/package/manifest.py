@@ -15,7 +15,7 @@ from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.errors import LinkwiseError
 from linkwise.output import sweep
-from linkwise.package.checked_tree import check_curve, check_passive, check_places, check_tree
+from linkwise.package.checked_tree import check_curve, check_energies, check_passive, check_places, check_tree
 from linkwise.package.decode import decode, parse_json, require
 from linkwise.package.entries import (
     CodeSize,
@@ -116,8 +116,15 @@ class Manifest:
             check_places(self.tree, self.formulas)
         elif self.passive or self.formulas:
             raise ValueError("passive and formulas are of a tree, and there is none")
-        if self.energies is not None and [e.link for e in self.energies.links] != names["links"]:
-            raise ValueError("energies is not of the links, one for each, in their order")
+        if self.energies is not None:
+            check_energies(self.energies, names["links"], count)
+
+    @property
+    def tied(self) -> bool:
+        """True if there are constraints beside the joints."""
+        if self.tree is not None:
+            return self.tree.tied
+        return self.energies is not None and bool(self.energies.constraints)
 
     def text(self) -> str:
         """Return the manifest as JSON, one entry of a list per line.

@@ -96,6 +96,11 @@ def _refuse_forces(system: System) -> None:
     """Raise LinkwiseError for links whose torques are not those of a Lagrangian alone."""
     if not isinstance(system, EnergySystem):
         return
+    if system.constraints:
+        raise LinkwiseError(
+            f"{system.name} has constraints, and terms are counted of free coordinates alone; leave them "
+            "out, or choose coordinates without any"
+        )
     for link in system.links:
         if not link.has_lagrangian or system.time is not None:
             what = "explicit time" if link.has_lagrangian else "dissipation or forces"

@@ -11,6 +11,7 @@ from linkwise_runtime.structure import PassiveJoint
 from sympy.printing.str import StrPrinter
 
 from linkwise.package.entries import (
+    ConstraintEntry,
     EnergiesEntry,
     EnergyEntry,
     FollowerEntry,
@@ -165,7 +166,14 @@ def energies(system: System) -> EnergiesEntry | None:
         for link in system.links
     )
     time = "" if system.time is None else system.time.name
-    return EnergiesEntry(links, time, tuple(symbol.name for symbol in system.inputs))
+    return EnergiesEntry(
+        links,
+        time,
+        tuple(symbol.name for symbol in system.inputs),
+        tuple(ConstraintEntry(one.name, text(one.expression), one.holonomic) for one in system.constraints),
+        system.independent,
+        system.closed_position,
+    )
 
 
 def _places(system: RigidSystem) -> Iterator[tuple[str, Scalar]]:

@@ -49,25 +49,33 @@ def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
             symbolic,
             None if isinstance(scope.get("time"), ModuleType) else scope.get("time"),
             scope.get("inputs", ()),
+            scope.get("constraints"),
+            scope.get("independent", ()),
         )
     except LinkwiseError as error:
-        line = _line_of_link(str(error), path.read_bytes())
-        raise LinkwiseError(f"line {line}: {error}" if line else str(error)) from error
+        raise LinkwiseError(with_line(str(error), path)) from error
 
 
-def _line_of_link(told: str, source: bytes) -> int | None:
-    """Return the last line with the link that an error names; None where the file makes up the name."""
-    found = re.match(r"link ('[^']*'|\"[^\"]*\"): ", told)
+def with_line(told: str, path: Path) -> str:
+    """Return an error behind the last line with the link or constraint that it names, if the file has one."""
+    found = re.match(r"(link|constraint) ('[^']*'|\"[^\"]*\")", told)
     if found is None:
-        return None
-    name = ast.literal_eval(found[1])
-    calls = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call))
-    return max((call.lineno for call in calls if _is_named(call, name)), default=None)
+        return told
+    name, nodes = ast.literal_eval(found[2]), [*ast.walk(ast.parse(path.read_bytes()))]
+    calls = [node.lineno for node in nodes if isinstance(node, ast.Call) and _is_named(node, name)]
+    given = (key for node in nodes if isinstance(node, ast.Dict) for key in node.keys)
+    keys = [key.lineno for key in given if key is not None and _is(key, name)]
+    line = max(calls if found[1] == "link" else keys, default=None)
+    return told if line is None else f"line {line}: {told}"
 
 
 def _is_named(call: ast.Call, name: str) -> bool:
     given = [*call.args[:1], *(keyword.value for keyword in call.keywords if keyword.arg == "name")]
-    return any(isinstance(one, ast.Constant) and one.value == name for one in given)
+    return any(_is(one, name) for one in given)
+
+
+def _is(node: ast.expr, name: str) -> bool:
+    return isinstance(node, ast.Constant) and node.value == name
 
 
 def _whole(scope: Mapping[str, Any], symbolic: bool) -> EnergySystem:

@@ -9,7 +9,10 @@ from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.errors import LinkwiseError
 
-READ = ("coordinates", "links", "parameters", "name", "time", "inputs", "system")
+READ = (
+    *("coordinates", "links", "parameters", "name", "time", "inputs", "constraints", "independent"),
+    "system",
+)
 """Names that linkwise reads from a file."""
 SCOPES = (ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 """Syntax with names of its own."""

@@ -38,20 +38,28 @@ def from_sympy(
     name: of the robot
 
     A body's `potential_energy` is the share `potential`; uniform gravity on masscenters is `gravity`; what
-    actuators do is called after their class, and what other loads do `force`. Raises LinkwiseError for
-    constraints, for a coordinate without a unit, for kinematic equations that do not give the speeds, and as
-    `energy_system` does.
+    actuators do is called after their class, and what other loads do `force`. Constraints are called
+    `holonomic 1`, `nonholonomic 1` and so on. Raises LinkwiseError for velocity constraints of its own, for a
+    coordinate without a unit, for kinematic equations that do not give the speeds, and as `energy_system`
+    does.
     """
     if not isinstance(system, System):
         raise LinkwiseError(
             f"from_sympy takes a sympy.physics.mechanics.System, and got {short(repr(system))}"
         )
-    _refuse_constraints(system)
     reader = _SystemReader(system)
     links = [link for link in map(reader.link, system.bodies) if _moves(link)]
     if (rest := reader.rest()) is not None:
         links.append(rest)
-    return energy_system(name, _units(system, units or {}), links, parameters, symbolic, inputs=inputs)
+    return energy_system(
+        name,
+        _units(system, units or {}),
+        links,
+        parameters,
+        symbolic,
+        inputs=inputs,
+        constraints=reader.constraints(system),
+    )
 
 
 class _SystemReader:
@@ -91,6 +99,21 @@ class _SystemReader:
                 self._add(forces, name, load)
         return LinkEnergy(OTHER, 0, 0, 0, forces) if any(forces.values()) else None
 
+    def constraints(self, system: System) -> dict[str, sp.Expr]:
+        """Return the constraints by name, in coordinates and velocities; raises LinkwiseError."""
+        rates = [zero.diff(dynamicsymbols._t) for zero in system.holonomic_constraints]
+        if list(system.velocity_constraints) != [*rates, *system.nonholonomic_constraints]:
+            raise LinkwiseError(
+                "the system has velocity_constraints of its own in place of the derivatives of its others; "
+                "leave them out, or give them as nonholonomic constraints"
+            )
+        kinds = {"holonomic": system.holonomic_constraints, "nonholonomic": system.nonholonomic_constraints}
+        return {
+            f"{kind} {number}": self._plain(zero)
+            for kind, found in kinds.items()
+            for number, zero in enumerate(found, 1)
+        }
+
     def _add(self, forces: dict[str, dict[sp.Expr, sp.Expr]], name: str, load: Force | Torque) -> None:
         is_force = isinstance(load, Force)
         moved = load.point.vel(self.frame) if is_force else load.frame.ang_vel_in(self.frame)
@@ -127,18 +150,6 @@ def _speeds(system: System, rates: list[sp.Expr]) -> dict[sp.Expr, sp.Expr]:
             "there must be one for each"
         )
     return dict(found[0])
-
-
-def _refuse_constraints(system: System) -> None:
-    kinds = {
-        "holonomic constraints": system.holonomic_constraints,
-        "velocity constraints": system.velocity_constraints,
-    }
-    for what, found in kinds.items():
-        if list(found):
-            raise LinkwiseError(
-                f"the system has {what}, which are not read yet; choose coordinates without any"
-            )
 
 
 def _units(system: System, given: Mapping[sp.Expr, str]) -> dict[sp.Expr, str]:

@@ -4,7 +4,7 @@ A rigid link and a link of hand-written energies are two types, and so are the s
 systems have `name`, `coordinates`, `links`, `link_names`, `parameters`, `notes`, `request` and `path`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -172,8 +172,23 @@ class RigidSystem:
 
 
 @dataclass(frozen=True)
+class WrittenConstraint:
+    """A constraint that a user wrote: phi(q) = 0, or sum_k A_k(q) qd_k = 0 of velocities alone."""
+
+    name: str
+    expression: sp.Expr
+    """phi in the user's unit, or the sum."""
+    holonomic: bool
+    """True for phi(q) = 0."""
+
+    def row(self, coordinates: Sequence[Coordinate]) -> tuple[sp.Expr, ...]:
+        """Return A_k for each coordinate."""
+        return tuple(sp.diff(self.expression, c.q if self.holonomic else c.qd) for c in coordinates)
+
+
+@dataclass(frozen=True)
 class EnergySystem:
-    """Links whose energies a user wrote."""
+    """Links whose energies a user wrote, and constraints on them."""
 
     name: str
     coordinates: tuple[Coordinate, ...]
@@ -187,6 +202,13 @@ class EnergySystem:
     """Time among the parameters; None where nothing depends on it."""
     inputs: tuple[sp.Symbol, ...] = ()
     """Inputs among the parameters."""
+    constraints: tuple[WrittenConstraint, ...] = ()
+    requested_independent: tuple[int, ...] = ()
+    """Coordinates that were asked for as those that the others follow; empty where none were."""
+    independent: tuple[int, ...] = ()
+    """Coordinates that the others follow by the constraints; empty until chosen, and without any."""
+    closed_position: tuple[float, ...] = ()
+    """Position where the constraints hold, at the parameters' own values; empty until found."""
 
     @property
     def share_names(self) -> tuple[str, ...]:

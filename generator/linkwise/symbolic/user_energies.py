@@ -14,6 +14,7 @@ from linkwise.robot.robot import Coordinate, unusable
 from linkwise.symbolic.energy_terms import GivenTerms, sorted_terms, symbols_of, written_terms
 from linkwise.symbolic.moving_bodies import BODIES, Particle, RigidBody
 from linkwise.symbolic.system import EnergySystem, LinkEnergy, LinkTerms
+from linkwise.symbolic.written_constraints import written_constraints
 from linkwise.symbolic.written_motion import WrittenMotion
 
 
@@ -25,6 +26,8 @@ def energy_system(
     symbolic: bool = False,
     time: sp.Symbol | None = None,
     inputs: Sequence[sp.Expr] = (),
+    constraints: Mapping[str, sp.Expr | sp.Equality] | None = None,
+    independent: Sequence[Any] = (),
 ) -> EnergySystem:
     """Return the system of links that a user wrote, checked: every symbol known, every expression usable.
 
@@ -34,6 +37,10 @@ def energy_system(
     expression has are left out
     time: the symbol of time, where expressions depend on it; that of coordinates given as functions is known
     inputs: symbols or functions of what is given from outside, which forces and dissipation may depend on
+    constraints: by name what is zero: an expression of coordinates, or a sum of velocities each times one, as
+    of what rolls; or equations
+    independent: coordinates that all others follow by the constraints, with their symbols or names; unless
+    given, they are chosen where the constraints hold
 
     Time and inputs are run-time parameters, with the value 0 unless another is given. Raises LinkwiseError
     naming the link, and for more coordinates than can be generated.
@@ -58,6 +65,11 @@ def energy_system(
     for symbol in motion.inputs:
         if symbol not in used:
             raise LinkwiseError(f"the input {symbol} is in no force and no dissipation; leave it out")
+    numbers = {symbol: sp.Float(value, 17) for symbol, value in values.items()}
+    held = written_constraints(
+        constraints or {}, motion, lambda zero: _known(_whole(zero), motion, values, symbolic), numbers
+    )
+    used |= {symbol for one in held for symbol in one.expression.free_symbols}
     kept = {symbol: value for symbol, value in values.items() if symbolic and symbol in used}
     varying = {symbol: value for symbol, value in motion.varying.items() if symbol in used}
     request = {"parameters": "symbolic" if symbolic else "numeric"}
@@ -69,7 +81,21 @@ def energy_system(
         request=request,
         time=motion.time if motion.time in varying else None,
         inputs=tuple(symbol for symbol in motion.inputs if symbol in varying),
+        constraints=held,
+        requested_independent=_requested(independent, motion, bool(held)),
     )
+
+
+def _requested(given: Sequence[Any], motion: WrittenMotion, held: bool) -> tuple[int, ...]:
+    """Return the indices of the coordinates that were asked for; raises LinkwiseError."""
+    if not isinstance(given, list | tuple):
+        raise LinkwiseError(f"`independent` is {short(repr(given))}; give a list of coordinates")
+    if given and not held:
+        raise LinkwiseError("`independent` is for constraints, and there are none; leave it out")
+    found = sorted(motion.index(one, "`independent` names") for one in given)
+    if len(set(found)) < len(found):
+        raise LinkwiseError("`independent` names a coordinate twice")
+    return tuple(found)
 
 
 def _check_names(name: str, coordinates: tuple[Coordinate, ...], links: tuple[Any, ...]) -> None:
@@ -129,17 +155,7 @@ def _checked(
     name: str, terms: GivenTerms, motion: WrittenMotion, values: dict[sp.Symbol, float], symbolic: bool
 ) -> LinkTerms:
     terms = terms.mapped(_whole)
-    known = {*motion.known(), *values}
-    for symbol in sorted(symbols_of(terms.all()) - known, key=str):
-        if symbol.name in {parameter.name for parameter in (*values, *motion.varying)}:
-            raise LinkwiseError(
-                f"the symbol {symbol} is not the one among `parameters`, `time` and `inputs`: their "
-                "assumptions differ; make it once and use it everywhere"
-            )
-        raise LinkwiseError(
-            f"the symbol {symbol} is neither a coordinate (use its .q and .qd) nor among `parameters`; "
-            "add it there"
-        )
+    _check_known(symbols_of(terms.all()), motion, values)
     numbers = {symbol: sp.Float(value, 17) for symbol, value in values.items()}
     plain = terms.mapped(lambda expr: _whole(expr.xreplace(numbers)))
     _check_real(*(expr for _, expr in (*terms.all(), *plain.all())))
@@ -158,6 +174,30 @@ def _checked(
     ):
         raise LinkwiseError("it depends on no coordinate; leave the link out")
     return sorted_terms(name, chosen, motion, numbers)
+
+
+def _known(zero: sp.Expr, motion: WrittenMotion, values: dict[sp.Symbol, float], symbolic: bool) -> sp.Expr:
+    """Return an expression with numbers for parameters unless they stay; raises LinkwiseError as terms do."""
+    _check_known(zero.free_symbols, motion, values)
+    plain = _whole(zero.xreplace({symbol: sp.Float(value, 17) for symbol, value in values.items()}))
+    _check_real(zero, plain)
+    return zero if symbolic else plain
+
+
+def _check_known(
+    symbols: Iterable[sp.Symbol], motion: WrittenMotion, values: Mapping[sp.Symbol, float]
+) -> None:
+    """Raise LinkwiseError for a symbol that is nothing of the system."""
+    for symbol in sorted({*symbols} - {*motion.known(), *values}, key=str):
+        if symbol.name in {parameter.name for parameter in (*values, *motion.varying)}:
+            raise LinkwiseError(
+                f"the symbol {symbol} is not the one among `parameters`, `time` and `inputs`: their "
+                "assumptions differ; make it once and use it everywhere"
+            )
+        raise LinkwiseError(
+            f"the symbol {symbol} is neither a coordinate (use its .q and .qd) nor among `parameters`; "
+            "add it there"
+        )
 
 
 def _whole(energy: sp.Expr) -> sp.Expr:
@@ -188,15 +228,13 @@ def _check_exponents(powers: Iterable[sp.Pow], parameters: set[sp.Symbol]) -> No
 def _check_real(*energies: sp.Expr) -> None:
     for energy in energies:
         if energy.has(sp.nan, sp.oo, -sp.oo, sp.zoo):
-            raise LinkwiseError("its energies hold NaN or infinity; look for a division by zero")
+            raise LinkwiseError("it holds NaN or infinity; look for a division by zero")
         if energy.has(sp.I):
-            raise LinkwiseError("its energies hold the imaginary unit; energies are real")
+            raise LinkwiseError("it holds the imaginary unit; energies and constraints are real")
         if any(abs(number) > float_info.max for number in energy.atoms(sp.Number)):
-            raise LinkwiseError("its energies hold a number beyond 1e308; choose other units")
+            raise LinkwiseError("it holds a number beyond 1e308; choose other units")
         if complex_numbers := [number for number in _numbers(energy) if sp.im(number.evalf()) != 0]:
-            raise LinkwiseError(
-                f"its energies hold {short(str(complex_numbers[0]))}, which is not a real number"
-            )
+            raise LinkwiseError(f"it holds {short(str(complex_numbers[0]))}, which is not a real number")
 
 
 def _numbers(expr: sp.Basic) -> Iterator[sp.Expr]:

@@ -80,16 +80,14 @@ class WrittenMotion:
         own = sum((sp.diff(found, c.q) * c.qd for c in self.coordinates), sp.S.Zero)
         return own + (sp.diff(found, self.time) if self.time is not None else 0)
 
-    def index(self, given: object) -> int:
+    def index(self, given: object, told: str = "its forces name") -> int:
         """Return the index of a coordinate given as one, as its symbol or function, or by its name."""
         for k, c in enumerate(self.coordinates):
             functions = [function for function, symbol in self._of_function.items() if symbol == c.q]
             if given in (c, c.q, c.name, *functions):
                 return k
         names = ", ".join(c.name for c in self.coordinates)
-        raise LinkwiseError(
-            f"its forces name {short(repr(given))}, which is no coordinate; choose among {names}"
-        )
+        raise LinkwiseError(f"{told} {short(repr(given))}, which is no coordinate; choose among {names}")
 
     def check_apart(self) -> None:
         """Raise LinkwiseError for a symbol that is given as two of coordinate, velocity, time and input."""

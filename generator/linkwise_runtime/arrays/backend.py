@@ -101,8 +101,8 @@ class ArrayBackend(PackedBackend):
 
     @property
     def ties_joints(self) -> bool:
-        """True if the robot's file ties joints."""
-        return self.tree is not None and self.tree.tied
+        """True if the robot's file ties joints, or constraints were written with its links."""
+        return self.structure.written is not None or (self.tree is not None and self.tree.tied)
 
     @cached_property
     def answers(self) -> Answers:
@@ -174,6 +174,12 @@ class ArrayBackend(PackedBackend):
 
     def _energy_columns(self, q: Numbers, qd: Numbers) -> Numbers:
         """Return K, P and R of the links, one after the other, (..., 3 N), from closed forms."""
+        raise NotImplementedError
+
+    def evaluated(
+        self, function: Callable[..., Sequence[object]], motion: Sequence[Numbers], count: int
+    ) -> Numbers:
+        """Return what a closed form returns of namespace, motion (..., n) and parameters, (..., count)."""
         raise NotImplementedError
 
     def tree_numbers(self, own: tuple[TreeArrays, Numbers], q: Numbers) -> TreeArrays:

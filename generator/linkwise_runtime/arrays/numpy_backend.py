@@ -1,6 +1,6 @@
 """Closed forms and the vectorised rule on NumPy arrays."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -154,6 +154,14 @@ class NumpyBackend(ArrayBackend):
         columns, p = _Columns(q, len(self.structure.share_rows)), self._values(q)
         for link in cast("Sequence[EnergyForms]", self.links):
             columns.fill(link.named_shares(np, q, qd, p))
+        return columns.array()
+
+    def evaluated(
+        self, function: Callable[..., Sequence[object]], motion: Sequence[Numbers], count: int
+    ) -> Numbers:
+        """Return what a closed form returns of namespace, motion (..., n) and parameters, (..., count)."""
+        columns = _Columns(motion[0], count)
+        columns.fill(tuple(function(np, *motion, self._values(motion[0]))))
         return columns.array()
 
     def _energy_columns(self, q: Numbers, qd: Numbers) -> Numbers:

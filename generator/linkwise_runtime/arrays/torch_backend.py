@@ -1,6 +1,6 @@
 """Closed forms and the vectorised rule on torch tensors."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, ClassVar, cast
 
@@ -145,6 +145,12 @@ class TorchBackend(ArrayBackend):
         p, links = self._values(q), cast("Sequence[EnergyForms]", self.links)
         entries = [value for link in links for value in link.named_shares(torch, q, qd, p)]
         return _stacked(q, tuple(entries)) if entries else self.zeros(q, 0)
+
+    def evaluated(
+        self, function: Callable[..., Sequence[object]], motion: Sequence[Numbers], count: int
+    ) -> Numbers:
+        """Return what a closed form returns of namespace, motion (..., n) and parameters, (..., count)."""
+        return _stacked(motion[0], tuple(function(torch, *motion, self._values(motion[0]))))
 
     def _energy_columns(self, q: Numbers, qd: Numbers) -> Numbers:
         """Return K, P and R of the links, one after the other, (..., 3 N)."""

@@ -63,7 +63,26 @@ class Closing(NamedTuple):
         return float(np.abs(self.left).max(initial=0.0))
 
 
-class TieEquations:
+class ClosingEquations:
+    """Equations phi(q) = 0 with rows A, and steps of least norm to where they hold."""
+
+    def at(self, q: Floats) -> Closing:
+        """Return phi and A at q (n,)."""
+        raise NotImplementedError
+
+    def closed_from(self, start: Floats) -> Closing:
+        """Return the end of the steps from q (n,)."""
+        at = self.at(start)
+        for _ in range(STEPS):
+            step = np.linalg.lstsq(at.rows, -at.left, rcond=RANK)[0]
+            size = np.abs(step).max()
+            if size < SHORTEST:
+                break
+            at = self.at(at.q + step * min(1.0, LONGEST / size))
+        return at
+
+
+class TieEquations(ClosingEquations):
     """Equations phi(q) = 0 of what is held in a tree, its couplings included."""
 
     def __init__(self, tree: JointTree, n: int, held: Sequence[Held]) -> None:
@@ -89,17 +108,6 @@ class TieEquations:
         comparable = np.concatenate([ties / self._sizes, couplings / np.where(most > 0.0, most, 1.0)])
         return Closing(q, phi / sizes, rows / sizes[:, None], slopes, comparable)
 
-    def closed_from(self, start: Floats) -> Closing:
-        """Return the end of the steps from q (n,)."""
-        at = self.at(start)
-        for _ in range(STEPS):
-            step = np.linalg.lstsq(at.rows, -at.left, rcond=RANK)[0]
-            size = np.abs(step).max()
-            if size < SHORTEST:
-                break
-            at = self.at(at.q + step * min(1.0, LONGEST / size))
-        return at
-
 
 def random_starts(n: int) -> list[Floats]:
     """Return starting positions (n,), the same ones at every call."""
@@ -107,7 +115,9 @@ def random_starts(n: int) -> list[Floats]:
     return [width * random.uniform(-1.0, 1.0, n) for width in WIDTHS for _ in range(TRIES)]
 
 
-def best_closing(equations: TieEquations, starts: Iterable[Floats]) -> tuple[Closing, tuple[Closing, ...]]:
+def best_closing(
+    equations: ClosingEquations, starts: Iterable[Floats]
+) -> tuple[Closing, tuple[Closing, ...]]:
     """Return the closed position with the largest rank of A, and all that were found.
 
     Where none closes, return the position that is open least.
@@ -127,80 +137,67 @@ def best_closing(equations: TieEquations, starts: Iterable[Floats]) -> tuple[Clo
 
 
 class ChosenConstraints:
-    """Ties, couplings and contacts of a robot, and its independent joints."""
+    """Constraints of a robot and its independent joints."""
 
-    def __init__(
-        self, structure: Structure, tree: JointTree, independent: object, contacts: object, at: object
-    ) -> None:
-        """Choose constraints and independent joints; raises as `Dynamics.constrained` does."""
-        self._structure, self._tree = structure, tree
-        self.held: Sequence[Held] = held_by(tree, contacts)
-        if not self.held and not tree.couplings:
-            raise ValueError(
-                f"{structure.name} has no ties; robot.constrained(contacts=[Contact(frame)]) makes some that "
-                "hold frames of it where they are"
-            )
-        self.tables = tie_tables(tree, structure.n, self.held)
-        self.names = all_names(self.held, tree)
-        self.couplings = len(tree.couplings)
-        """Number of couplings, whose rows are the last ones."""
-        self.rows = (
-            *(row for one in self.held for row in one.row_names),
-            *(coupling.name for coupling in tree.couplings),
-        )
-        self.row_units = (
-            *(unit for one in self.held for unit in one.row_units),
-            *("" for _ in tree.couplings),  # whose coefficients set the unit of their sum
-        )
-        self.row_names = tuple(
-            [one.name for one in self.held for _ in one.row_names] + [c.name for c in tree.couplings]
-        )
+    names: tuple[str, ...]
+    """Names of the constraints."""
+    rows: tuple[str, ...]
+    """Name of each row, which says what it holds."""
+    row_units: tuple[str, ...]
+    """Unit in which each row is open; empty where its author's coefficients set it."""
+    row_names: tuple[str, ...]
+    """Name of the constraint that each row belongs to."""
+    independent: tuple[int, ...]
+    _structure: Structure
+    _own: tuple[int, ...]
+    """Independent joints of the package; empty where it has none."""
+    _own_position: tuple[float, ...]
+    """Closed position of the package."""
+
+    def _choose(self, independent: object, at: object, loose: Sequence[int], contacts: bool = False) -> None:
+        """Choose the independent joints; loose: those that rather follow others, as nothing drives them."""
         self._at = None if at is None else self._position(at)
-        self._is_own = independent is None and not contacts and bool(tree.independent)
-        self.independent = self._independent(independent, bool(contacts))
+        self._is_own = independent is None and not contacts and bool(self._own)
+        self.independent = self._independent(independent, loose)
+
+    def _closed(self) -> Closing:
+        """Return a position near `at`, or any without it, where constraints hold, at its own numbers."""
+        raise NotImplementedError
+
+    def _best(self, found: Closing, _: object) -> Closing:
+        """Return the end of a search; raises ValueError where it is open."""
+        if not found.is_closed:
+            told = "from any position that was tried; give `at`" if self._at is None else "beside `at`"
+            raise ValueError(f"{listed(self.names)} did not close {told}")
+        return found
 
     @cached_property
     def redundant(self) -> tuple[str, ...]:
         """Names of the constraints some of whose rows follow from other rows."""
-        return redundant_names(self._matrix, self.row_names)
+        return redundant_names(self._closing.comparable, self.row_names)
 
     @cached_property
     def closed_position(self) -> NDArray[np.float64]:
-        """Position (n,) where ties close: the tree's own, or the one at which other joints were chosen."""
+        """Position (n,) where constraints hold: the package's, or that at which other joints were chosen."""
         if self._is_own and self._at is None:
-            return np.array(self._tree.closed_position)
+            return np.array(self._own_position)
         return self._closing.q
-
-    @property
-    def _matrix(self) -> NDArray[np.float64]:
-        return self._closing.comparable
 
     @cached_property
     def _closing(self) -> Closing:
-        """Position near `at`, or any without it, where loops close, with A, at the tree's own numbers."""
-        tree, n = self._tree, self._structure.n
-        starts = random_starts(n) if self._at is None else [self._at]
-        q = starts[0]
-        if tree.tied:
-            ties = TieEquations(tree, n, [one for one in self.held if one.second is not None])
-            found, _ = best_closing(ties, starts)
-            if not found.is_closed:
-                told = "from any position that was tried; give `at`" if self._at is None else "beside `at`"
-                raise ValueError(f"{listed(self.names)} did not close {told}")
-            q = found.q
-        return TieEquations(tree, n, self.held).at(q)
+        return self._closed()
 
-    def _independent(self, given: object, has_contacts: bool) -> tuple[int, ...]:
+    def _independent(self, given: object, loose: Sequence[int]) -> tuple[int, ...]:
         if self._is_own:
-            return self._tree.independent
+            return self._own
+        matrix = self._closing.comparable
         n, names = self._structure.n, self._structure.joint_names
-        free = n - rank_of(self._matrix)
+        free = n - rank_of(matrix)
         if not free:
             raise ValueError(f"{listed(self.names)} leave nothing to move: the robot is over-constrained")
-        # Joints that follow by the ties alone stay dependent when contacts are added.
-        following = [k for k in range(n) if self._tree.independent and k not in self._tree.independent]
-        first = (*loose_base(self._tree), *following) if has_contacts else following
-        proposed = chosen_independent(self._matrix, tuple(dict.fromkeys(first)))
+        # Joints that follow by the package's constraints alone stay dependent when contacts are added.
+        following = [k for k in range(n) if self._own and k not in self._own]
+        proposed = chosen_independent(matrix, tuple(dict.fromkeys((*loose, *following))))
         if given is None:
             return proposed
         chosen = self._listed(given)
@@ -209,7 +206,7 @@ class ChosenConstraints:
             count = f"{len(chosen)} joint{'s' if len(chosen) != 1 else ''}"
             raise ValueError(f"independent has {count}, but the constraints leave {free} to choose, {told}")
         rest = [k for k in range(n) if k not in chosen]
-        if rank_of(self._matrix[:, rest]) < n - free:
+        if rank_of(matrix[:, rest]) < n - free:
             mine = listed([names[k] for k in chosen])
             raise ValueError(
                 f"the other joints do not follow {mine}, of which some follow others; choose others, {told}"
@@ -231,3 +228,45 @@ class ChosenConstraints:
         check_numbers({"at": found}, self._structure.joint_names)
         position: NDArray[np.float64] = found.astype(float)
         return position
+
+
+class TreeConstraints(ChosenConstraints):
+    """Ties, couplings and contacts of a tree, and independent joints."""
+
+    def __init__(
+        self, structure: Structure, tree: JointTree, independent: object, contacts: object, at: object
+    ) -> None:
+        """Choose constraints and independent joints; raises as `Dynamics.constrained` does."""
+        self._structure, self._tree = structure, tree
+        self._own, self._own_position = tree.independent, tree.closed_position
+        self.held: Sequence[Held] = held_by(tree, contacts)
+        if not self.held and not tree.couplings:
+            raise ValueError(
+                f"{structure.name} has no ties; robot.constrained(contacts=[Contact(frame)]) makes some that "
+                "hold frames of it where they are"
+            )
+        self.tables = tie_tables(tree, structure.n, self.held)
+        self.names = all_names(self.held, tree)
+        self.couplings = len(tree.couplings)
+        """Number of couplings, whose rows are the last ones."""
+        self.rows = (
+            *(row for one in self.held for row in one.row_names),
+            *(coupling.name for coupling in tree.couplings),
+        )
+        self.row_units = (
+            *(unit for one in self.held for unit in one.row_units),
+            *("" for _ in tree.couplings),  # whose coefficients set the unit of their sum
+        )
+        self.row_names = tuple(
+            [one.name for one in self.held for _ in one.row_names] + [c.name for c in tree.couplings]
+        )
+        self._choose(independent, at, loose_base(tree) if contacts else (), bool(contacts))
+
+    def _closed(self) -> Closing:
+        tree, n = self._tree, self._structure.n
+        starts = random_starts(n) if self._at is None else [self._at]
+        q = starts[0]
+        if tree.tied:
+            ties = TieEquations(tree, n, [one for one in self.held if one.second is not None])
+            q = self._best(*best_closing(ties, starts)).q
+        return TieEquations(tree, n, self.held).at(q)

@@ -18,7 +18,7 @@ from ..interface import Numbers, array_of, is_traced, namespace
 from ..rule.kinematics import gather
 from .chosen_constraints import OPEN
 from .independent_joints import JointColumns, check_factors, check_following, row_sizes
-from .tie_rows import RowsAt, TieRows
+from .rows import ConstraintRows, RowsThere
 
 if TYPE_CHECKING:
     from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
@@ -49,7 +49,7 @@ class TiesAt(NamedTuple):
 
     q: Numbers
     """Positions of all joints, (..., n)."""
-    made: RowsAt
+    made: RowsThere
     sizes: Numbers | None
     """Sizes that rows are divided by, (..., C); None without couplings."""
     violation: Numbers
@@ -73,7 +73,7 @@ class ClosedPlace(NamedTuple):
     q: Numbers
     """Positions of all joints, (..., n)."""
     found: DependentMap
-    made: RowsAt
+    made: RowsThere
     rows: Numbers
     """A, with its rows divided by their sizes, (..., C, n)."""
     triangle: Numbers
@@ -103,7 +103,9 @@ class ClosedPlace(NamedTuple):
         return gather(motion, self.found.columns.independent, -1)
 
 
-def ties_at(ties: TieRows, columns: JointColumns, q: Numbers, held_at: Numbers | None = None) -> TiesAt:
+def ties_at(
+    ties: ConstraintRows, columns: JointColumns, q: Numbers, held_at: Numbers | None = None
+) -> TiesAt:
     """Return the ties at q (..., n), with contacts as they are there, or from where they took hold."""
     made = ties.at(q, held_at)
     positions = made.positions()
@@ -126,7 +128,7 @@ def checked_place(at: TiesAt, columns: JointColumns, names: RowNames) -> ClosedP
 
 
 def closed_place(
-    ties: TieRows, columns: JointColumns, q: Numbers, tolerance: float | None, names: RowNames
+    ties: ConstraintRows, columns: JointColumns, q: Numbers, tolerance: float | None, names: RowNames
 ) -> ClosedPlace:
     """Return how joints follow at q (..., n); raises ValueError where ties are open or joints do not."""
     at = ties_at(ties, columns, q)

@@ -31,7 +31,7 @@ from .closed_places import (
     worst_open,
 )
 from .independent_joints import JointColumns, check_factors, left_free, lost_at
-from .tie_rows import TieRows
+from .rows import ConstraintRows
 
 if TYPE_CHECKING:
     from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
@@ -58,7 +58,7 @@ class DoesNotClose(ValueError):
 
 
 def closed(
-    ties: TieRows,
+    ties: ConstraintRows,
     columns: JointColumns,
     q: Numbers,
     held_at: Numbers,
@@ -90,7 +90,7 @@ def closed(
 
 
 def _found(
-    ties: TieRows,
+    ties: ConstraintRows,
     columns: JointColumns,
     q: Numbers,
     held_at: Numbers,

@@ -16,7 +16,7 @@ from ..interface import Array, Numbers, array_of, is_traced, side_by_side
 from ..labelled import labelled
 from ..quantities import Coefficients, ConstrainedMotion, Propagation
 from ..structure import Structure
-from .chosen_constraints import ChosenConstraints
+from .chosen_constraints import TreeConstraints
 from .closed_places import (
     ClosedPlace,
     DependentMap,
@@ -24,7 +24,9 @@ from .closed_places import (
     tie_forces,
 )
 from .newton_closing import led, with_independent
+from .tie_rows import TieRows
 from .tied_joints import TiedJoints, without_gradient
+from .written_rows import WrittenChoice, WrittenRows
 
 
 class TiedRobot(Protocol):
@@ -80,12 +82,9 @@ class Constraints(Generic[Array]):
     sample and joints.
     """
 
-    def __init__(
-        self, robot: "TiedRobot", chosen: ChosenConstraints, tolerance: float | None, made: tuple[object, ...]
-    ) -> None:
+    def __init__(self, robot: "TiedRobot", ties: TiedJoints, made: tuple[object, ...]) -> None:
         """Keep `made`, the arguments with which the robot's `constrained` makes them again, as for a copy."""
-        self._robot, self._made = robot, made
-        self.ties = TiedJoints(robot.structure, chosen, tolerance)
+        self._robot, self._made, self.ties = robot, made, ties
         """Motion of the tied joints, for arguments that have been read."""
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -287,7 +286,13 @@ class Constraints(Generic[Array]):
 
     def _led(self, q: object, held_at: object, start: object) -> Numbers:
         """Return closed positions (..., n) for positions of the independent joints (..., m)."""
-        joints = self._robot.joint_names
+        joints, written = self._robot.joint_names, self._robot.structure.written
+        if written is not None and not all(written.holonomic):
+            moving = next(name for name, own in zip(written.names, written.holonomic, strict=True) if not own)
+            raise ValueError(
+                f"where {', '.join(self.independent)} are does not tell where the others are: {moving} is a "
+                f"constraint of velocities, and the way matters; give closed(q) all {len(joints)} joints"
+            )
         # As a list it has no precision of its own.
         begin = self._closed_position.tolist() if start is None else start
         asked = {"start": begin} if held_at is None else {"start": begin, "held_at": held_at}
@@ -358,13 +363,21 @@ def constraints_of(
     robot: "TiedRobot", independent: object, contacts: object, at: object, tolerance: object
 ) -> Constraints[Any]:
     """Return constraints as `Dynamics.constrained` makes them; raises as it says."""
-    if robot.backend.tree is None:
-        raise ValueError(
-            f"the links of {robot.structure.name} are energies, which do not say where anything is; "
-            "constraints are there for rigid links"
-        )
     allowed = float(tolerance) if isinstance(tolerance, Real) and not isinstance(tolerance, bool) else None
     if tolerance is not None and (allowed is None or not 0.0 <= allowed < np.inf):
         raise ValueError(f"tolerance is {tolerance!r}; give a number of m and rad, 0 or more")
-    chosen = ChosenConstraints(robot.structure, robot.backend.tree, independent, contacts, at)
-    return Constraints(robot, chosen, allowed, (independent, contacts, at, allowed))
+    made = independent, contacts, at, allowed
+    structure, tree = robot.structure, robot.backend.tree
+    if tree is not None:
+        chosen = TreeConstraints(structure, tree, independent, contacts, at)
+        ties = TiedJoints(structure, chosen, allowed, lambda backend: TieRows(backend.frames, chosen))
+        return Constraints(robot, ties, made)
+    written = structure.written
+    if written is None or not isinstance(contacts, list | tuple) or len(contacts):
+        raise ValueError(
+            f"the links of {structure.name} are energies, which do not say where anything is, so that no "
+            "frame can be held; write constraints with the energies: energy_system(..., constraints=...)"
+        )
+    choice = WrittenChoice(structure, independent, at)
+    ties = TiedJoints(structure, choice, allowed, lambda backend: WrittenRows(backend, written))
+    return Constraints(robot, ties, made)

@@ -11,7 +11,7 @@ from ..interface import Numbers, side_by_side
 from ..kinematics.frame_answers import FrameAnswers, FrameRequest, in_pieces
 from ..kinematics.frame_arrays import FramePoses
 from ..rule.kinematics import Poses
-from .chosen_constraints import ChosenConstraints
+from .chosen_constraints import TreeConstraints
 from .held_frames import TieTables
 from .tie_arrays import (
     Changes,
@@ -42,7 +42,7 @@ class TieEnd(NamedTuple):
 class TieRows:
     """Rows of constraints on one back end: phi, A and dA/dt; arguments are as `Constraints` says."""
 
-    def __init__(self, frames: FrameAnswers, chosen: ChosenConstraints) -> None:
+    def __init__(self, frames: FrameAnswers, chosen: TreeConstraints) -> None:
         self._frames, self._constants, self.count = frames, chosen.tables, len(chosen.rows)
         self.couplings = chosen.couplings
         self._tables: dict[object, TieTables] = {}

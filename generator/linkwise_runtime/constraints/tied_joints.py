@@ -1,5 +1,6 @@
 """Motion of a robot's tied joints and the forces that cause it, for arguments that have been read."""
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, cast
 
@@ -23,14 +24,21 @@ from .closed_places import (
 )
 from .independent_joints import JointColumns, joint_columns
 from .newton_closing import closed
-from .tie_rows import TieRows
+from .rows import ConstraintRows
 
 
 class TiedJoints:
     """Chosen constraints, for any back end; tables are made when first asked for."""
 
-    def __init__(self, structure: Structure, chosen: ChosenConstraints, tolerance: float | None) -> None:
-        self.chosen, self._tolerance = chosen, tolerance
+    def __init__(
+        self,
+        structure: Structure,
+        chosen: ChosenConstraints,
+        tolerance: float | None,
+        rows: Callable[[ArrayBackend], ConstraintRows],
+    ) -> None:
+        """Keep the choice, and the function that returns its rows on a back end."""
+        self.chosen, self._tolerance, self._rows_on = chosen, tolerance, rows
         self._listed = joint_columns(chosen.independent, structure.n)
         self.independent, self.dependent = (
             tuple(structure.joint_names[k] for k in columns.tolist()) for columns in self._listed[:2]
@@ -38,12 +46,12 @@ class TiedJoints:
         """Names of the independent and of the dependent joints."""
         self._names = RowNames(chosen.rows, chosen.row_names, structure.joint_names)
         self._columns: dict[object, JointColumns] = {}
-        self._rows: dict[ArrayBackend, TieRows] = {}
+        self._rows: dict[ArrayBackend, ConstraintRows] = {}
 
-    def rows(self, backend: ArrayBackend) -> TieRows:
+    def rows(self, backend: ArrayBackend) -> ConstraintRows:
         """Return the rows of the constraints on a back end."""
         if backend not in self._rows:
-            self._rows[backend] = TieRows(backend.frames, self.chosen)
+            self._rows[backend] = self._rows_on(backend)
         return self._rows[backend]
 
     def columns(self, backend: ArrayBackend, q: Numbers) -> JointColumns:

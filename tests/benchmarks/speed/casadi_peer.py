@@ -92,21 +92,21 @@ def decomposition(package: Package) -> tuple[list[object], list[object]]:
 
 
 def energies(package: Package, q: object, qd: object) -> list[tuple[object, object]]:
-    """Kinetic and potential energy of each link, from the manifest's bodies."""
+    """Kinetic and potential energy of each link, from the manifest's tree."""
     import casadi as ca
 
     gravity = ca.DM(package.manifest["tree"]["gravity"])
     frames: list[tuple[object, ...]] = []
     found = []
     axis = ca.DM([0, 0, 1])
-    for link in package.manifest["tree"]["bodies"]:
+    for joint in package.manifest["tree"]["joints"]:
         rest = ca.DM.eye(3), ca.DM.zeros(3), ca.SX.zeros(3), ca.SX.zeros(3)
-        turn, place, spin, speed = rest if link["parent"] is None else frames[link["parent"]]
-        arm = ca.DM(link["translation"])
-        rotation = ca.sparsify(ca.DM(link["rotation"]))
-        x, xd = q[link["coordinate"]], qd[link["coordinate"]]
+        turn, place, spin, speed = rest if joint["parent"] is None else frames[joint["parent"]]
+        arm = ca.DM(joint["translation"])
+        rotation = ca.sparsify(ca.DM(joint["rotation"]))
+        x, xd = q[joint["coordinate"]], qd[joint["coordinate"]]
         here = place + turn @ arm
-        if link["kind"] == "revolute":
+        if joint["kind"] == "revolute":
             s, c = ca.sin(x), ca.cos(x)
             about = ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
             local = rotation @ about
@@ -119,6 +119,8 @@ def energies(package: Package, q: object, qd: object) -> list[tuple[object, obje
             moved = rotation.T @ (speed + ca.cross(spin, arm + rotation @ axis * x)) + axis * xd
         turn = turn @ local
         frames.append((turn, here, rate, moved))
+    for link in package.manifest["tree"]["links"]:
+        turn, here, rate, moved = frames[link["joint"]]
         com, inertia, m = ca.DM(link["com"]), ca.DM(link["inertia"]), link["mass"]
         v = moved + ca.cross(rate, com)
         found.append(

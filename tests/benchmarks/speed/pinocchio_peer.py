@@ -96,15 +96,15 @@ def measure(package: Package, work: Path) -> Peer:
 
 def description(package: Package) -> str:
     """The robot as peers/pinocchio.cpp reads it."""
-    links = package.manifest["tree"]["bodies"]
-    lines = [" ".join(map(repr, [len(links), *package.manifest["tree"]["gravity"]]))]
-    for k, link in enumerate(links):
-        if link["coordinate"] != k or link["ratio"] != 1.0:
+    tree = package.manifest["tree"]
+    lines = [" ".join(map(repr, [len(tree["joints"]), *tree["gravity"]]))]
+    for k, (joint, link) in enumerate(zip(tree["joints"], tree["links"], strict=True)):
+        if joint["coordinate"] != k or joint["ratio"] != 1.0:
             raise ValueError(f"{package.name}: the peer knows only one joint of its own for each link")
-        numbers = [*np.ravel(link["rotation"]), *link["translation"], link["mass"], *link["com"]]
-        parent = -1 if link["parent"] is None else link["parent"]
+        numbers = [*np.ravel(joint["rotation"]), *joint["translation"], link["mass"], *link["com"]]
+        parent = -1 if joint["parent"] is None else joint["parent"]
         text = " ".join(repr(float(x)) for x in [*numbers, *np.ravel(link["inertia"])])
-        lines.append(f"{parent} {link['kind']} {text}")
+        lines.append(f"{parent} {joint['kind']} {text}")
     return "\n".join([*lines, ""])
 
 
@@ -113,11 +113,12 @@ def chain(package: Package, links: list[int], only: int | None) -> Any:
     import pinocchio as pin
 
     model, index = pin.Model(), {}
+    tree = package.manifest["tree"]
     for j in links:
-        link = package.manifest["tree"]["bodies"][j]
-        joint = pin.JointModelPZ() if link["kind"] == "prismatic" else pin.JointModelRZ()
-        place = pin.SE3(np.array(link["rotation"]), np.array(link["translation"]))
-        index[j] = model.addJoint(index.get(link["parent"], 0), joint, place, str(j))
+        joint, link = tree["joints"][j], tree["links"][j]
+        made = pin.JointModelPZ() if joint["kind"] == "prismatic" else pin.JointModelRZ()
+        place = pin.SE3(np.array(joint["rotation"]), np.array(joint["translation"]))
+        index[j] = model.addJoint(index.get(joint["parent"], 0), made, place, str(j))
         if only in (None, j):
             body = pin.Inertia(link["mass"], np.array(link["com"]), np.array(link["inertia"]))
             model.appendBodyToJoint(index[j], body, pin.SE3.Identity())

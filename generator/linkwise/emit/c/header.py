@@ -83,8 +83,7 @@ def joint_lines(system: System) -> Iterator[str]:
 
 def tie_lines(system: System) -> list[str]:
     """Return a table: what ties joints, by name, and what each holds; empty for an open tree."""
-    found = constraints_of(system.robot) if isinstance(system, RigidSystem) else ()
-    rows = [[c_comment(word) for word in row] for row in found]
+    rows = [[c_comment(word) for word in row] for row in constraints_of(system)]
     return list(align_columns(rows)) if rows else []
 
 

@@ -131,7 +131,9 @@ def rows_from_s(inputs: Sequence[str]) -> str:
 
 def free(system: System) -> bool:
     """Return whether each joint may have an impedance of its own: nothing ties one to others."""
-    return not (isinstance(system, RigidSystem) and (system.robot.ties or system.robot.couplings))
+    if isinstance(system, EnergySystem):
+        return not system.constraints
+    return not (system.robot.ties or system.robot.couplings)
 
 
 def totals(size: EntryCounts) -> list[tuple[str, int]]:
