@@ -15,6 +15,7 @@ from ..rule.calls import RigidRule
 from ..structure import Structure
 from .autograd_backend import AutogradBackend
 from .partial_lagrangian import PartialLagrangian, RigidLagrangian
+from .replaced_link import replaced
 
 MADE_ANEW = ("structure", "backend", "layout", "_load", "_asked", "door", "kinematics", "constraints")
 """Attributes that a copy does not take over: it has its own."""
@@ -42,6 +43,18 @@ class LinkModules(torch.nn.Module):
             link += len(self.names)
         link = position_of(link, self.names, "link", "the link")
         return cast(PartialLagrangian, self._modules[self._keys[link]])
+
+    def __setitem__(self, link: int | str, module: torch.nn.Module) -> None:
+        """Have a module's energies count for a link; its torques and shares follow.
+
+        The module has kinetic(q, qd, p) and potential(q, p), tensors of the shape of q[k] in J, of the
+        coordinates of the link's path alone; kinetic energy is of degree two in the velocities. Other links
+        are moved by the package's own numbers. Raises ValueError for a link that is not there, TypeError for
+        another module.
+        """
+        own = self[link]
+        at = next(j for j in range(len(self)) if self[j] is own)
+        self.add_module(self._keys[at], replaced(own, module))
 
     def __len__(self) -> int:
         return len(self.names)
