@@ -9,7 +9,17 @@ from linkwise.cli import GeneratedPackage, Json, LinkName, tell
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text
 from linkwise.extras import extra
-from linkwise.graphs import FOLDS, FORMATS, Overlay, graph_files, graph_json, graph_summary, overlay
+from linkwise.graphs import (
+    FOLDS,
+    FORMATS,
+    Overlay,
+    graph_files,
+    graph_json,
+    graph_summary,
+    overlay,
+    recorded_files,
+    recorded_summary,
+)
 from linkwise.output import write_files
 from linkwise.package.load import open_package, refuse_exit
 from linkwise.package.write import require_free
@@ -34,13 +44,19 @@ def graph(
     fold: Annotated[
         str, typer.Option(help="What a picture draws as one node: none, line, link, or auto")
     ] = "auto",
+    recorded: Annotated[
+        bool, typer.Option("--recorded", help="Files of torch's own graph of the torque too, node by node")
+    ] = False,
     formats: Annotated[
         list[str] | None, typer.Option("--format", help="svg, png, dot, graphml or json; may be repeated")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Directory that gets the files")] = None,
     as_json: Json = False,
 ) -> None:
-    """Show what autograd computes for a partial torque, or a part of it; equal operations are one."""
+    """Show what autograd computes for a partial torque, or a part of it; equal operations are one.
+
+    With --recorded also torch's own graph of the torque, each of its nodes as torch recorded it.
+    """
     _check("--order", order, ("all", "0", "1", "2"))
     _check("--fold", fold, ("auto", *FOLDS))
     wanted = formats or ["svg", "graphml", "json"]
@@ -52,15 +68,19 @@ def graph(
     i = position(joint, robot.joint_names, "--joint")
     j = None if link == "all" else position(link, robot.link_names, "--link")
     k = None if coordinate == "all" else position(coordinate, robot.joint_names, "--coordinate")
+    whole = robot.graph(i, j)
+    torchs = whole.recorded(*_motion(robot))
     found = overlay(robot, i, j, _parts(robot, i, j, k, None if order == "all" else int(order)))
     if out is not None:
         with progress() as advance:
             files = graph_files(found, wanted, None if fold == "auto" else fold, advance)
+            if recorded:
+                files |= recorded_files(found, torchs, wanted, advance)
         write_files(out, files)
     if as_json:
         print(json_text(graph_json(found), indent=1))
         return
-    tell(*graph_summary(found, robot.graph(i, j), _elsewhere(robot, found)))
+    tell(*graph_summary(found, whole, _elsewhere(robot, found)), recorded_summary(found, torchs))
 
 
 def _check(option: str, given: str, choices: tuple[str, ...]) -> None:
@@ -78,6 +98,13 @@ def _robot(directory: Path) -> Any:
         )
     with refuse_exit():
         return package.module.load("autograd")
+
+
+def _motion(robot: Any) -> list[Any]:
+    """Return any motion at which a torque is a number: what torch records does not depend on it."""
+    torch, n = extra("torch"), len(robot.joint_names)
+    draw = torch.Generator().manual_seed(0)
+    return [*(0.1 + 0.8 * torch.rand(3, n, generator=draw, dtype=torch.float64))]
 
 
 def _parts(robot: Any, i: int, j: int | None, k: int | None, m: int | None) -> list[Any]:

@@ -6,8 +6,8 @@ A generated package records them (`Dynamics.graph`); here `overlay` joins the gr
 
 from linkwise.graphs.dot_text import dot_text
 from linkwise.graphs.folding import FOLDS, folded
-from linkwise.graphs.graph_files import FORMATS, graph_files, graph_json
-from linkwise.graphs.overlay import Overlay, graph_summary, overlay, part_label
+from linkwise.graphs.graph_files import FORMATS, graph_files, graph_json, recorded_files
+from linkwise.graphs.overlay import Overlay, graph_summary, overlay, part_label, recorded_summary
 
 __all__ = [
     "FOLDS",
@@ -20,4 +20,6 @@ __all__ = [
     "graph_summary",
     "overlay",
     "part_label",
+    "recorded_files",
+    "recorded_summary",
 ]

@@ -11,6 +11,7 @@ from linkwise.extras import extra
 from linkwise.graphs.dot_text import dot_text
 from linkwise.graphs.folding import folded
 from linkwise.graphs.overlay import KINDS, Overlay
+from linkwise.graphs.recorded_dot import recorded_dot, recorded_json
 from linkwise.progress import Progress, silent
 
 FORMATS = ("svg", "png", "dot", "graphml", "json")
@@ -46,6 +47,28 @@ def graph_files(
             case _:
                 raise LinkwiseError(f"--format {kind!r} is not there; choose among {', '.join(FORMATS)}")
         texts[f"{file_name(graph)}.{kind}"] = content
+    return texts
+
+
+def recorded_files(
+    graph: Overlay, recorded: Any, formats: Iterable[str], progress: Progress = silent
+) -> dict[str, bytes]:
+    """Return files of torch's own graph of a torque, by name; GraphML is left to the other graph."""
+    texts: dict[str, bytes] = {}
+    stage = f"draw {len(recorded):,} recorded nodes"
+    whole = "_".join(["tau", str(graph.joint + 1), *([] if graph.link is None else [str(graph.link + 1)])])
+    for kind in formats:
+        if kind in ("svg", "png"):
+            progress(stage, 0, 1)
+            content = _drawn(recorded_dot(recorded), kind)
+            progress(stage, 1, 1)
+        elif kind == "dot":
+            content = recorded_dot(recorded).encode()
+        elif kind == "json":
+            content = f"{json_text(recorded_json(recorded), indent=1)}\n".encode()
+        else:
+            continue
+        texts[f"{whole}_recorded.{kind}"] = content
     return texts
 
 

@@ -90,6 +90,15 @@ def part_label(graph: Overlay, part: int) -> str:
     return f"c{order}_{graph.joint + 1},{through}{k + 1} {DOTS[order]}_{k + 1}"
 
 
+def recorded_summary(graph: Overlay, recorded: Any) -> str:
+    """Return a line on torch's own graph of the torque."""
+    names = ", ".join(f"{count} {name}" for name, count in [*recorded.counts().items()][:3])
+    return (
+        f"torch itself recorded {len(recorded)} nodes for {graph.torque}, as partial_torque answers it: "
+        f"{names} and others"
+    )
+
+
 def graph_summary(graph: Overlay, whole: Any, elsewhere: Mapping[str, int]) -> Iterator[str]:
     """Yield lines of plain text.
 

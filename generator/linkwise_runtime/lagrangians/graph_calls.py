@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import product
-from typing import NoReturn, Protocol, cast
+from typing import Any, NoReturn, Protocol, cast
 
 import torch
 from torch import Tensor
@@ -17,6 +17,7 @@ from ..interface import Numbers
 from ..structure import Structure
 from .energy_interface import Energies, Nested, Number, Parameters
 from .operation_recorder import Leaf, Operation, Ref, mapped
+from .recorded_graph import RecordedGraph, recorded_graph
 from .recorded_torques import LinkEnergies, Part, RecordedParts, WrittenEnergies, record
 from .written_sweeps import WrittenTerms
 
@@ -134,6 +135,32 @@ class TorqueGraph:
             result = torch.func.vmap(self.module)(*wide).reshape(like.shape)
         torque: Tensor = result.to(like.dtype).expand(like.shape)
         return torque
+
+    def recorded(self, q: Tensor, qd: Tensor, qdd: Tensor) -> RecordedGraph:
+        """Return torch's own graph behind this torque as `partial_torque` has it at a motion (..., n).
+
+        It has every node that torch recorded, where this graph has equal operations once and no constants,
+        vectors and views: a walk along `grad_fn` meets as many. Leaves are q, qd, qdd, and what is learned.
+        Raises ValueError for a part of a torque, which no call of torch answers.
+        """
+        if self.coordinate is not None or self.order is not None:
+            raise ValueError(
+                "torch records calls, and none answers a part of a torque alone; ask graph(i, j) for recorded"
+            )
+        backend: Any = self.backend
+        structure = backend.structure
+        given = {"q": q, "qd": qd, "qdd": qdd}
+        leaves = {
+            name: torch.as_tensor(value).detach().clone().requires_grad_() for name, value in given.items()
+        }
+        read = cast("Sequence[Tensor]", backend.arrays(leaves, structure.n))
+        (tau,) = backend.answers.partial_torque(*read)
+        joint = structure.joint_names.index(self.joint)
+        through = [structure.link_names.index(link) for link in self.links]
+        value = tau[..., joint, through[0]] if len(through) == 1 else tau[..., joint, through].sum(-1)
+        learned = dict(cast(torch.nn.Module, backend.modules).named_parameters())
+        entry = f"partial_torque(q, qd, qdd) on {self.joint} through {', '.join(self.links)}"
+        return recorded_graph(entry, value, leaves | learned | dict(backend.parameters))
 
     @cached_property
     def module(self) -> torch.fx.GraphModule:
