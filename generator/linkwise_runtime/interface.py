@@ -7,7 +7,7 @@ With them, the library that numbers belong to, their precision, and how they lie
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -223,3 +223,14 @@ def kind_of(values: Numbers) -> np.dtype[np.floating]:
 def epsilon_of(values: Numbers) -> float:
     """Return the relative rounding of the dtype of an array or a tensor."""
     return float(np.finfo(kind_of(values)).eps)
+
+
+class Unscripted:
+    """Base of what torch.jit.script is given and cannot compile, as it knows a part of Python alone."""
+
+    def __prepare_scriptable__(self) -> NoReturn:
+        """Raise TypeError, which says what works instead; torch.jit.script calls this first."""
+        raise TypeError(
+            "torch.jit.script compiles a part of Python alone, which this is not written in; take "
+            "torch.compile or torch.export, or torch.jit.trace of the back end torch"
+        )

@@ -10,12 +10,12 @@ from typing import Any
 from .arrays.backend import ArrayBackend
 from .call_table import CALLS
 from .door import Door
-from .interface import Numbers
+from .interface import Numbers, Unscripted
 from .out_argument import accepted
 from .structure import JointLimits, Layout, Structure
 
 
-class RobotCalls:
+class RobotCalls(Unscripted):
     """A robot on one back end, whose calls are rows of `call_table.CALLS`."""
 
     name: str

@@ -410,6 +410,17 @@ def test_a_call_of_native_is_one_graph_beside_its_callers(
     assert relative_error(*(torch.autograd.grad(each, q)[0] for each in taken)) <= 1e-13
 
 
+@pytest.mark.filterwarnings("ignore:`torch.jit.script:DeprecationWarning")
+@pytest.mark.parametrize("backend", ["torch", "autograd", "numpy"])
+def test_torch_jit_script_is_refused_by_its_name(planar2: ModuleType, backend: str) -> None:
+    robot = planar2.load(backend)
+    for one in (robot, *((robot.module("partial_torque"), robot.links[0]) if backend == "autograd" else ())):
+        with pytest.raises(
+            TypeError, match=r"^torch.jit.script compiles a part of Python .* take torch.compile"
+        ):
+            torch.jit.script(one)
+
+
 @pytest.mark.filterwarnings("ignore:`torch.jit.trace:DeprecationWarning")
 @pytest.mark.filterwarnings("ignore::torch.jit.TracerWarning")
 def test_traced_by_torch_jit_a_call_is_right_or_refused(planar2: ModuleType) -> None:

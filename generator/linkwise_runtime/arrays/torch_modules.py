@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from ..chosen_names import short
-from ..interface import Numbers
+from ..interface import Numbers, Unscripted
 from ..rule.joint_tree import Bodies
 from .backend import ArrayBackend
 
@@ -92,7 +92,7 @@ class BodyTensors(torch.nn.Module):
         return (getattr(self, name) for name in self._names)
 
 
-class CallModule(torch.nn.Module):
+class CallModule(Unscripted, torch.nn.Module):
     """Module that answers as one call of a robot does, with a dict by name where that has several results.
 
     forward accepts the arguments of the call, under the same names, but for those that are `fixed`, and out.

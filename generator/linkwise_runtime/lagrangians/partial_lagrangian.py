@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from ..arrays.torch_modules import RunTimeValues, hold
+from ..interface import Unscripted
 from ..quantities import Coefficients
 from ..structure import Structure
 from .autograd_backend import AutogradBackend
@@ -25,7 +26,7 @@ CROSS = (
 """Tensor with c·CROSS the entries of the matrix [c]×, row by row, where [c]× a = c × a."""
 
 
-class PartialLagrangian(torch.nn.Module):
+class PartialLagrangian(Unscripted, torch.nn.Module):
     """Lagrangian of one link as a module; a subclass implements `kinetic` and `potential`.
 
     A call link(q, qd) runs torch's hooks; `torque`, `coefficients` and the calls of the whole robot
