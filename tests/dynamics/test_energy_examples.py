@@ -1,5 +1,6 @@
 """Textbook systems of examples/energies, against the equations of the textbooks, and Lagrangians by hand."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -182,3 +183,19 @@ def test_torques_are_those_of_the_textbook(name: str, tmp_path: Path) -> None:
         start, 0.0 * start, np.linspace(0, 0.5, 51), method="DOP853", rtol=1e-12, atol=1e-13
     )
     assert np.abs(motion.energy_drift).max() <= 1e-9
+
+
+def test_the_teachers_notebook_runs_from_top_to_bottom(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pyplot, drawn = pytest.importorskip("matplotlib.pyplot"), []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(pyplot, "show", lambda: drawn.append(pyplot.get_fignums()))
+    notebook = json.loads((FOLDER.parent / "teaching.ipynb").read_text())
+    names: dict[str, Any] = {}
+    for cell in notebook["cells"]:
+        if cell["cell_type"] == "code":
+            exec(compile("".join(cell["source"]), "teaching.ipynb", "exec"), names)
+    pyplot.close("all")
+    assert len(drawn) == 2
+    assert set(names["causes"]) >= {"trolley accelerates", "load swings (its speed)", "rail", "motor"}
