@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from linkwise.symbolic.moving_bodies import Particle, RigidBody
     from linkwise.symbolic.sympy_system import from_sympy
     from linkwise.symbolic.system import LinkEnergy, System
+    from linkwise.symbolic.tables import interpolated
     from linkwise.symbolic.user_energies import energy_system
 
 __all__ = [
@@ -66,6 +67,7 @@ __all__ = [
     "from_sympy",
     "generate",
     "identify",
+    "interpolated",
     "kept_package",
     "read_robot",
     "read_system",
@@ -101,6 +103,7 @@ _ROOM_OF = {
     "from_sympy": "symbolic.sympy_system",
     "generate": "pipeline",
     "identify": "identification",
+    "interpolated": "symbolic.tables",
     "kept_package": "package_cache",
     "read_robot": "robot",
     "read_system": "pipeline",

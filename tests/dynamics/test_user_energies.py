@@ -16,8 +16,10 @@ from linkwise import (
     Coordinate,
     LinkEnergy,
     LinkwiseError,
+    check_package,
     energy_system,
     generate,
+    interpolated,
     read_robot,
     read_system,
     write_package,
@@ -33,6 +35,7 @@ from linkwise.report import TermQuery, terms_markdown, terms_report
 from linkwise.symbolic.chain_rule import lagrangian as lagrangian_of
 from linkwise.symbolic.system import EnergySystem
 from matplotlib.text import Text
+from scipy.interpolate import make_interp_spline
 
 CART, TURNTABLE = str(DATA / "cart_pendulum.py"), str(DATA / "turntable.py")
 BACKENDS = ("numpy", "torch", "autograd", *(pytest.param(b, marks=needs_compiler) for b in ("c", "native")))
@@ -460,3 +463,33 @@ def test_what_energies_give_at_rest_is_called_gravity_only_where_it_is(
 
 def _texts(figure: Any) -> list[str]:
     return [text.get_text() for text in figure.findobj(Text)]
+
+
+def test_a_table_is_the_spline_through_it_and_goes_on_beyond(tmp_path: Path) -> None:
+    places, values = np.array([-1.0, -0.2, 0.5, 1.1, 2.0]), np.array([0.3, -0.1, 0.4, 1.0, 0.2])
+    for degree in (1, 3):
+        spring = interpolated(X.q, places, values, degree)
+        system = energy_system("table", [X], [LinkEnergy("a", X.qd**2 / 2, {"spring": spring})])
+        write_package(generate(system, ["numpy"]), tmp_path / f"table{degree}")
+        robot = import_package(tmp_path / f"table{degree}").load("numpy")
+        q = np.linspace(-1.4, 2.4, 39)[:, None] + 0.013
+        expected = make_interp_spline(places, values, degree)
+        np.testing.assert_allclose(robot.energy(q, 0 * q).potential[:, 0], expected(q)[:, 0], atol=1e-13)
+        slopes = expected.derivative()(q)
+        np.testing.assert_allclose(robot.inverse_dynamics(q, 0 * q, 0 * q), slopes, atol=1e-12)
+        assert not [result for result in check_package(tmp_path / f"table{degree}") if result.failed]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (([0, 1, 2, 3], [0, 1, 2]), "as many finite values as places"),
+        (([0, 1, 1, 3], [0, 1, 2, 3]), "do not ascend"),
+        (([0, 1, 2], [0, 1, 2]), "a table of degree 3 needs 4 places, and has 3"),
+        (([0, 1, 2, 3], [0, 1, 2, "a"]), "a table needs numbers"),
+        (([0, 1, 2, 3], [0, 1, 2, 3], 0), "the degree of a table is 0"),
+    ],
+)
+def test_what_is_no_table_is_told(given: tuple[Any, ...], message: str) -> None:
+    with pytest.raises(LinkwiseError, match=message):
+        interpolated(X.q, *given)

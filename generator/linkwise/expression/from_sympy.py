@@ -111,7 +111,8 @@ class Lowering:
         """Return the first expression whose condition is true; raises LinkwiseError where none may be."""
         if not pieces:
             raise LinkwiseError(
-                "a Piecewise has no value where none of its conditions is true; end it by (..., True)"
+                "a Piecewise has no value where none of its conditions is true; end it by (..., True), or "
+                "take linkwise.interpolated for a table"
             )
         (value, condition), *others = pieces
         return self._chosen(condition, lambda: self(value), lambda: self._pieces(others))
