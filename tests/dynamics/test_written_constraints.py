@@ -300,7 +300,73 @@ def test_a_wrong_row_fails(tmp_path: Path) -> None:
     assert "numpy: velocities in closed loops against least squares" in failed
 
 
-X, Y = Coordinate("x", "m"), Coordinate("y", "m")
+X, Y, YAW = Coordinate("x", "m"), Coordinate("y", "m"), Coordinate("yaw")
+BEAD = LinkEnergy("bead", (X.qd**2 + Y.qd**2) / 2, 9.81 * Y.q)
+
+
+def skate() -> Any:
+    energy = LinkEnergy("skate", X.qd**2 + Y.qd**2 + YAW.qd**2 / 10, 3 * Y.q**2)
+    blade = {"blade": Y.qd * sp.cos(YAW.q) - X.qd * sp.sin(YAW.q)}
+    return energy_system("skate", [X, Y, YAW], [energy], constraints=blade, independent=["x", "yaw"])
+
+
+def test_gradients_run_through_positions_that_constraints_of_velocities_leave(tmp_path: Path) -> None:
+    robot = loaded(skate(), tmp_path, "torch")
+
+    def end(start: Any) -> Any:
+        return robot.simulate(start[:3], robot.constraints.velocity(start[:3], start[3:]), [0, 0.1, 0.2]).q[
+            -1
+        ]
+
+    start = torch.tensor([0.1, 0.2, 0.3, 0.8, 0.5], dtype=torch.float64)
+    closed = torch.autograd.functional.jacobian(robot.constraints.closed, start[:3])
+    torch.testing.assert_close(closed, torch.eye(3, dtype=torch.float64))
+    assert torch.autograd.gradcheck(end, [start.requires_grad_()])
+
+
+@pytest.mark.parametrize("method", ["RK4", "DOP853", "LSODA"])
+def test_a_motion_stops_where_the_independent_coordinates_do_not_tell_the_others(
+    method: str, tmp_path: Path
+) -> None:
+    robot = loaded(skate(), tmp_path)
+    with pytest.raises(ValueError, match=r"at t = .* s x, yaw go no further: .*y can move"):
+        robot.simulate([0, 0, 0], [1, 0, 0.5], np.linspace(0, 12, 241), method=method)
+    with pytest.raises(ValueError, match=r"choose robot.constrained\(independent=\['y', 'yaw'\]\)"):
+        robot.constraints.velocity([0, 0, np.pi / 2], [1.0, 1.0])
+
+
+HELD: dict[str, Any] = {
+    "far away": {"a": X.q - 1000},
+    "a wide circle": {"a": X.q**2 + Y.q**2 - 50**2},
+    "a far circle": {"a": (X.q - 100) ** 2 + (Y.q - 100) ** 2 - 1},
+    "twice": {"a": X.q - Y.q**2, "b": 2 * (X.q - Y.q**2)},
+    "with its rate": {"a": X.q - Y.q**2, "b": X.qd - 2 * Y.q * Y.qd},
+    "of other sizes": {"a": 1e-6 * (X.q - Y.q**2), "b": 1e6 * (YAW.q - sp.sin(Y.q))},
+    "a linear one, written otherwise": {"a": (X.qd + 1) * X.q - X.qd * X.q - Y.q},
+    "a hidden zero": {"a": X.qd * Y.q - Y.qd + sp.sin(X.q) ** 2 + sp.cos(X.q) ** 2 - 1},
+    "not at zero": {"a": X.qd / Y.q - Y.qd},
+    'names """ of \\ all "kinds" it\'s': {'a"""b\\': X.q - Y.q, "c'd\"e": YAW.q - X.q},
+}
+
+
+@pytest.mark.parametrize("case", HELD)
+def test_what_holds_is_taken_and_proved(case: str, tmp_path: Path) -> None:
+    energy = LinkEnergy("bead", (X.qd**2 + Y.qd**2 + YAW.qd**2) / 2, 9.81 * Y.q)
+    system = energy_system("held", [X, Y, YAW], [energy], constraints=HELD[case])
+    write_package(generate(system, ["numpy"]), tmp_path / "held")
+    tied = import_package(tmp_path / "held").load().constraints
+    assert np.isfinite(tied.closed_position).all()
+    assert not [result for result in check_package(tmp_path / "held") if result.failed]
+    assert bool(tied.redundant) == (case in ("twice", "with its rate"))
+
+
+def test_a_small_row_is_kept_as_well_as_a_large_one(tmp_path: Path) -> None:
+    tiny = energy_system("tiny", [X, Y], [BEAD], constraints={"a": 1e-6 * (Y.q - X.q**2)})
+    robot = loaded(tiny, tmp_path)
+    with pytest.raises(ValueError, match=r"a is open by 0\.25 of its sum"):
+        robot.constraints.velocity([0.5, 0.5], [1.0])
+
+
 U = sp.Symbol("u")
 BAD: dict[str, tuple[dict[str, Any], str]] = {
     "no dictionary": ({"constraints": [X.q]}, "`constraints` is .*; give a dictionary of expressions"),
@@ -313,6 +379,11 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
         "'a': it has velocities, and is not linear",
     ),
     "not alone": ({"constraints": {"a": X.qd - Y.q}}, "constraint 'a': .* has terms without velocities"),
+    "never, and small": ({"constraints": {"a": 1e-6 * (X.q**2 + Y.q**2 + 1)}}, "constraint 'a' never closes"),
+    "nothing but rounding": (
+        {"constraints": {"a": X.qd * (sp.sin(X.q) ** 2 + sp.cos(X.q) ** 2 - 1)}},
+        "constraint 'a': no motion changes it",
+    ),
     "never": ({"constraints": {"a": X.q**2 + Y.q**2 + 1}}, "constraint 'a' never closes"),
     "stands still": (
         {"constraints": {"a": X.q - Y.q, "b": X.q + Y.q - 1}},
@@ -367,7 +438,11 @@ def test_a_file_may_define_constraints(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("zero", "message"),
-    [("y.q + z", "the symbol z is neither"), ("y.q**2 + 1", "never closes: .* correct its places")],
+    [
+        ("y.q + z", "the symbol z is neither"),
+        ("y.q**2 + 1", "never closes: .* correct its places"),
+        ("y.q, 'wire': x.q", "stands twice in one dictionary"),
+    ],
 )
 def test_a_constraint_of_a_file_is_named_by_its_line(zero: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "wire.py").write_text(
@@ -378,5 +453,5 @@ def test_a_constraint_of_a_file_is_named_by_its_line(zero: str, message: str, tm
         "coordinates, links = [x, y], [Particle('bead', 1, [x.q, y.q])]\n"
         f"constraints = {{'wire': {zero}}}\n"
     )
-    with pytest.raises(LinkwiseError, match=f"wire.py: line 6: constraint 'wire'.*{message}"):
+    with pytest.raises(LinkwiseError, match=f"wire.py: line 6: (constraint )?'wire'.*{message}"):
         read_system(tmp_path / "wire.py")

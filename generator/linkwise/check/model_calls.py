@@ -190,7 +190,7 @@ def _structure(checked: Named, manifest: Manifest) -> Iterator[Result]:
     off[tuple(rows.tau.T)] = False
     error = float(np.abs(tau[:, off]).max(initial=0.0))
     yield Result(f"{name}: tau_ij = 0 off the path", error == 0.0, error, f"largest value {error:.1e}")
-    mass = model.mass_matrix(q)
+    mass = np.asarray(model.coefficients(q, qd).acceleration).sum(2)  # of degree three it has velocities, too
     # Scaled to a diagonal of ones, so that a hand's inertia is not lost beside a body's.
     diagonal = np.einsum("sii->si", mass)
     size = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))

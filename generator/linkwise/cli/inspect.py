@@ -15,7 +15,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, listed, printable
 from linkwise.robot import Options, kept_apart, left_out
 from linkwise.robot.robot import Parameter
-from linkwise.symbolic.definition import joint_entries, joint_tree
+from linkwise.symbolic.definition import exact_text, joint_entries, joint_tree
 from linkwise.symbolic.system import EnergySystem, System
 
 LESS = "…"
@@ -108,7 +108,7 @@ def _written_constraints(system: System) -> dict[str, Any]:
             {
                 "name": one.name,
                 "kind": "positions" if one.holonomic else "velocities",
-                "expression": f"{one.expression} = 0",
+                "expression": f"{exact_text(one.expression)} = 0",
             }
             for one in system.constraints
         ],

@@ -13,7 +13,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.robot.notes import BESIDE, LEAST, Note
 from linkwise.robot.robot import Coupling, Robot
-from linkwise.symbolic.definition import joint_tree
+from linkwise.symbolic.definition import exact_text, joint_tree
 from linkwise.symbolic.system import EnergySystem, System
 
 
@@ -49,13 +49,16 @@ def _constrained_energies(system: EnergySystem) -> EnergySystem:
     slides = [(float(coordinate.unit == "m"),) for coordinate in system.coordinates]
     proposed = chosen_independent(loops.rows, (), slides)
     chosen = _independent(loops, names, proposed, system.requested_independent, "independent=")
-    return replace(system, independent=chosen, closed_position=loops.position(chosen))
+    notes = [Note("constraint", name, about, BESIDE) for name, about in constraints_of(system)]
+    notes += [Note("redundant", name, "", LEAST) for name in redundant_names(loops.rows, loops.owners)]
+    position = loops.position(chosen)
+    return replace(system, independent=chosen, closed_position=position, notes=(*system.notes, *notes))
 
 
 def constraints_of(system: System) -> Iterator[tuple[str, str]]:
     """Yield the name of each constraint of the joints, and what it holds, in words; none of an open tree."""
     if isinstance(system, EnergySystem):
-        yield from ((one.name, f"{one.expression} = 0") for one in system.constraints)
+        yield from ((one.name, f"{exact_text(one.expression)} = 0") for one in system.constraints)
         return
     robot = system.robot
     yield from ((tie.name, _about_tie(tie, robot)) for tie in robot.ties)

@@ -25,8 +25,6 @@ from linkwise.symbolic.system import EnergySystem
 FAR = 0.3
 """Positions whose least singular value of A_d is below this part of the best one's count as next to
 singular."""
-UNDEFINED = 1e100
-"""Stands for what is no number at a position."""
 FLAT = 1e-4
 """Slopes below this part of a coupling's factors count as zero: steps end where rows have all but lost
 rank."""
@@ -81,14 +79,13 @@ def closed_constraints(system: EnergySystem) -> ClosedLoops:
 
     def rows(q: Array) -> Array:
         with np.errstate(all="ignore"):
-            found: Array = np.asarray(made(q), float)
-        return np.nan_to_num(found, nan=UNDEFINED, posinf=UNDEFINED, neginf=-UNDEFINED)
+            return np.asarray(made(q), np.float64)
 
     n, names = len(coordinates), tuple(one.name for one in system.constraints)
-    slopes = [np.abs(rows(start)[:, 1:]).max(-1) for start in random_starts(n)]
+    slopes = np.array([np.abs(rows(start)[:, 1:]).max(-1) for start in random_starts(n)])
     sizes = {
-        one.name: float(np.median([size[at] for size in slopes]))
-        for at, one in enumerate(system.constraints)
+        one.name: float(np.median(own[np.isfinite(own)]) if np.isfinite(own).any() else 0.0)
+        for one, own in zip(system.constraints, slopes.T, strict=True)
         if one.holonomic
     }
     return _closed(WrittenEquations(rows), n, names, list(names), sizes)

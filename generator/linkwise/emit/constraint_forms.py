@@ -6,6 +6,7 @@ from linkwise_runtime.version import VERSION
 
 from linkwise.dynamics.constraint_rows import constraint_rows
 from linkwise.emit.closed_forms import form_function, functions_text
+from linkwise.escape import python_docstring
 from linkwise.render import render
 from linkwise.symbolic.system import EnergySystem
 
@@ -31,7 +32,7 @@ def constraint_files(system: EnergySystem) -> Iterator[tuple[str, str]]:
     names = [one.name for one in system.constraints]
     view = {
         "version": VERSION,
-        "names": [repr(name) for name in names],
+        "names": [python_docstring(name) for name in names],
         "functions": functions_text(functions),
     }
     yield "constraints.py", render("package/constraints.py.j2", view)

@@ -155,5 +155,5 @@ def following(rows: Array, own: Sequence[int]) -> Array:
     rest = [k for k in range(n) if k not in own]
     found = np.zeros((samples, n, len(own)))
     found[:, own] = np.eye(len(own))
-    found[:, rest] = -np.linalg.pinv(rows[..., rest]) @ rows[..., own]
+    found[:, rest] = -np.linalg.pinv(rows[..., rest], rcond=RANK**2) @ rows[..., own]
     return found

@@ -66,9 +66,9 @@ class TextConstraints:
         return self._mapped(rate, q, qd)
 
     def sizes(self, q: Array) -> Array:
-        """Return what rows are divided by (samples, C): their largest slope, where that is above 1."""
+        """Return what rows are divided by (samples, C): their largest slope."""
         most: Array = np.abs(self.rows(q)).max(-1)
-        return np.maximum(most, 1.0)
+        return np.where(most > 0.0, most, 1.0)
 
     def closed_near(self, q: Array) -> Array:
         """Return positions to which steps of least norm lead; starts that lead to none are left out."""
@@ -103,8 +103,14 @@ class TextConstraints:
         # A formula without a coordinate still has a gradient, of zeros.
         return self._values.value(formula, q, qd, self._values.now) + 0.0 * (q.sum() + qd.sum())
 
+    def _shape(self, function: Callable[..., Any]) -> tuple[int, ...]:
+        count, n = len(self._formulas), len(self.independent) + len(self.dependent)
+        return (count,) if function == self._phi else (count, n)
+
     def _mapped(self, function: Callable[..., Any], *motion: Array) -> Array:
         torch = extra("torch")
+        if not len(motion[0]):
+            return np.zeros((0, *self._shape(function)))
         found: Array = torch.func.vmap(function)(*(torch.from_numpy(a) for a in motion)).numpy()
         return found
 
@@ -152,7 +158,7 @@ def followed(ties: TextConstraints, q: Array, v: Array) -> tuple[Array, Array]:
     q, rest = q.copy(), ties.dependent
     for _ in range(STEPS):
         held, sizes = _scaled(ties, q)
-        step = (np.linalg.pinv(held[..., rest]) @ (ties.violation(q)[..., None] / sizes))[..., 0]
+        step = (np.linalg.pinv(held[..., rest], rcond=SMALL) @ (ties.violation(q)[..., None] / sizes))[..., 0]
         q[:, rest] -= step
         if np.abs(step).max() < SETTLED:
             break
@@ -163,7 +169,9 @@ def held_acceleration(ties: TextConstraints, q: Array, qd: Array, mass: Array, f
     """Return ydd (1, m) at q and qd, under a mass matrix (1, n, n) and forces tau - h (1, n)."""
     held, sizes = _scaled(ties, q)
     change = (ties.rates(q, qd) / sizes) @ qd[..., None]
-    moved: Array = _moved(mass, held, force[..., None], change)[0][:, list(ties.independent), 0]
+    moved: Array = _moved(mass, held, ties.dependent, force[..., None], change)[0][
+        :, list(ties.independent), 0
+    ]
     return moved
 
 
@@ -192,7 +200,7 @@ def _answers(
     held, sizes = _scaled(ties, q)
     mapped = following(held, own)
     inverse = np.zeros((len(q), q.shape[1], held.shape[1]))
-    inverse[:, rest] = np.linalg.pinv(held[..., rest])
+    inverse[:, rest] = np.linalg.pinv(held[..., rest], rcond=SMALL)
     qd = (mapped @ yd[..., None])[..., 0]
     rates = ties.rates(q, qd)
     bias = -(inverse @ (rates / sizes) @ qd[..., None])[..., 0]
@@ -209,7 +217,7 @@ def _answers(
         "constraints": np.zeros((*q.shape, q.shape[1])),
     }
     total = tau - rest_torque
-    moved, forces = _moved(mass, held, total[..., None], bias_rate=(rates / sizes) @ qd[..., None])
+    moved, forces = _moved(mass, held, rest, total[..., None], (rates / sizes) @ qd[..., None])
     found = {
         "violation": ties.violation(q),
         "jacobian": held * sizes,
@@ -224,7 +232,9 @@ def _answers(
         "c2^": np.einsum("sia,sijk,skb->sajb", mapped, c2, mapped),
         "c1^": np.einsum("sia,sijb->sajb", mapped, _times(c2, turning) + _times(c1, mapped)),
         "g^": np.einsum("sia,sij->saj", mapped, g),
-        "lambda of links": np.linalg.pinv(np.swapaxes(held[..., rest], -1, -2)) @ torque[:, rest] / sizes,
+        "lambda of links": np.linalg.pinv(np.swapaxes(held[..., rest], -1, -2), rcond=SMALL)
+        @ torque[:, rest]
+        / sizes,
         "qdd": moved[..., 0],
         "lambda": (forces / sizes)[..., 0],
     }
@@ -232,18 +242,22 @@ def _answers(
         flat = force.reshape(*force.shape[:2], -1)
         is_own = source == "constraints"
         own_rate = (rates / sizes) * qd[:, None, :] if is_own else 0.0 * (held @ flat)
-        induced, reactions = _moved(mass, held, flat, own_rate)
+        induced, reactions = _moved(mass, held, rest, flat, own_rate)
         found[f"{source}: accelerations"] = induced.reshape(force.shape)
         found[f"{source}: reactions"] = (reactions / sizes).reshape(len(q), -1, *force.shape[2:])
     return found
 
 
-def _moved(mass: Array, rows: Array, force: Array, bias_rate: Array) -> tuple[Array, Array]:
+def _moved(
+    mass: Array, rows: Array, rest: Sequence[int], force: Array, bias_rate: Array
+) -> tuple[Array, Array]:
     """Return accelerations (samples, n, X) and lambda (samples, C, X) of forces (samples, n, X).
 
     bias_rate: what the rows times accelerations come to, with the other sign, (samples, C, X)
     """
-    null = motions(mass, rows)
+    # Rows that follow from others take no freedom away: those of U^T A are as many as the rank.
+    basis = np.linalg.svd(rows[..., rest])[0][..., : len(rest)]
+    null = motions(mass, np.swapaxes(basis, -1, -2) @ rows)
     back = np.swapaxes(null, -1, -2)
     own = -np.linalg.pinv(rows, rcond=SMALL) @ bias_rate
     moved = null @ np.linalg.solve(back @ mass @ null, back @ (force - mass @ own)) + own

@@ -210,6 +210,11 @@ def _texts(system: System) -> Callable[[Scalar], str]:
     return text
 
 
+def exact_text(expression: sp.Expr) -> str:
+    """Return an expression as text, with numbers in their shortest exact form."""
+    return str(_Exact().doprint(expression))
+
+
 class _Exact(StrPrinter):  # type: ignore[misc]
     """Printer of numbers that Python reads back to the last bit, constants such as zeta(3) among them."""
 

@@ -3,7 +3,7 @@
 import ast
 import re
 import runpy
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from traceback import walk_tb
 from types import ModuleType
@@ -25,11 +25,12 @@ def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
     """
     try:
         scope: dict[str, Any] = runpy.run_path(str(path))
-    except LinkwiseError:
-        raise
+    except LinkwiseError as error:
+        raise LinkwiseError(with_line(str(error), path)) from error
     except (Exception, SystemExit) as error:  # the user's own code may raise anything
         raise LinkwiseError(f"running the file failed{_said(error, str(path))}") from error
     refuse_passed_over(path.read_bytes(), scope)
+    _refuse_doubles(path.read_bytes())
     if isinstance(scope.get("system"), EnergySystem):
         return _whole(scope, symbolic)
     links = scope.get("links")
@@ -56,17 +57,55 @@ def read_energies(path: Path, symbolic: bool = False) -> EnergySystem:
         raise LinkwiseError(with_line(str(error), path)) from error
 
 
+TEXT = r"""'(?:[^'\\\\]|\\\\.)*'|"(?:[^"\\\\]|\\\\.)*\""""
+NAMED = re.compile(rf"(link|constraints?|the constraints|`independent`)(?: names)? ({TEXT})?")
+
+
 def with_line(told: str, path: Path) -> str:
     """Return an error behind the last line with the link or constraint that it names, if the file has one."""
-    found = re.match(r"(link|constraint) ('[^']*'|\"[^\"]*\")", told)
+    found = NAMED.match(told)
     if found is None:
         return told
-    name, nodes = ast.literal_eval(found[2]), [*ast.walk(ast.parse(path.read_bytes()))]
-    calls = [node.lineno for node in nodes if isinstance(node, ast.Call) and _is_named(node, name)]
-    given = (key for node in nodes if isinstance(node, ast.Dict) for key in node.keys)
-    keys = [key.lineno for key in given if key is not None and _is(key, name)]
-    line = max(calls if found[1] == "link" else keys, default=None)
-    return told if line is None else f"line {line}: {told}"
+    nodes = [*ast.walk(ast.parse(path.read_bytes()))]
+    if found[1] == "`independent`" or found[2] is None:
+        wanted = "independent" if found[1] == "`independent`" else "constraints"
+        lines = [line for node in nodes for line in _assigned(node, wanted)]
+    else:
+        name = ast.literal_eval(found[2])
+        lines = [line for node in nodes for line in _with_name(node, name, found[1] == "link")]
+    return f"line {max(lines)}: {told}" if lines else told
+
+
+def _assigned(node: ast.AST, name: str) -> Iterator[int]:
+    targets = node.targets if isinstance(node, ast.Assign) else ()
+    yield from (at.lineno for at in targets if isinstance(at, ast.Name) and at.id == name)
+
+
+def _with_name(node: ast.AST, name: str, is_link: bool) -> Iterator[int]:
+    """Yield the line of a call that makes a link of this name, or where a constraint of it is given."""
+    if isinstance(node, ast.Call):
+        if is_link and _is_named(node, name):
+            yield node.lineno
+        yield from (keyword.value.lineno for keyword in node.keywords if not is_link and keyword.arg == name)
+    elif isinstance(node, ast.Dict) and not is_link:
+        yield from (key.lineno for key in node.keys if key is not None and _is(key, name))
+    elif isinstance(node, ast.Subscript) and not is_link and _is(node.slice, name):
+        yield node.lineno
+
+
+def _refuse_doubles(source: bytes) -> None:
+    """Raise LinkwiseError for a dictionary with a text twice: Python drops the first in silence."""
+    for node in ast.walk(ast.parse(source)):
+        keys = (
+            [key for key in node.keys if isinstance(key, ast.Constant)] if isinstance(node, ast.Dict) else []
+        )
+        values = [key.value for key in keys]
+        for at, key in enumerate(keys):
+            if key.value in values[:at]:
+                raise LinkwiseError(
+                    f"line {key.lineno}: {key.value!r} stands twice in one dictionary, and the first would "
+                    "count for nothing; name one otherwise"
+                )
 
 
 def _is_named(call: ast.Call, name: str) -> bool:

@@ -1,5 +1,6 @@
 """Constraints as a user writes them in SymPy, checked: phi(q) = 0, or a sum A(q) qd = 0 of velocities."""
 
+import random
 from collections.abc import Callable, Mapping
 
 import sympy as sp
@@ -9,8 +10,11 @@ from linkwise.escape import short
 from linkwise.symbolic.energy_terms import expression_of
 from linkwise.symbolic.jumps import jump
 from linkwise.symbolic.system import WrittenConstraint
-from linkwise.symbolic.velocity_degree import degree_in
 from linkwise.symbolic.written_motion import WrittenMotion
+
+PLACES = 4
+DIGITS = 50
+"""Places and digits by which an expression is found to be zero."""
 
 
 def written_constraints(
@@ -56,14 +60,33 @@ def _checked(
         raise LinkwiseError("it depends on no coordinate: it holds always or never; leave it out")
     if (where := jump(zero.xreplace(dict(numbers)))) is not None:
         raise LinkwiseError(f"it jumps where {short(str(where))} passes zero; join the pieces")
-    degree = degree_in(zero, motion.velocities)
-    if degree == 0:
-        return WrittenConstraint(name, zero, holonomic=True)
-    rest = zero.xreplace(dict.fromkeys(motion.velocities, sp.S.Zero))
-    if degree != 1 or sp.expand(rest) != 0:
-        beside = "has terms without velocities beside those with" if degree == 1 else "is not linear in them"
-        raise LinkwiseError(
-            f"it has velocities, and {beside}; what is modelled is a sum of velocities, each times a "
-            "function of the coordinates, or an expression of coordinates alone"
-        )
-    return WrittenConstraint(name, zero, holonomic=False)
+    velocities = motion.velocities
+    rest = zero.xreplace(dict.fromkeys(velocities, sp.S.Zero))
+    if not zero.has(*velocities) or all(_vanishes(sp.diff(zero, v)) for v in velocities):
+        found = WrittenConstraint(name, rest, holonomic=True)
+    else:
+        bends = (sp.diff(zero, v, w) for v in velocities for w in velocities)
+        linear = all(_vanishes(bend) for bend in bends)
+        if not linear or not _vanishes(rest):
+            beside = "has terms without velocities beside those with" if linear else "is not linear in them"
+            raise LinkwiseError(
+                f"it has velocities, and {beside}; what is modelled is a sum of velocities, each times a "
+                "function of the coordinates, or an expression of coordinates alone"
+            )
+        found = WrittenConstraint(name, zero if rest == 0 else sp.expand(zero - rest), holonomic=False)
+    if all(_vanishes(entry) for entry in found.row(motion.coordinates)):
+        raise LinkwiseError("no motion changes it: it holds always or never; leave it out")
+    return found
+
+
+def _vanishes(expression: sp.Expr) -> bool:
+    """Return whether an expression is zero, as sin² + cos² - 1 is: at some places, to thirty digits."""
+    if expression == 0:
+        return True
+    symbols, draw = sorted(expression.free_symbols, key=str), random.Random(0)
+    for _ in range(PLACES):
+        at = {symbol: sp.Float(draw.uniform(0.3, 1.7), DIGITS) for symbol in symbols}
+        value = expression.subs(at).evalf(DIGITS)
+        if not value.is_number or value.is_comparable is False or abs(value) > sp.Float(10) ** -(DIGITS // 2):
+            return False
+    return True

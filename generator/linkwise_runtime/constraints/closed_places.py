@@ -60,6 +60,8 @@ class TiesAt(NamedTuple):
     """Factors Q and R of A_d."""
     inverse: Numbers | None = None
     """A_d^+; None before A_d is known to have full rank."""
+    unit_rows: bool = False
+    """See `ConstraintRows`."""
 
     @property
     def closable(self) -> Numbers:
@@ -78,6 +80,8 @@ class ClosedPlace(NamedTuple):
     """A, with its rows divided by their sizes, (..., C, n)."""
     triangle: Numbers
     """Factor R of A_d, from these rows."""
+    unit_rows: bool
+    """See `ConstraintRows`."""
 
     def velocity(self, yd: Numbers) -> Numbers:
         """Return the velocities G yd of all joints, (..., n)."""
@@ -111,10 +115,11 @@ def ties_at(
     positions = made.positions()
     sizes = None
     if ties.couplings:
-        sizes = row_sizes(positions[..., 1:], ties.couplings)
+        sizes = row_sizes(positions[..., 1:], ties.couplings, ties.unit_rows)
         positions = positions / sizes[..., None]
     rows = positions[..., 1:]
-    return TiesAt(q, made, sizes, positions[..., 0], rows, factor_dependent(rows, columns))
+    factors = factor_dependent(rows, columns)
+    return TiesAt(q, made, sizes, positions[..., 0], rows, factors, unit_rows=ties.unit_rows)
 
 
 def checked_place(at: TiesAt, columns: JointColumns, names: RowNames) -> ClosedPlace:
@@ -124,7 +129,8 @@ def checked_place(at: TiesAt, columns: JointColumns, names: RowNames) -> ClosedP
     check_following(at.rows, columns, mapped, names.owners, names.joints)
     if at.sizes is not None:  # rates and forces are those of rows that are not scaled
         inverse = inverse / at.sizes[..., None, :]
-    return ClosedPlace(at.q, DependentMap(columns, inverse, mapped), at.made, at.rows, at.factors[1])
+    found = DependentMap(columns, inverse, mapped)
+    return ClosedPlace(at.q, found, at.made, at.rows, at.factors[1], at.unit_rows)
 
 
 def closed_place(
@@ -133,7 +139,7 @@ def closed_place(
     """Return how joints follow at q (..., n); raises ValueError where ties are open or joints do not."""
     at = ties_at(ties, columns, q)
     check_closed(at.violation, tolerance, names.rows, names.owners)
-    check_factors(at.rows, at.factors[1], columns, names.joints)
+    check_factors(at.rows, at.factors[1], columns, names.joints, at.unit_rows)
     if tolerance is None:  # stricter for what joints could close than for what nothing can
         check_closed(at.closable, closable_tolerance(q), names.rows, names.owners)
     return checked_place(at, columns, names)

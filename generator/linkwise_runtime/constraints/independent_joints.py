@@ -50,18 +50,18 @@ def joint_columns(independent: tuple[int, ...], n: int) -> JointColumns:
     return JointColumns(np.array(independent, dtype=np.intp), np.array(dependent, dtype=np.intp), order)
 
 
-def row_sizes(rows: Numbers, couplings: int) -> Numbers:
+def row_sizes(rows: Numbers, couplings: int, unit_rows: bool = False) -> Numbers:
     """Return the sizes (..., C) that rows of A (..., C, n) are divided by; couplings have the last rows.
 
-    The size of a coupling is its largest slope where that is above 1: its unit is the file's choice, and
-    divided by this size, its violation counts in rad and m of its joints. Other rows have size 1. No gradient
-    flows through the sizes.
+    The size of a coupling is its largest slope where that is above 1, and for `unit_rows` in any case: its
+    unit is its author's choice, and divided by this size, its violation counts in rad and m of its joints.
+    Other rows have size 1. No gradient flows through the sizes.
     """
     own: Numbers = rows if isinstance(rows, np.ndarray) else cast("Tensor", rows).detach()
     xp, first = namespace(rows), rows.shape[-2] - couplings
     slopes = xp.amax(abs(own[..., first:, :]), -1)
     ones = xp.ones_like(own[..., 0])
-    most = xp.where(slopes > 1.0, slopes, ones[..., first:])
+    most = xp.where(slopes > (0.0 if unit_rows else 1.0), slopes, ones[..., first:])
     return xp.concat([ones[..., :first], most], -1)
 
 
@@ -152,28 +152,37 @@ def _floating(tree: JointTree, root: int, carried: set[int]) -> tuple[int, ...]:
 
 
 def check_factors(
-    rows: Numbers, triangle: Numbers, columns: JointColumns, joint_names: Sequence[str]
+    rows: Numbers,
+    triangle: Numbers,
+    columns: JointColumns,
+    joint_names: Sequence[str],
+    unit_rows: bool = False,
 ) -> None:
     """Raise ValueError for the first sample where A_d, whose factor R is given, loses its rank."""
-    place = lost_at(triangle)
+    place = lost_at(triangle, unit_rows)
     if place is not None:
         own = array_of(rows)[tuple(place)].astype(float)
         raise ValueError(why_not_following(own, columns, _epsilon(rows), joint_names, sample_of(place)))
 
 
-def least_left(triangle: Numbers) -> NDArray[np.floating]:
-    """Return the least part of a column of R left normal to those before it, (...,): |R_ff| by its length."""
+def least_left(triangle: Numbers, unit_rows: bool = False) -> NDArray[np.floating]:
+    """Return the least part of a column of R left normal to those before it, (...,): |R_ff| by its length.
+
+    unit_rows: rows of A have a largest slope of 1, and |R_ff| itself says how well a joint follows
+    """
     r = array_of(triangle)
+    if unit_rows:
+        return np.asarray(np.abs(r.diagonal(0, -2, -1)).min(-1))
     sizes = np.sqrt((r * r).sum(-2))
     least: NDArray[np.floating] = (np.abs(r.diagonal(0, -2, -1)) / np.where(sizes > 0.0, sizes, 1.0)).min(-1)
     return least
 
 
-def lost_at(triangle: Numbers) -> list[int] | None:
+def lost_at(triangle: Numbers, unit_rows: bool = False) -> list[int] | None:
     """Return the first sample where R has lost its rank, or None."""
     if is_traced(triangle):
         return None
-    lost = least_left(triangle) <= _epsilon(triangle)
+    lost = least_left(triangle, unit_rows) <= _epsilon(triangle)
     if not lost.any():
         return None
     place: list[int] = np.argwhere(lost)[0].tolist()

@@ -3,7 +3,7 @@
     q_d <- q_d - A_d^+ phi
 
 The last step starts at the closed position, so that a gradient through it is that of the implicit function:
-dq_d = -A_d^+ A_y dq_y.
+dq_d = dq_d - A_d^+ dphi, which is -A_d^+ A_y dq_y where all constraints are of positions.
 
 With the independent joints alone, the others are led from a position where ties are closed: steps along G go
 straight to the wanted independent joints, all samples at once, and are halved where others would leap. So
@@ -77,9 +77,9 @@ def closed(
         with torch.no_grad():
             at = _found(ties, columns, q, held_at, tolerance, names)
         if torch.is_grad_enabled():
-            found = with_independent(
-                cast("Tensor", at.q).detach(), gather(q, columns.independent, -1), columns
-            )
+            # The value of what was found, and the slope of q: where a constraint is of velocities, positions
+            # of all joints are states.
+            found = q + cast("Tensor", at.q - q).detach()
             at = ties_at(ties, columns, found, held_at)
             step = dependent_shares(columns, pseudoinverse(at.factors), at.violation[..., None])[..., 0]
             at = ties_at(ties, columns, found + step, held_at)
@@ -99,6 +99,8 @@ def _found(
 ) -> TiesAt:
     double = q.dtype.itemsize == 8
     near = 1e-8 if double else 1e-4  # of a step; what is left is about its square
+    if ties.unit_rows and len(columns.dependent) < ties.couplings:
+        near = 0.0  # a row of velocities that repeats one of positions halves its steps
     least = 1e-12 if double else 1e-6  # of a step that changes no row by more than rounding does
     at, is_near, is_seen = ties_at(ties, columns, q, held_at), False, not is_traced(q)
     for count in range(STEPS):
@@ -119,12 +121,12 @@ def _check_step(
     at: TiesAt, columns: JointColumns, tolerance: float | None, names: RowNames, is_start: bool
 ) -> None:
     """Raise ValueError where A_d has lost its rank; open ties are named, for q is not where they close."""
-    place = lost_at(at.factors[1])
+    place = lost_at(at.factors[1], at.unit_rows)
     if place is None:
         return
     found = worst_open(at.violation[tuple(place)], tolerance)
     if found is None:
-        check_factors(at.rows, at.factors[1], columns, names.joints)
+        check_factors(at.rows, at.factors[1], columns, names.joints, at.unit_rows)
         return
     tie, where = plain(names.owners[found[1]]), sample_of(place)
     free = left_free(at.rows[tuple(place)], columns, names.joints, " there")

@@ -19,6 +19,10 @@ class ConstraintRows(Protocol):
     """Rows of constraints on one back end."""
 
     @property
+    def unit_rows(self) -> bool:
+        """True if all rows are divided by their largest slopes, by which a singular A_d is then measured."""
+
+    @property
     def couplings(self) -> int:
         """Number of the last rows whose unit is their author's choice: they are divided by their slopes."""
 

@@ -42,6 +42,8 @@ class TieEnd(NamedTuple):
 class TieRows:
     """Rows of constraints on one back end: phi, A and dA/dt; arguments are as `Constraints` says."""
 
+    unit_rows = False
+
     def __init__(self, frames: FrameAnswers, chosen: TreeConstraints) -> None:
         self._frames, self._constants, self.count = frames, chosen.tables, len(chosen.rows)
         self.couplings = chosen.couplings

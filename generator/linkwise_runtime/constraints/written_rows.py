@@ -8,6 +8,8 @@ from ..arrays.backend import ArrayBackend
 from ..interface import Numbers, side_by_side
 from ..structure import Structure, WrittenConstraints
 from .chosen_constraints import (
+    SHORTEST,
+    STEPS,
     ChosenConstraints,
     Closing,
     ClosingEquations,
@@ -15,6 +17,10 @@ from .chosen_constraints import (
     best_closing,
     random_starts,
 )
+from .independent_joints import RANK
+
+LEAST = 1e-6
+"""Smallest part of a step of Newton's."""
 
 
 class WrittenEquations(ClosingEquations):
@@ -27,11 +33,30 @@ class WrittenEquations(ClosingEquations):
     def at(self, q: Floats) -> Closing:
         """Return phi and A at q (n,)."""
         values = self._rows(q)
+        if not np.isfinite(values).all():
+            nothing = np.zeros((len(values), len(q)))
+            return Closing(q, np.full(len(values), np.inf), nothing, nothing[:, 0], nothing)
         phi, rows = values[:, 0], values[:, 1:]
         slopes = np.abs(rows).max(-1, initial=0.0)
-        sizes = np.maximum(slopes, 1.0)
-        comparable = rows / np.where(slopes > 0.0, slopes, 1.0)[:, None]
-        return Closing(q, phi / sizes, rows / sizes[:, None], slopes, comparable)
+        sizes = np.where(slopes > 0.0, slopes, 1.0)
+        comparable = rows / sizes[:, None]
+        return Closing(q, phi / sizes, comparable, slopes, comparable)
+
+    def closed_from(self, start: Floats) -> Closing:
+        """Return the end of Newton's steps from q (n,), each halved until less is left open."""
+        at = self.at(start)
+        for _ in range(STEPS):
+            if not np.isfinite(at.left).all():
+                break
+            step = np.linalg.lstsq(at.rows, -at.left, rcond=RANK)[0]
+            if np.abs(step).max() < SHORTEST * (1.0 + np.abs(at.q).max()):
+                break
+            found, part = self.at(at.q + step), 1.0
+            while not np.linalg.norm(found.left) < np.linalg.norm(at.left) and part > LEAST:
+                part /= 2.0
+                found = self.at(at.q + part * step)
+            at = found
+        return at
 
 
 class WrittenChoice(ChosenConstraints):
@@ -62,6 +87,8 @@ def positions_at(written: WrittenConstraints, q: Floats, values: dict[str, float
 
 class WrittenRows:
     """Rows that a user wrote on one back end; see `ConstraintRows`."""
+
+    unit_rows = True
 
     def __init__(self, backend: ArrayBackend, written: WrittenConstraints) -> None:
         self.backend, self.written, self.couplings = backend, written, len(written.names)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import NOTHING, Beside
 from ..arrays.backend import ArrayBackend
@@ -42,7 +43,8 @@ class TiedMotion:
         """Begin at `start`, where contacts also took hold."""
         self._ties, self._backend, self._held_at = ties, backend, start.q
         self._last: tuple[Numbers, ClosedPlace] = start.q, start
-        self._dead = 0.0 if is_traced(start.q) else DEAD * float(least_left(start.triangle).min(initial=1.0))
+        self._dead = 0.0 if is_traced(start.q) else DEAD * float(_left_of(start).min(initial=1.0))
+        self._turned = _turning(start)
 
     def place(self, t: float, q: Numbers) -> ClosedPlace:
         """Return the closed place beside q (..., n), whose dependent joints are closed first.
@@ -107,15 +109,33 @@ class TiedMotion:
         """Return why independent joints go no further than a place; None where they do."""
         if is_traced(place.q):
             return None
-        left = least_left(place.triangle)
-        if not left.min(initial=1.0) < near * self._dead:
+        left, turned = _left_of(place), _turning(place)
+        passed = None if turned is None or self._turned is None else turned != self._turned
+        if not left.min(initial=1.0) < near * self._dead and (passed is None or not passed.any()):
             return None
-        at = np.unravel_index(left.argmin(), left.shape)
+        worst = left.argmin() if passed is None or not passed.any() else passed.argmax()
+        at = np.unravel_index(worst, left.shape)
         values = array_of(place.rows[at])
         own, names = self._ties.independent, self._backend.structure.joint_names
         told = why_not_following(values.astype(float), place.found.columns, NEAR * self._dead, names, "")
         go = "goes" if len(own) == 1 else "go"
         return f"{listed(own)} {go} no further{sample_of([int(k) for k in at])}: {told}"
+
+
+def _left_of(place: ClosedPlace) -> NDArray[np.floating]:
+    return least_left(place.triangle, place.unit_rows)
+
+
+def _turning(place: ClosedPlace) -> NDArray[np.bool_] | None:
+    """Return the sign of det A_d (...,), which a dead point between two places changes; None without one.
+
+    Of ties positions alone tell: steps do not lead across.
+    """
+    dependent = array_of(place.found.columns.dependent)
+    if not place.unit_rows or is_traced(place.q) or place.rows.shape[-2] != len(dependent):
+        return None
+    signs = np.linalg.slogdet(array_of(place.rows)[..., dependent])[0]
+    return np.asarray(signs > 0.0)
 
 
 Given = Callable[[float, Numbers, Numbers], object]
