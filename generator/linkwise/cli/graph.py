@@ -53,10 +53,7 @@ def graph(
     out: Annotated[Path | None, typer.Option(help="Directory that gets the files")] = None,
     as_json: Json = False,
 ) -> None:
-    """Show what autograd computes for a partial torque, or a part of it; equal operations are one.
-
-    With --recorded also torch's own graph of the torque, each of its nodes as torch recorded it.
-    """
+    """Show what autograd computes for a partial torque, or a part of it; equal operations are one."""
     _check("--order", order, ("all", "0", "1", "2"))
     _check("--fold", fold, ("auto", *FOLDS))
     wanted = formats or ["svg", "graphml", "json"]
