@@ -101,7 +101,7 @@ class Dynamics(RobotCalls):
     def constraints(self) -> Constraints[Any]:
         """Calls on the motion that the ties and couplings of the robot's file allow, see `Constraints`.
 
-        Raises ValueError for a robot without any, and for links given by energies.
+        Raises ValueError for a robot without any, links given by energies without constraints included.
         """
         return constraints_of(self, None, (), None, None)
 

@@ -68,7 +68,7 @@ def there(what: T | None) -> T:
     return what
 
 
-NEAR_NONE = "loops close near none of the states that were tried"
+NEAR_NONE = "loops close near none of the states, or only next to singular positions"
 SEEDS = (None, 1, 2, 3)
 """Seeds of errors in each operation of what a user wrote; None for none."""
 

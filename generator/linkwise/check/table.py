@@ -16,7 +16,7 @@ from linkwise.check.model_calls import Named, against_reference, recorded_parts
 from linkwise.check.parametric_tree import check_bodies, check_numbers
 from linkwise.check.regressor_checks import regressor_calls
 from linkwise.check.simulation_checks import simulation_calls
-from linkwise.check.subject import Subject, check_energies, there
+from linkwise.check.subject import NEAR_NONE, Subject, check_energies, there
 from linkwise.check.sum_checks import passive_calls, sum_calls
 
 T = TypeVar("T")
@@ -47,7 +47,6 @@ class Check(Generic[T]):
 
 COMPOSED = "of a robot as large as this, held of torch, which composes it of the same answers"
 NONE_COMPUTES = "nothing here computes with the energies"
-NEAR_NONE = "loops close near none of the states, or only next to singular positions"
 LARGE = (
     "of a robot as large as this: batches of other shapes, modules of links beyond the first, and recorded "
     "graphs of links that many joints carry; what cuts batches and records graphs is alike for all robots"

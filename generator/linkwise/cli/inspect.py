@@ -102,19 +102,15 @@ def _written_constraints(system: System) -> dict[str, Any]:
     """Return the constraints that a user wrote, as `_constraints` does; empty without any."""
     if not isinstance(system, EnergySystem) or not system.constraints:
         return {}
-    joints = [c.name for c in system.coordinates]
-    return {
-        "constraints": [
-            {
-                "name": one.name,
-                "kind": "positions" if one.holonomic else "velocities",
-                "expression": f"{exact_text(one.expression)} = 0",
-            }
-            for one in system.constraints
-        ],
-        "independent": [joints[k] for k in system.independent],
-        "dependent": [joint for k, joint in enumerate(joints) if k not in system.independent],
-    }
+    constraints = [
+        {
+            "name": one.name,
+            "kind": "positions" if one.holonomic else "velocities",
+            "expression": f"{exact_text(one.expression)} = 0",
+        }
+        for one in system.constraints
+    ]
+    return {"constraints": constraints, **_moved([c.name for c in system.coordinates], system.independent)}
 
 
 def _constraints(tree: JointTree, joints: Sequence[str]) -> dict[str, Any]:
@@ -130,10 +126,14 @@ def _constraints(tree: JointTree, joints: Sequence[str]) -> dict[str, Any]:
         {"name": c.name, "kind": "coupling", "terms": {joints[k]: list(factors) for k, factors in c.terms}}
         for c in tree.couplings
     )
+    return {"constraints": [*ties, *couplings], **_moved(joints, tree.independent)}
+
+
+def _moved(joints: Sequence[str], independent: Sequence[int]) -> dict[str, list[str]]:
+    """Return the joints that move freely, and those that follow them."""
     return {
-        "constraints": [*ties, *couplings],
-        "independent": [joints[k] for k in tree.independent],
-        "dependent": [joint for k, joint in enumerate(joints) if k not in tree.independent],
+        "independent": [joints[k] for k in independent],
+        "dependent": [joint for k, joint in enumerate(joints) if k not in independent],
     }
 
 

@@ -37,9 +37,9 @@ def constrained_system(system: System) -> System:
     requested = [names.index(name) for name in robot.requested_independent]
     chosen = _independent(loops, names, _proposed(robot, loops.rows), requested)
     position = loops.position(chosen)
-    notes = [Note("constraint", name, about, BESIDE) for name, about in constraints_of(system)]
-    notes += [Note("redundant", name, "", LEAST) for name in redundant_names(loops.rows, loops.owners)]
-    held = replace(robot, independent=chosen, closed_position=position, notes=(*robot.notes, *notes))
+    held = replace(
+        robot, independent=chosen, closed_position=position, notes=(*robot.notes, *_notes(system, loops))
+    )
     return replace(system, robot=held)
 
 
@@ -49,10 +49,17 @@ def _constrained_energies(system: EnergySystem) -> EnergySystem:
     slides = [(float(coordinate.unit == "m"),) for coordinate in system.coordinates]
     proposed = chosen_independent(loops.rows, (), slides)
     chosen = _independent(loops, names, proposed, system.requested_independent, "independent=")
-    notes = [Note("constraint", name, about, BESIDE) for name, about in constraints_of(system)]
-    notes += [Note("redundant", name, "", LEAST) for name in redundant_names(loops.rows, loops.owners)]
     position = loops.position(chosen)
-    return replace(system, independent=chosen, closed_position=position, notes=(*system.notes, *notes))
+    return replace(
+        system, independent=chosen, closed_position=position, notes=(*system.notes, *_notes(system, loops))
+    )
+
+
+def _notes(system: System, loops: ClosedLoops) -> list[Note]:
+    return [
+        *(Note("constraint", name, about, BESIDE) for name, about in constraints_of(system)),
+        *(Note("redundant", name, "", LEAST) for name in redundant_names(loops.rows, loops.owners)),
+    ]
 
 
 def constraints_of(system: System) -> Iterator[tuple[str, str]]:

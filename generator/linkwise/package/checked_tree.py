@@ -49,17 +49,7 @@ def check_energies(energies: EnergiesEntry, links: Sequence[str], joints: int) -
     names = [entry.name for entry in energies.constraints]
     if len(set(names)) < len(names):
         raise ValueError("energies.constraints has a name twice")
-    free = energies.independent
-    if list(free) != sorted(set(free)) or not all(k < joints for k in free):
-        raise ValueError("energies.independent is not of joints, in ascending order")
-    if bool(names) != bool(free) or (names and len(free) == joints):
-        raise ValueError(
-            "energies.independent is not of some joints where there are constraints, else of none"
-        )
-    if len(energies.closed_position) != (joints if names else 0):
-        raise ValueError(
-            "energies.closed_position is not of all joints where there are constraints, else of none"
-        )
+    _check_independent("energies", energies.independent, energies.closed_position, joints, bool(names))
 
 
 def check_places(tree: JointTree, formulas: Iterable[str]) -> None:
@@ -128,14 +118,22 @@ def _check_constraints(tree: JointTree, count: int) -> None:
             )
         if not found[-1] < count:
             raise ValueError(f"the coupling {coupling.name[:80]!a} of the tree has a joint that is not there")
-    free = tree.independent
-    if list(free) != sorted(set(free)) or not all(k < count for k in free):
-        raise ValueError("tree.independent is not of joints, in ascending order")
-    if bool(names) != bool(free) or (names and len(free) == count):
-        raise ValueError("tree.independent is not of some joints where there are constraints, else of none")
-    if len(tree.closed_position) != (count if names else 0):
+    _check_independent("tree", tree.independent, tree.closed_position, count, bool(names))
+
+
+def _check_independent(
+    place: str, independent: Sequence[int], closed: Sequence[float], count: int, constrained: bool
+) -> None:
+    """Raise ValueError for independent joints or a closed position that do not suit the constraints."""
+    if list(independent) != sorted(set(independent)) or not all(k < count for k in independent):
+        raise ValueError(f"{place}.independent is not of joints, in ascending order")
+    if constrained != bool(independent) or (constrained and len(independent) == count):
         raise ValueError(
-            "tree.closed_position is not of all joints where there are constraints, else of none"
+            f"{place}.independent is not of some joints where there are constraints, else of none"
+        )
+    if len(closed) != (count if constrained else 0):
+        raise ValueError(
+            f"{place}.closed_position is not of all joints where there are constraints, else of none"
         )
 
 

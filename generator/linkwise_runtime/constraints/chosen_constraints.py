@@ -72,14 +72,7 @@ class ClosingEquations:
 
     def closed_from(self, start: Floats) -> Closing:
         """Return the end of the steps from q (n,)."""
-        at = self.at(start)
-        for _ in range(STEPS):
-            step = np.linalg.lstsq(at.rows, -at.left, rcond=RANK)[0]
-            size = np.abs(step).max()
-            if size < SHORTEST:
-                break
-            at = self.at(at.q + step * min(1.0, LONGEST / size))
-        return at
+        raise NotImplementedError
 
 
 class TieEquations(ClosingEquations):
@@ -107,6 +100,17 @@ class TieEquations(ClosingEquations):
         sizes = np.concatenate([ones, np.maximum(slopes, 1.0)])
         comparable = np.concatenate([ties / self._sizes, couplings / np.where(most > 0.0, most, 1.0)])
         return Closing(q, phi / sizes, rows / sizes[:, None], slopes, comparable)
+
+    def closed_from(self, start: Floats) -> Closing:
+        """Return the end of Newton's steps from q (n,), each no longer than `LONGEST`."""
+        at = self.at(start)
+        for _ in range(STEPS):
+            step = np.linalg.lstsq(at.rows, -at.left, rcond=RANK)[0]
+            size = np.abs(step).max()
+            if size < SHORTEST:
+                break
+            at = self.at(at.q + step * min(1.0, LONGEST / size))
+        return at
 
 
 def random_starts(n: int) -> list[Floats]:
@@ -164,8 +168,10 @@ class ChosenConstraints:
         """Return a position near `at`, or any without it, where constraints hold, at its own numbers."""
         raise NotImplementedError
 
-    def _best(self, found: Closing, _: object) -> Closing:
-        """Return the end of a search; raises ValueError where it is open."""
+    def _best(self, equations: ClosingEquations) -> Closing:
+        """Return the best end of steps from `at`, or of a few starts; raises ValueError where it is open."""
+        starts = random_starts(self._structure.n) if self._at is None else [self._at]
+        found, _ = best_closing(equations, starts)
         if not found.is_closed:
             told = "from any position that was tried; give `at`" if self._at is None else "beside `at`"
             raise ValueError(f"{listed(self.names)} did not close {told}")
@@ -264,9 +270,8 @@ class TreeConstraints(ChosenConstraints):
 
     def _closed(self) -> Closing:
         tree, n = self._tree, self._structure.n
-        starts = random_starts(n) if self._at is None else [self._at]
-        q = starts[0]
         if tree.tied:
-            ties = TieEquations(tree, n, [one for one in self.held if one.second is not None])
-            q = self._best(*best_closing(ties, starts)).q
+            q = self._best(TieEquations(tree, n, [one for one in self.held if one.second is not None])).q
+        else:
+            q = random_starts(n)[0] if self._at is None else self._at
         return TieEquations(tree, n, self.held).at(q)

@@ -69,8 +69,8 @@ class Constraints(Generic[Array]):
     distance pushes its ends apart; the force of a coupling is per unit of its sum. They load the joints with
     A^T lambda. Where rows are redundant, as those of a planar loop in space are, A_d^-1 is the pseudoinverse,
     and lambda is the solution with the least sum of squares, a coupling's force being multiplied by its
-    largest slope where that is above 1; `redundant` names where that choice was made. Other forces are
-    unique.
+    largest slope where that is above 1, and that of a constraint that a user wrote in any case; `redundant`
+    names where that choice was made. Other forces are unique.
 
     q, batches and errors are as for `Dynamics`. Positions q (..., n) are those of all joints, in which the
     ties must close within the tolerance of `Dynamics.constrained`: else ValueError is raised; `closed`
@@ -168,7 +168,8 @@ class Constraints(Generic[Array]):
 
         q: positions of all joints, (..., n), where the search for the dependent ones starts; or of the
         independent joints alone, (..., m): the others are then led there from `start`, step by step without
-        leaps, so that ties that can close in several ways keep the way of the start
+        leaps, so that ties that can close in several ways keep the way of the start. Constraints of
+        velocities do not say where the others are, and refuse this
         held_at: positions (..., n) in which contacts took hold; unless given, q itself, or `start` where
         joints are led
         start: a closed position (..., n), accepted with independent joints alone; `closed_position` unless

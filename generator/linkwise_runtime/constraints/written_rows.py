@@ -14,8 +14,6 @@ from .chosen_constraints import (
     Closing,
     ClosingEquations,
     Floats,
-    best_closing,
-    random_starts,
 )
 from .independent_joints import RANK
 
@@ -74,15 +72,12 @@ class WrittenChoice(ChosenConstraints):
 
     def _closed(self) -> Closing:
         values = {name: float(value) for name, value in self._structure.parameters.items()}
-        equations = WrittenEquations(lambda q: positions_at(self._written, q, values))
-        starts = random_starts(self._structure.n) if self._at is None else [self._at]
-        return self._best(*best_closing(equations, starts))
 
+        def rows(q: Floats) -> Floats:
+            flat = np.array(self._written.positions(np, q, values), float)
+            return flat.reshape(len(self.names), 1 + len(q))
 
-def positions_at(written: WrittenConstraints, q: Floats, values: dict[str, float]) -> Floats:
-    """Return phi and A beside it, (C, 1 + n), at q (n,)."""
-    flat = np.array(written.positions(np, q, values), float)
-    return flat.reshape(len(written.names), 1 + len(q))
+        return self._best(WrittenEquations(rows))
 
 
 class WrittenRows:

@@ -49,7 +49,7 @@ class TreeJoint:
 
 @dataclass(frozen=True)
 class TreeLink:
-    """Rigid body, in the axes of the frame that its joint moves, and about the origin of that."""
+    """Rigid body, in the axes of the frame that its joint moves."""
 
     joint: int
     """Index of the joint that moves it."""
