@@ -43,6 +43,13 @@ class Learned(torch.nn.Module):  # type: ignore[misc]
         return self.layers(torch.stack([q[0], q[1]], -1))[..., 3]
 
 
+class Summed(Learned):
+    """Energy of all samples in one, from which no sample has its own."""
+
+    def kinetic(self, q: Any, qd: Any, p: Any) -> Any:
+        return (qd[0] ** 2).sum()
+
+
 class Slow(Learned):
     def kinetic(self, q: Any, qd: Any, p: Any) -> Any:
         return qd[0] ** 4
@@ -128,5 +135,7 @@ def test_what_is_no_link_is_refused(package_of: Packages) -> None:
         robot.links[1] = torch.nn.Linear(2, 2)
     with pytest.raises(TypeError, match="not of degree two in the velocities"):
         robot.links[1] = Slow()
+    with pytest.raises(TypeError, match=r"kinetic answers with shape \(\) where each"):
+        robot.links[1] = Summed()
     with pytest.raises(ValueError, match="elbow"):
         robot.links["elbow"] = Learned()

@@ -8,6 +8,8 @@ from .energy_interface import Number, Parameters, Values
 from .partial_lagrangian import PartialLagrangian, RigidLagrangian
 
 FACE = ("kinetic", "potential")
+SAMPLES = 8
+"""Number of samples by which energies are tried."""
 
 
 class ReplacedLink(PartialLagrangian):
@@ -60,28 +62,35 @@ def replaced(own: PartialLagrangian, module: object) -> ReplacedLink:
             f"q[k].shape; this is {type(module).__name__}{told}"
         )
     made = ReplacedLink(own, module)
-    _check_quadratic(made)
+    _check_energies(made)
     return made
 
 
-def _check_quadratic(link: ReplacedLink) -> None:
-    """Raise TypeError for a kinetic energy that twice the velocities do not make four times as large.
+def _check_energies(link: ReplacedLink) -> None:
+    """Raise TypeError for energies of another shape, and a kinetic energy not of degree two in velocities.
 
-    Coefficients c1 own the velocity forces of such energies alone.
+    Coefficients c1 own the velocity forces of energies of degree two alone.
     """
     n = link._backend.structure.n
     for dtype in (torch.float64, torch.float32):
         draw = torch.Generator().manual_seed(0)
-        q, qd = (torch.rand(n, 8, dtype=dtype, generator=draw) for _ in range(2))
+        q, qd = (torch.rand(n, SAMPLES, dtype=dtype, generator=draw) for _ in range(2))
         given = link._backend.seen_by(q.mT)
         try:
             with torch.no_grad():
-                once, twice = (
-                    torch.as_tensor(link.kinetic(q.unbind(), (by * qd).unbind(), given)) for by in (1.0, 2.0)
-                )
+                once, twice = (link.kinetic(q.unbind(), (by * qd).unbind(), given) for by in (1.0, 2.0))
+                energies = {"kinetic": once, "potential": link.potential(q.unbind(), given)}
         except RuntimeError:  # a module of the other dtype, whose calls are to have motion of that
             continue
-        if not torch.allclose(twice, 4.0 * once, rtol=1e-4, atol=1e-4 * float(once.abs().max())):
+        for name, energy in energies.items():
+            if isinstance(energy, torch.Tensor) and energy.shape != (SAMPLES,):
+                raise TypeError(
+                    f"{name} answers with shape {tuple(energy.shape)} where each q[k] has shape ({SAMPLES},)"
+                    "; give one energy in J for each sample"
+                )
+        once, twice = torch.as_tensor(once), torch.as_tensor(twice)
+        size = float(once.nan_to_num().abs().max())  # NaN where the energy is not defined tells nothing
+        if not torch.allclose(twice, 4.0 * once, rtol=1e-4, atol=1e-4 * size, equal_nan=True):
             raise TypeError(
                 "its kinetic energy is not of degree two in the velocities, so that no coefficients own its "
                 "forces; give sums of m_ik(q) qd_i qd_k, a mass matrix that is learned, say"
