@@ -111,10 +111,9 @@ class Worker:
     def _called(self) -> tuple[int | None, str, str]:
         """Exit status, and the traceback of what ought not to have come this far and where it began."""
         with self._redirected():
-            signal.setitimer(signal.ITIMER_PROF, self.seconds)
             self.watch.inside = str(self.room.root)
             try:
-                self.main()
+                self._main_in_time()
                 return 0, "", ""
             except SystemExit as end:
                 return (end.code if isinstance(end.code, int) else 1), "", ""
@@ -123,8 +122,15 @@ class Worker:
                 at = f"{Path(own[-1].filename).name}:{own[-1].name}" if own else "?"
                 return None, traceback.format_exc(limit=-8), f"{type(error).__name__} in {at}"
             finally:
-                signal.setitimer(signal.ITIMER_PROF, 0.0)
                 self.watch.inside = None
+
+    def _main_in_time(self) -> None:
+        """Run the command; the timer ends within, as a case's memory is freed where its error is handled."""
+        signal.setitimer(signal.ITIMER_PROF, self.seconds)
+        try:
+            self.main()
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
 
     @contextlib.contextmanager
     def _redirected(self) -> Iterator[None]:
