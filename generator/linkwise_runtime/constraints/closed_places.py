@@ -15,7 +15,6 @@ import numpy as np
 
 from ..chosen_names import plain, sample_of
 from ..interface import Numbers, array_of, is_traced, namespace
-from ..rule.kinematics import gather
 from .chosen_constraints import OPEN
 from .independent_joints import JointColumns, check_factors, check_following, row_sizes
 from .rows import ConstraintRows, RowsThere
@@ -78,8 +77,8 @@ class ClosedPlace(NamedTuple):
     made: RowsThere
     rows: Numbers
     """A, with its rows divided by their sizes, (..., C, n)."""
-    triangle: Numbers
-    """Factor R of A_d, from these rows."""
+    factors: tuple[Numbers, Numbers]
+    """Factors Q and R of A_d, from these rows."""
     unit_rows: bool
     """See `ConstraintRows`."""
 
@@ -104,7 +103,7 @@ class ClosedPlace(NamedTuple):
 
     def own(self, motion: Numbers) -> Numbers:
         """Return the independent joints' entries (..., m) of motion (..., n)."""
-        return gather(motion, self.found.columns.independent, -1)
+        return self.found.columns.own(motion)
 
 
 def ties_at(
@@ -130,7 +129,7 @@ def checked_place(at: TiesAt, columns: JointColumns, names: RowNames) -> ClosedP
     if at.sizes is not None:  # rates and forces are those of rows that are not scaled
         inverse = inverse / at.sizes[..., None, :]
     found = DependentMap(columns, inverse, mapped)
-    return ClosedPlace(at.q, found, at.made, at.rows, at.factors[1], at.unit_rows)
+    return ClosedPlace(at.q, found, at.made, at.rows, at.factors, at.unit_rows)
 
 
 def closed_place(
@@ -147,7 +146,7 @@ def closed_place(
 
 def factor_dependent(rows: Numbers, columns: JointColumns) -> tuple[Numbers, Numbers]:
     """Return the factors Q and R of A_d, from rows A (..., C, n)."""
-    q, r = namespace(rows).linalg.qr(gather(rows, columns.dependent, -1))
+    q, r = namespace(rows).linalg.qr(columns.others(rows))
     return q, r
 
 
@@ -166,19 +165,19 @@ def pseudoinverse(factors: tuple[Numbers, Numbers]) -> Numbers:
 def velocity_map(rows: Numbers, columns: JointColumns, inverse: Numbers) -> Numbers:
     """Return the velocity map G (..., n, m)."""
     xp = namespace(rows)
-    moved = -inverse @ gather(rows, columns.independent, -1)
-    m = len(columns.independent)
+    moved = -inverse @ columns.own(rows)
+    m = columns.independent.shape[-1]
     # Zeros made from the motion give a unit matrix of its kind, through which gradients can flow.
     unit = xp.zeros_like(moved[..., :1, :]) + xp.eye(m, **_kind(rows))
-    return gather(xp.concat([unit, moved], -2), columns.order, -2)
+    return columns.ordered(xp.concat([unit, moved], -2), -2)
 
 
 def dependent_shares(columns: JointColumns, inverse: Numbers, changes: Numbers) -> Numbers:
     """Return -A_d^+ times columns (..., C, X) on dependent joints, zero on independent ones, (..., n, X)."""
-    xp, m = namespace(changes), len(columns.independent)
+    xp, m = namespace(changes), columns.independent.shape[-1]
     moved = -inverse @ changes
     still = xp.zeros_like(moved[..., :1, :]) + xp.zeros((m, 1), **_kind(moved))
-    return gather(xp.concat([still, moved], -2), columns.order, -2)
+    return columns.ordered(xp.concat([still, moved], -2), -2)
 
 
 def closable(factors: tuple[Numbers, Numbers], violation: Numbers) -> Numbers:
@@ -188,7 +187,7 @@ def closable(factors: tuple[Numbers, Numbers], violation: Numbers) -> Numbers:
 
 def tie_forces(found: DependentMap, torque: Numbers) -> Numbers:
     """Return lambda (..., C, X) for torques (..., n, X), of which those of dependent joints count."""
-    return found.inverse.mT @ gather(torque, found.columns.dependent, -2)
+    return found.inverse.mT @ found.columns.others(torque, -2)
 
 
 def independent_torque(found: DependentMap, torque: Numbers) -> Numbers:

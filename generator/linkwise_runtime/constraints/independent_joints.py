@@ -5,8 +5,9 @@ a row that a planar loop leaves at zero holds nothing but rounding. Columns are 
 them normal to those taken before.
 """
 
+import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from ..answers.inertia_solve import SHARE
 from ..chosen_names import listed, plain, sample_of
 from ..interface import Numbers, array_of, epsilon_of, is_traced, namespace
 from ..rule.joint_tree import JointTree
+from ..rule.kinematics import gather
 
 if TYPE_CHECKING:
     from torch import Tensor  # type: ignore[import-not-found, unused-ignore]
@@ -35,12 +37,49 @@ AGREE = 1e-4
 
 
 class JointColumns(NamedTuple):
-    """Joints as tables of indices."""
+    """Joints as tables of indices: one table for all samples, or one for each, (..., m), on a way."""
 
     independent: Numbers
     dependent: Numbers
     order: Numbers
     """Position of each joint in the list of the independent joints followed by the dependent ones."""
+
+    def own(self, a: Numbers, axis: int = -1) -> Numbers:
+        """Return the independent joints' entries of an axis of `a`, -1 or -2."""
+        return _taken(a, self.independent, axis)
+
+    def others(self, a: Numbers, axis: int = -1) -> Numbers:
+        """Return the dependent joints' entries."""
+        return _taken(a, self.dependent, axis)
+
+    def ordered(self, a: Numbers, axis: int = -1) -> Numbers:
+        """Return entries of independent joints followed by dependent ones, in the order of all joints."""
+        return _taken(a, self.order, axis)
+
+    def names(self, joints: Sequence[str]) -> tuple[str, ...]:
+        """Return the names of the independent joints, "x or y" where samples differ, of those of all."""
+        index = array_of(self.independent)
+        each = np.unique(index.reshape(-1, index.shape[-1]), axis=0).T.astype(int).tolist()
+        return tuple(" or ".join(joints[k] for k in dict.fromkeys(row)) for row in each)
+
+    def of(self, sample: Sequence[int]) -> "JointColumns":
+        """Return the table of one sample."""
+        shared = len(self.order.shape) == 1
+        return self if shared else JointColumns(*(array_of(a)[tuple(sample)] for a in self))
+
+
+def _taken(a: Numbers, index: Numbers, axis: int) -> Numbers:
+    if len(index.shape) == 1:
+        return gather(a, index, axis)
+    own: Any = index
+    if len(a.shape) > len(index.shape):
+        own = own[..., None, :] if axis == -1 else own[..., None]
+    found: Numbers
+    if isinstance(a, np.ndarray):
+        found = np.take_along_axis(a, own, axis)
+    else:
+        found = sys.modules["torch"].take_along_dim(a, own, axis)
+    return found
 
 
 def joint_columns(independent: tuple[int, ...], n: int) -> JointColumns:
@@ -76,6 +115,7 @@ def chosen_independent(
     rather_dependent: Sequence[int] = (),
     preference: Sequence[tuple[float, ...]] | None = None,
     tolerance: float = RANK,
+    rank: int | None = None,
 ) -> tuple[int, ...]:
     """Return the coordinates left when pivoting takes columns of A (C, n) as those of dependent joints.
 
@@ -83,8 +123,9 @@ def chosen_independent(
     them
     preference: key of each coordinate; of the columns that are not small beside the largest, the one with the
     greatest key is taken; unless given, the largest column is
+    rank: number of dependent coordinates; that of A unless given
     """
-    left, rank = rows.copy(), rank_of(rows, tolerance)
+    left, rank = rows.copy(), rank_of(rows, tolerance) if rank is None else rank
     least = tolerance * np.linalg.norm(left, axis=0).max(initial=1.0)
     rest = [k for k in range(rows.shape[1]) if k not in rather_dependent]
     taken: list[int] = []
@@ -161,7 +202,7 @@ def check_factors(
     """Raise ValueError for the first sample where A_d, whose factor R is given, loses its rank."""
     place = lost_at(triangle, unit_rows)
     if place is not None:
-        own = array_of(rows)[tuple(place)].astype(float)
+        own, columns = array_of(rows)[tuple(place)].astype(float), columns.of(place)
         raise ValueError(why_not_following(own, columns, _epsilon(rows), joint_names, sample_of(place)))
 
 
@@ -225,7 +266,7 @@ def check_following(
     Rows are compared with the largest of their tie: in a loop that a joint carries as a whole, or that is
     open within the tolerance, some rows are nothing but what is left of differences.
     """
-    if rows.shape[-2] == len(columns.dependent) or is_traced(rows):
+    if rows.shape[-2] == columns.dependent.shape[-1] or is_traced(rows):
         return
     a, g = array_of(rows), array_of(mapped)
     starts = [at for at, name in enumerate(names) if not at or name != names[at - 1]]
@@ -236,7 +277,7 @@ def check_following(
     if not wrong.any():
         return
     *place, row, joint = np.argwhere(wrong)[0].tolist()
-    mover = joint_names[columns.independent.tolist()[joint]]
+    mover = joint_names[columns.of(place).independent.tolist()[joint]]
     raise ValueError(
         f"{plain(names[row])} does not stay closed{sample_of(place)} when {mover} moves and the others "
         "follow: the loop is over-constrained, and what holds it twice does not agree"

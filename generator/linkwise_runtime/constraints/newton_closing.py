@@ -18,7 +18,6 @@ import numpy as np
 
 from ..chosen_names import listed, plain, sample_of
 from ..interface import Numbers, is_traced, namespace
-from ..rule.kinematics import gather
 from .closed_places import (
     ClosedPlace,
     RowNames,
@@ -99,7 +98,7 @@ def _found(
 ) -> TiesAt:
     double = q.dtype.itemsize == 8
     near = 1e-8 if double else 1e-4  # of a step; what is left is about its square
-    if ties.unit_rows and len(columns.dependent) < ties.couplings:
+    if ties.unit_rows and columns.dependent.shape[-1] < ties.couplings:
         near = 0.0  # a row of velocities that repeats one of positions halves its steps
     least = 1e-12 if double else 1e-6  # of a step that changes no row by more than rounding does
     at, is_near, is_seen = ties_at(ties, columns, q, held_at), False, not is_traced(q)
@@ -129,6 +128,7 @@ def _check_step(
         check_factors(at.rows, at.factors[1], columns, names.joints, at.unit_rows)
         return
     tie, where = plain(names.owners[found[1]]), sample_of(place)
+    columns = columns.of(place)
     free = left_free(at.rows[tuple(place)], columns, names.joints, " there")
     if is_start:
         raise DoesNotClose(
@@ -150,14 +150,14 @@ def _led(columns: JointColumns) -> str:
 
 def with_independent(q: Numbers, own: Numbers, columns: JointColumns) -> Numbers:
     """Return q (..., n) with its independent joints at `own` (..., m); gradients flow through both."""
-    others = gather(q, columns.dependent, -1)
-    return gather(namespace(q).concat([own, others], -1), columns.order, -1)
+    return columns.ordered(namespace(q).concat([own, columns.others(q)], -1))
 
 
 def _check(violation: Numbers, tolerance: float | None, columns: JointColumns, names: RowNames) -> None:
     found = worst_open(violation, tolerance)
     if found is not None:
         place, row, size = found
+        columns = columns.of(place)
         raise DoesNotClose(
             f"{plain(names.owners[row])} does not close{sample_of(place)}: from here the dependent joints "
             f"leave {open_by(size, names.rows[row])}",

@@ -65,15 +65,23 @@ class TiedJoints:
         """Return how joints follow at q (..., n), in which all ties close; raises as `Constraints` says."""
         return closed_place(self.rows(backend), self.columns(backend, q), q, self._tolerance, self._names)
 
-    def closed(self, backend: ArrayBackend, q: Numbers, held_at: Numbers) -> TiesAt:
-        """Return the ties once dependent joints close them; held_at: where contacts took hold, (..., n)."""
-        columns = self.columns(backend, q)
+    def closed(
+        self, backend: ArrayBackend, q: Numbers, held_at: Numbers, columns: JointColumns | None = None
+    ) -> TiesAt:
+        """Return the ties once dependent joints close them.
+
+        held_at: where contacts took hold, (..., n)
+        columns: other independent joints than the chosen ones
+        """
+        columns = columns or self.columns(backend, q)
         return closed(self.rows(backend), columns, q, held_at, self._tolerance, self._names)
 
-    def closed_place(self, backend: ArrayBackend, q: Numbers, held_at: Numbers) -> ClosedPlace:
-        """Return how joints follow once dependent joints close the ties; held_at: as in `closed`."""
-        at = self.closed(backend, q, held_at)
-        return checked_place(at, self.columns(backend, at.q), self._names)
+    def closed_place(
+        self, backend: ArrayBackend, q: Numbers, held_at: Numbers, columns: JointColumns | None = None
+    ) -> ClosedPlace:
+        """Return how joints follow once dependent joints close the ties; see `closed`."""
+        at = self.closed(backend, q, held_at, columns)
+        return checked_place(at, columns or self.columns(backend, at.q), self._names)
 
     def motion(
         self, backend: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool
@@ -90,9 +98,10 @@ class TiedJoints:
     def acceleration(
         self, backend: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool
     ) -> Numbers:
-        """Return ydd (..., m) under torques (..., n), at velocities that follow."""
+        """Return qdd (..., n) under torques (..., n), at velocities that follow."""
         mass, bias = backend.answers.equations(place.q, qd, passive)
-        return self._solved(place, mass, tau - bias, place.bias(qd))
+        own = place.bias(qd)
+        return place.velocity(self._solved(place, mass, tau - bias, own)) + own
 
     def coefficients(
         self, backend: ArrayBackend, place: ClosedPlace, qd: Numbers
@@ -111,7 +120,9 @@ class TiedJoints:
     def _solved(self, place: ClosedPlace, mass: Numbers, force: Numbers, bias: Numbers) -> Numbers:
         found = place.found
         driven = independent_torque(found, (force - times(mass, bias))[..., None])[..., 0]
-        return solve_inertia(independent_torque(found, mass @ found.map), driven, self.independent)
+        chosen = any(found.columns is one for one in self._columns.values())
+        names = self.independent if chosen else found.columns.names(self._names.joints)
+        return solve_inertia(independent_torque(found, mass @ found.map), driven, names)
 
 
 def without_gradient(like: Numbers) -> AbstractContextManager[object]:

@@ -1,17 +1,17 @@
 """Equations of motion as rates of a state, for an open tree or with constraints, and their energy.
 
-State (q, v, W): v = qd, or with constraints that of the independent joints, and W the work that was done:
+State (q, v, W): v = qd, and W the work that was done:
 
-    dq/dt = qd    dv/dt = qdd (ydd)    dW/dt = qd . (tau - sum_e load torque_e - damping - friction) + R
+    dq/dt = qd    dv/dt = qdd    dW/dt = qd . (tau - sum_e load torque_e - damping - friction) + R
 
 with R the power that links which were written by hand get otherwise than from joints.
 
 With constraints the dependent joints of every q are closed first, by Newton's method from where they are, and
-qd = G v, so that they do not drift.
+qd = G v_y of the independent ones, so that they do not drift.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,62 +20,113 @@ from numpy.typing import NDArray
 from ..arguments import NOTHING, Beside
 from ..arrays.backend import ArrayBackend
 from ..chosen_names import listed, sample_of, short
-from ..constraints.closed_places import ClosedPlace
-from ..constraints.independent_joints import least_left, why_not_following
+from ..constraints.closed_places import ClosedPlace, factor_dependent
+from ..constraints.independent_joints import (
+    JointColumns,
+    chosen_independent,
+    joint_columns,
+    least_left,
+    left_free,
+)
 from ..constraints.tied_joints import TiedJoints, without_gradient
 from ..interface import Numbers, array_of, is_traced
 from .source_forces import AppliedLoads, loads_of
 
-HALVES = 30
-"""Limit of the halvings of the way to a position that does not close, to find how far it goes."""
 DEAD = 1e-3
-"""Part of what is left of columns of A_d at the start; where less is left, joints are at a dead point."""
+"""Part of what was left of columns of A_d where joints were chosen; where less is left, they tell nothing."""
+WEAK = 0.5
+"""Part below which other independent joints are looked for: the error of a step grows as it gets less."""
 LEAP = 0.5
 """Longest way from one place to the next, in rad and m: joints that go farther have left the motion."""
-NEAR = 10.0
-"""Factor of the limit of a dead point, for the last position beside it that closes."""
 
 
 class TiedMotion:
-    """Closed places along a motion; the last one is kept, since a step begins where the one before ended."""
+    """Closed places along a motion; the last one is kept, since a step begins where the one before ended.
+
+    Where independent joints come to tell little of the others, as at a crank's dead point, each sample goes
+    on with others, which pivoting finds: the motion itself does not depend on the choice.
+    """
 
     def __init__(self, ties: TiedJoints, backend: ArrayBackend, start: ClosedPlace) -> None:
         """Begin at `start`, where contacts also took hold."""
         self._ties, self._backend, self._held_at = ties, backend, start.q
         self._last: tuple[Numbers, ClosedPlace] = start.q, start
-        self._dead = 0.0 if is_traced(start.q) else DEAD * float(_left_of(start).min(initial=1.0))
-        self._turned = _turning(start)
+        self._chosen = Followed.at(start.rows, start.found.columns, start.unit_rows)
 
     def place(self, t: float, q: Numbers) -> ClosedPlace:
         """Return the closed place beside q (..., n), whose dependent joints are closed first.
 
-        Raises ValueError, with the time, where they cannot be closed, or independent joints go no further.
+        Raises ValueError, with the time, where they cannot be closed, or constraints come to a place where
+        they take fewer freedoms.
         """
         asked, place = self._last
         if asked is q:
             return place
-        try:
-            found = self._ties.closed_place(self._backend, q, self._held_at)
-        except ValueError as error:
+        chosen = self._chosen
+        found, error = self._closed(q, chosen)
+        if chosen is not None and (found is None or chosen.lost_at(found) is not None):
+            other = self._rechosen()
+            again = None if other is None else self._closed(q, other)[0]
+            if again is not None:
+                found, chosen = again, other
+        if found is None:
             with without_gradient(q):
-                reason = self._leap(q) or self._dead_point(self._furthest(self._last[1], q), NEAR)
-            raise ValueError(f"at t = {t:g} s {reason or error}") from None
-        reason = self._dead_point(found)
-        if reason is not None:
-            raise ValueError(f"at t = {t:g} s {reason}")
+                raise ValueError(f"at t = {t:g} s {self._leap(q) or error}") from None
+        if chosen is not None:
+            worst = chosen.lost_at(found)
+            if worst is not None:
+                raise ValueError(f"at t = {t:g} s {self._singular(found, worst)}")
+            self._chosen = chosen.after(found)
         self._last = q, found
         return found
 
-    def close_ties(self, t: float, q: Numbers) -> Numbers:
-        """Return q (..., n) with its dependent joints where the constraints want them."""
-        place = self.place(t, q)
+    def settled(self, t: float, q: Numbers) -> ClosedPlace:
+        """Return the closed place beside q (..., n), from whose positions the next step begins.
+
+        Here other independent joints are chosen in time: within a step they would cost its order, for its
+        stages are less exact than its end.
+        """
+        place, chosen = self.place(t, q), self._chosen
+        if chosen is not None:
+            part = chosen.part_left(place)
+            if part < chosen.weak:
+                other = self._rechosen()
+                again = None if other is None else self._closed(place.q, other)[0]
+                if again is None:
+                    self._chosen = replace(chosen, weak=part / 2.0)
+                else:
+                    place, self._chosen = again, other
         self._last = place.q, place
-        return place.q
+        return place
 
     def acceleration(self, t: float, q: Numbers, qd: Numbers, tau: Numbers, passive: bool) -> Numbers:
-        """Return the accelerations of the independent joints, (..., m)."""
+        """Return the accelerations of all joints, (..., n)."""
         place = self.place(t, q)
         return self._ties.acceleration(self._backend, place, qd, tau, passive)
+
+    def _closed(self, q: Numbers, chosen: "Followed | None") -> tuple[ClosedPlace | None, str]:
+        """Return the closed place beside q, or None and why there is none."""
+        columns = None if chosen is None else chosen.columns
+        try:
+            return self._ties.closed_place(self._backend, q, self._held_at, columns), ""
+        except ValueError as error:
+            return None, str(error)
+
+    def _rechosen(self) -> "Followed | None":
+        """Return the independent joints that pivoting finds at the last place; None where these are those."""
+        place = self._last[1]
+        rows = array_of(place.rows).astype(float)
+        old, count = array_of(place.found.columns.independent), place.found.columns.dependent.shape[-1]
+        flat = rows.reshape(-1, *rows.shape[-2:])
+        chosen = [chosen_independent(own, rank=count) for own in flat]
+        shape = (*rows.shape[:-2], len(chosen[0]))
+        if (np.array(chosen).reshape(shape) == old).all():
+            return None
+        tables = [joint_columns(own, rows.shape[-1]) for own in chosen]
+        columns = (np.stack([array_of(a) for a in of]) for of in zip(*tables, strict=True))
+        kept = (a.reshape(*rows.shape[:-2], a.shape[-1]) for a in columns)
+        made = JointColumns(*(self._backend.index(a, place.q) for a in kept))
+        return Followed.at(place.rows, made, place.unit_rows)
 
     def _leap(self, q: Numbers) -> str | None:
         """Return a message if independent joints leap away from where they were, else None."""
@@ -85,57 +136,62 @@ class TiedMotion:
         far = np.abs(array_of(place.own(q - place.q)))
         if not far.max(initial=0.0) > LEAP:
             return None
-        joint = self._ties.independent[int(far.reshape(-1, far.shape[-1]).max(0).argmax())]
+        sample = np.unravel_index(far.argmax(), far.shape)
+        own = place.found.columns.of([int(k) for k in sample[:-1]]).independent.tolist()
+        joint = self._backend.structure.joint_names[own[int(sample[-1])]]
         return (
             f"{joint} leaps by {far.max():.3g}: take smaller steps, or look at the torques; next to a "
             "singular mass matrix, as of a base pitched by 90 degrees, accelerations have no bound"
         )
 
-    def _furthest(self, place: ClosedPlace, q: Numbers) -> ClosedPlace:
-        """Return the last place that closes on the straight way of the independent joints to q."""
-        way, reached = q - place.q, 0.0
-        for k in range(1, HALVES):
-            tried = reached + 0.5**k
-            # Dependent joints start from the last place that closed, not from far along the way.
-            mover = place.velocity(place.own(way)) * (tried - reached)
-            try:
-                place = self._ties.closed_place(self._backend, place.q + mover, self._held_at)
-            except ValueError:
-                continue
-            reached = tried
-        return place
+    def _singular(self, place: ClosedPlace, sample: list[int]) -> str:
+        """Return where the motion leads, with the joints that are free there."""
+        rows, columns = array_of(place.rows)[tuple(sample)], place.found.columns.of(sample)
+        free = left_free(rows, columns, self._backend.structure.joint_names, "")
+        return (
+            f"the motion comes to a singular position{sample_of(sample)}, from which it can go on in more "
+            f"than one way, or its steps are too long to tell: {free}"
+        )
 
-    def _dead_point(self, place: ClosedPlace, near: float = 1.0) -> str | None:
-        """Return why independent joints go no further than a place; None where they do."""
-        if is_traced(place.q):
+
+@dataclass(frozen=True)
+class Followed:
+    """Independent joints of a motion, and how others followed them where they were chosen and last."""
+
+    columns: JointColumns
+    left: NDArray[np.floating]
+    """Least part of a column of A_d that was left where they were chosen, (...,)."""
+    factors: tuple[NDArray[np.floating], NDArray[np.floating]]
+    """Factors Q and R of A_d at the last place."""
+    weak: float = WEAK
+    """Part below which others are looked for."""
+
+    @classmethod
+    def at(cls, rows: Numbers, columns: JointColumns, unit_rows: bool) -> "Followed | None":
+        """Return how well others follow where rows are A (..., C, n); None where nobody may look."""
+        if is_traced(rows):
             return None
-        left, turned = _left_of(place), _turning(place)
-        passed = None if turned is None or self._turned is None else turned != self._turned
-        if not left.min(initial=1.0) < near * self._dead and (passed is None or not passed.any()):
-            return None
-        worst = left.argmin() if passed is None or not passed.any() else passed.argmax()
-        at = np.unravel_index(worst, left.shape)
-        values = array_of(place.rows[at])
-        own, names = self._ties.independent, self._backend.structure.joint_names
-        told = why_not_following(values.astype(float), place.found.columns, NEAR * self._dead, names, "")
-        go = "goes" if len(own) == 1 else "go"
-        return f"{listed(own)} {go} no further{sample_of([int(k) for k in at])}: {told}"
+        factors = factor_dependent(rows, columns)
+        return cls(columns, least_left(factors[1], unit_rows), (array_of(factors[0]), array_of(factors[1])))
 
+    def after(self, place: ClosedPlace) -> "Followed":
+        """Return the same joints, last at a place."""
+        return replace(self, factors=(array_of(place.factors[0]), array_of(place.factors[1])))
 
-def _left_of(place: ClosedPlace) -> NDArray[np.floating]:
-    return least_left(place.triangle, place.unit_rows)
+    def part_left(self, place: ClosedPlace) -> float:
+        """Return the least part that is left at a place of what there was."""
+        return float((least_left(place.factors[1], place.unit_rows) / self.left).min(initial=1.0))
 
+    def lost_at(self, place: ClosedPlace) -> list[int] | None:
+        """Return the first sample whose independent joints tell the others no more, or None."""
+        lost = (least_left(place.factors[1], place.unit_rows) < DEAD * self.left) | self._turned(place)
+        return [int(k) for k in np.argwhere(lost)[0]] if lost.any() else None
 
-def _turning(place: ClosedPlace) -> NDArray[np.bool_] | None:
-    """Return the sign of det A_d (...,), which a dead point between two places changes; None without one.
-
-    Of ties positions alone tell: steps do not lead across.
-    """
-    dependent = array_of(place.found.columns.dependent)
-    if not place.unit_rows or is_traced(place.q) or place.rows.shape[-2] != len(dependent):
-        return None
-    signs = np.linalg.slogdet(array_of(place.rows)[..., dependent])[0]
-    return np.asarray(signs > 0.0)
+    def _turned(self, place: ClosedPlace) -> NDArray[np.bool_]:
+        """Return whether det Q_last^T A_d has another sign than det R_last, (...,)."""
+        orthogonal, triangle = self.factors
+        now = np.linalg.slogdet(orthogonal.mT @ array_of(place.found.columns.others(place.rows)))[0]
+        return np.asarray(now * np.sign(triangle.diagonal(0, -2, -1)).prod(-1) < 0.0)
 
 
 Given = Callable[[float, Numbers, Numbers], object]
@@ -148,7 +204,7 @@ class State(NamedTuple):
     q: Numbers
     """Positions of all joints, (..., n)."""
     v: Numbers
-    """Velocities of all joints, (..., n), or of the independent ones, (..., m)."""
+    """Velocities of all joints, (..., n); under constraints those of the independent ones count."""
     work: Numbers
     """Work W, (...)."""
 
@@ -180,7 +236,7 @@ class EquationsOfMotion:
         if self.ties is None:
             return state.q, state.v
         place = self.ties.place(t, state.q)
-        return place.q, place.velocity(state.v)
+        return place.q, place.velocity(place.own(state.v))
 
     def rates(self, t: float, state: State) -> State:
         """Return the rates of a state."""
@@ -204,7 +260,7 @@ class EquationsOfMotion:
     def _accelerated(
         self, t: float, asked: Numbers, q: Numbers, qd: Numbers, given: Numbers, passive: bool
     ) -> Numbers:
-        """Return accelerations of all joints, or of the independent ones at the place for `asked`."""
+        """Return the accelerations of all joints, under constraints at the place for `asked`."""
         if self.ties is not None:
             return self.ties.acceleration(t, asked, qd, given, passive)
         answers = self.backend.answers
@@ -212,8 +268,11 @@ class EquationsOfMotion:
         return solve(q, qd, given)[0]
 
     def close_ties(self, t: float, state: State) -> State:
-        """Return the state with its dependent joints where the constraints want them."""
-        return state if self.ties is None else state._replace(q=self.ties.close_ties(t, state.q))
+        """Return the state with its dependent joints, and their velocities, as the constraints want them."""
+        if self.ties is None:
+            return state
+        place = self.ties.settled(t, state.q)
+        return state._replace(q=place.q, v=place.velocity(place.own(state.v)))
 
     def torques(self, t: float, q: Numbers, qd: Numbers) -> Numbers:
         """Return the torques of the actuators, (..., n)."""

@@ -44,18 +44,20 @@ def in_fixed_steps(
 
 def by_scipy(
     rates: Rates,
+    settle: Rates,
     start: State,
     times: Sequence[float],
     method: str,
     step: float | None,
     tolerances: tuple[float, float],
 ) -> Iterator[State]:
-    """Return states at `times`, of NumPy arrays, by steps whose errors are each within the tolerances.
+    """Yield states at `times`, of NumPy arrays, by steps whose errors are each within the tolerances.
 
+    settle: function of an instant and the state after each step, which is told of it
     Raises ImportError without SciPy, ValueError where the solver gives up.
     """
     try:
-        solve_ivp = import_module("scipy.integrate").solve_ivp
+        solvers = import_module("scipy.integrate")
     except ImportError:
         raise ImportError(
             f"method {method!r} is SciPy's, which is not installed here: pip install scipy, or take method "
@@ -67,16 +69,22 @@ def by_scipy(
     def flat_rates(t: float, values: NDArray[np.float64]) -> NDArray[np.float64]:
         return _flat(rates(float(t), _shaped(values, exact)))
 
-    if len(times) == 1:
-        return iter([start])
-    span, most = (times[0], times[-1]), math.inf if step is None else step
-    rtol, atol = tolerances
-    found = solve_ivp(
-        flat_rates, span, _flat(exact), method, t_eval=times, max_step=most, rtol=rtol, atol=atol
+    yield start
+    rest, (rtol, atol) = list(times[1:]), tolerances
+    if not rest:
+        return
+    most = math.inf if step is None else step
+    solver = getattr(solvers, method)(
+        flat_rates, times[0], _flat(exact), times[-1], max_step=most, rtol=rtol, atol=atol
     )
-    if not found.success:
-        raise ValueError(f"{method} gave up after t = {times[max(0, found.t.size - 1)]:g} s: {found.message}")
-    return (_shaped(values, start) for values in found.y.T)
+    while rest:
+        message = solver.step()
+        if solver.status == "failed":
+            raise ValueError(f"{method} gave up after t = {solver.t:g} s: {message}")
+        settle(float(solver.t), _shaped(solver.y, exact))
+        between = solver.dense_output()
+        while rest and rest[0] <= solver.t:
+            yield _shaped(between(rest.pop(0)), start)
 
 
 def _step(rates: Rates, t: float, length: float, state: State) -> State:
@@ -157,7 +165,7 @@ def simulate_motion(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
                 f"method {asked.method!r} computes with arrays and keeps no gradient; take 'RK4', or load "
                 "numpy"
             )
-        states = by_scipy(equations.rates, state, times, asked.method, step, tolerances)
+        states = by_scipy(equations.rates, equations.close_ties, state, times, asked.method, step, tolerances)
     else:
         raise ValueError(f"method is {short(asked.method)}; choose RK4 or, of SciPy, {', '.join(ADAPTIVE)}")
     return _collected(equations, times, _finite(states, times, start))
@@ -182,7 +190,7 @@ def _started(
         return free, State(q, qd, work)
     place = constraints.ties.closed_place(free.backend, q, q)
     ties = TiedMotion(constraints.ties, free.backend, place)
-    return replace(free, ties=ties), State(place.q, place.own(qd), work)
+    return replace(free, ties=ties), State(place.q, place.velocity(place.own(qd)), work)
 
 
 def _finite(states: Iterator[State], times: Sequence[float], like: Numbers) -> Iterator[State]:
