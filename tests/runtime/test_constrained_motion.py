@@ -11,8 +11,8 @@ import pytest
 import sympy as sp
 from conftest import DATA, needs_compiler
 from helpers.answers import relative_error
-from linkwise.package.load import import_package
 from linkwise import generate, read_system, write_package
+from linkwise.package.load import import_package
 from linkwise_runtime.constraints.tie_rows import TieRows
 
 torch = pytest.importorskip("torch")
