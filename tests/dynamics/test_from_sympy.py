@@ -128,3 +128,45 @@ def test_what_is_no_system_is_refused() -> None:
         LinkwiseError, match=r"from_sympy takes a sympy\.physics\.mechanics\.System, and got 3"
     ):
         from_sympy(3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("are_numbers", [False, True])
+def test_a_weight_is_that_of_its_own_body_though_another_holds_its_masscenter(
+    are_numbers: bool, tmp_path: Path
+) -> None:
+    """A wheel turns about its masscenter, at the end of a rod; gravity along axes that stand still, tilted."""
+    values = {} if are_numbers else {M: 1.7, m: 0.4, r: 0.6, g: 9.81}
+    heavy, light, length, fall = (1.7, 0.4, 0.6, 9.81) if are_numbers else (M, m, r, g)
+    wall, rod, wheel = RigidBody("wall"), RigidBody("rod", mass=light), RigidBody("wheel", mass=heavy)
+    system = System.from_newtonian(wall)
+    end = -length * rod.y
+    system.add_joints(
+        PinJoint("hip", wall, rod, THETA, OMEGA, joint_axis=wall.z, child_point=length * rod.y),
+        PinJoint("axle", rod, wheel, *dynamicsymbols("turn spin"), joint_axis=rod.z, parent_point=end),
+    )
+    tilted = wall.frame.orientnew("G", "axis", [sp.Rational(3, 10), wall.z])
+    system.apply_uniform_gravity(-fall * tilted.y)
+    inertias = {s for b in (rod, wheel) for s in b.central_inertia.to_matrix(b.frame).free_symbols}
+    robot = loaded(from_sympy(system, values | dict.fromkeys(sorted(inertias, key=str), 0.02)), tmp_path)
+    assert robot.share_names == ("gravity",)
+    swing = 9.81 * 0.6 * np.sin(0.8 - 0.3)
+    weights = robot.named_shares(np.array([0.8, 0.2]), np.zeros(2))
+    np.testing.assert_allclose(weights[..., 0], [[0.4 * swing, 2 * 1.7 * swing], [0, 0]], atol=1e-12)
+
+
+def test_a_force_that_gives_all_bodies_another_acceleration_is_no_gravity(tmp_path: Path) -> None:
+    cart, pole = Particle("cart", Point("C"), 2.0), Particle("pole", Point("P"), 0.3)
+    frame, origin = ReferenceFrame("N"), Point("O")
+    origin.set_vel(frame, 0)
+    system = System(frame, origin)
+    cart.masscenter.set_pos(origin, X * frame.x)
+    pole.masscenter.set_pos(origin, THETA * frame.x)
+    for body in (cart, pole):
+        body.masscenter.set_vel(frame, body.masscenter.pos_from(origin).dt(frame))
+    system.add_bodies(cart, pole)
+    system.add_coordinates(X, THETA)
+    system.add_speeds(U, OMEGA)
+    system.add_kdes(U - X.diff(T), OMEGA - THETA.diff(T))
+    system.add_loads(Force(cart.masscenter, 6 * frame.x), Force(pole.masscenter, 6 * frame.x))
+    robot = loaded(from_sympy(system, units={X: "m", THETA: "m"}), tmp_path)
+    assert robot.share_names == ("force",)

@@ -37,8 +37,10 @@ def from_sympy(
     units: rad or m of each coordinate that is not that of a pin or prismatic joint, {x: "m"}
     name: of the robot
 
-    A body's `potential_energy` is the share `potential`; uniform gravity on masscenters is `gravity`; what
-    actuators do is called after their class, and what other loads do `force`. Constraints are called
+    A body's `potential_energy` is the share `potential`; uniform gravity on masscenters is `gravity`, where
+    masses are symbols, or are numbers and all bodies have the same: the weight of one body alone might be any
+    force. What actuators do is called after their class, and what other loads do `force`: those on a point,
+    or a frame, that is fixed to several bodies count for the first of them. Constraints are called
     `holonomic 1`, `nonholonomic 1` and so on. Raises LinkwiseError for velocity constraints of its own, for a
     coordinate without a unit, for kinematic equations that do not give the speeds, and as `energy_system`
     does.
@@ -71,6 +73,8 @@ class _SystemReader:
         self.rates = [q.diff(dynamicsymbols._t) for q in self.positions]
         self._speeds = _speeds(system, self.rates)
         self._loads = list(_named_loads(system))
+        self._masscenters = [body.masscenter for body in system.bodies]
+        self._fields = self._fields_of_all(system.bodies)
 
     def link(self, body: RigidBody | Particle) -> LinkEnergy:
         """Return the energies of a body, and the loads on it."""
@@ -80,11 +84,11 @@ class _SystemReader:
                 potential[POTENTIAL] = self._plain(body.potential_energy)
             forces: dict[str, dict[sp.Expr, sp.Expr]] = {}
             for at, (name, load) in enumerate(self._loads):
-                if load is None or not _acts_on(load, body):
+                if load is None or not self._acts_on(load, body):
                     continue
                 self._loads[at] = (name, None)
                 field = _field(load, body, self.frame)
-                if field is not None:
+                if field is not None and (sp.sympify(body.mass).free_symbols or field in self._fields):
                     place = body.masscenter.pos_from(self.origin)
                     potential[GRAVITY] = potential.get(GRAVITY, 0) - body.mass * field.dot(place)
                 else:
@@ -113,6 +117,24 @@ class _SystemReader:
             for kind, found in kinds.items()
             for number, zero in enumerate(found, 1)
         }
+
+    def _acts_on(self, load: Force | Torque, body: Any) -> bool:
+        """Return whether a load is on a body: on its masscenter or a point fixed to it, or on its frame."""
+        if isinstance(load, Torque):
+            return isinstance(body, RigidBody) and load.frame == body.frame
+        if load.point in self._masscenters:  # another body may have it fixed, as a rod has a wheel's
+            return bool(load.point == body.masscenter)
+        return isinstance(body, RigidBody) and _is_fixed(load.point, body)
+
+    def _fields_of_all(self, bodies: Sequence[RigidBody | Particle]) -> list[Vector]:
+        """Return the accelerations that loads give to all bodies alike, of two at least."""
+        found = []
+        for body in bodies:
+            own = [load for _, load in self._loads if load is not None and self._acts_on(load, body)]
+            fields = [field for load in own if (field := _field(load, body, self.frame)) is not None]
+            if fields or body.kinetic_energy(self.frame) != 0:
+                found.append(fields)
+        return [field for field in found[0] if all(field in own for own in found)] if len(found) > 1 else []
 
     def _add(self, forces: dict[str, dict[sp.Expr, sp.Expr]], name: str, load: Force | Torque) -> None:
         is_force = isinstance(load, Force)
@@ -176,13 +198,6 @@ def _named_loads(system: System) -> Iterable[tuple[str, Force | Torque | None]]:
             yield type(actuator).__name__, load
 
 
-def _acts_on(load: Force | Torque, body: Any) -> bool:
-    """Return whether a load is on a body: on its masscenter or a point fixed to it, or on its frame."""
-    if isinstance(load, Torque):
-        return isinstance(body, RigidBody) and load.frame == body.frame
-    return load.point == body.masscenter or (isinstance(body, RigidBody) and _is_fixed(load.point, body))
-
-
 def _is_fixed(point: Any, body: RigidBody) -> bool:
     """Return whether a point stands still in a body's frame."""
     try:
@@ -193,15 +208,16 @@ def _is_fixed(point: Any, body: RigidBody) -> bool:
 
 
 def _field(load: Force | Torque, body: Any, frame: ReferenceFrame) -> Vector | None:
-    """Return the acceleration by uniform gravity, if a load is a body's weight in it; else None.
+    """Return the acceleration in a frame that a load gives to a body, if it is constant; else None.
 
-    It is on the masscenter, in proportion to a mass that is a symbol, and else made of constants along axes
-    that stand still: with numbers it could be any constant force.
+    It is on the masscenter, made of constants along axes that stand still, and in proportion to the mass
+    where that is a symbol.
     """
-    if not isinstance(load, Force) or load.point != body.masscenter or not sp.sympify(body.mass).free_symbols:
+    if not isinstance(load, Force) or load.point != body.masscenter or body.mass == 0:
         return None
-    field = load.vector / body.mass
-    parts = [(component, own) for matrix, own in field.args for component in matrix]
+    try:
+        field = (load.vector / body.mass).express(frame).simplify()
+    except ValueError:  # axes that nothing relates to the frame
+        return None
     changing = (AppliedUndef, dynamicsymbols._t, *sp.sympify(body.mass).free_symbols)
-    plain = all(not sp.simplify(component).has(*changing) for component, _ in parts)
-    return field.simplify() if plain and all(own == frame for _, own in parts) else None
+    return None if any(matrix.has(*changing) for matrix, _ in field.args) else field
