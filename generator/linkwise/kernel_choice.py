@@ -42,7 +42,10 @@ def chosen_kernel(
     if choice not in CHOICES:
         raise LinkwiseError(f"no kernel {choice!r}; choose among {', '.join(CHOICES)}")
     if choice == "loops" and isinstance(system, EnergySystem):
-        raise LinkwiseError("--kernel loops goes over rigid bodies, and here are energies; leave it out")
+        told = system.request.get("robot", system.name)
+        raise LinkwiseError(
+            f"{told}: --kernel loops goes over rigid bodies, and here are energies; leave it out"
+        )
     if choice == "loops" and derivation == "energy":
         raise LinkwiseError("--kernel loops derives nothing, and --derivation energy does; leave one out")
     closed = derivation == "energy" or (backends is not None and not set(backends) <= LOOPS.keys())

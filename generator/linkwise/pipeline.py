@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.constraints.constrained_system import constrained_system
-from linkwise.dynamics.derive import Method, derive
+from linkwise.dynamics.derive import Method, check_written, derive
 from linkwise.emit.assemble import checked_identifier, package_files
 from linkwise.emit.backend import BackendFiles, chosen_backends, usual_backends
 from linkwise.emit.derivation import Derivation
@@ -31,7 +31,8 @@ from linkwise.package.entries import KernelKind
 from linkwise.progress import Progress, silent
 from linkwise.robot import Options, read_robot, told_name
 from linkwise.robot.robot import Robot
-from linkwise.symbolic.energy_file import read_energies, with_line
+from linkwise.symbolic.energy_file import read_energies
+from linkwise.symbolic.named_lines import with_line
 from linkwise.symbolic.system import System, rigid_system
 
 PYTHON = ".py"
@@ -42,10 +43,11 @@ def is_program(spec: str | Path) -> bool:
     return Path(spec).suffix == PYTHON and is_file(Path(spec))
 
 
-def read_system(spec: str | Path, options: Options | None = None) -> System:
+def read_system(spec: str | Path, options: Options | None = None, as_made: bool = False) -> System:
     """Return the system of a built-in robot, a robot's file, or a Python file of energies.
 
-    Raises LinkwiseError.
+    Where such a file makes its `system` with numbers, these are taken with `as_made`, though the options ask
+    for symbols. Raises LinkwiseError.
     """
     options = options or Options()
     if is_program(spec):
@@ -55,12 +57,13 @@ def read_system(spec: str | Path, options: Options | None = None) -> System:
                 raise LinkwiseError(
                     f"energies in Python do not accept {', '.join(rigid)}; change the energies"
                 )
-            energies = read_energies(Path(spec), options.parameters != "numeric")
+            energies = read_energies(Path(spec), options.parameters != "numeric", as_made)
             written = replace(energies, request={"robot": told_name(spec), **options.request()})
             try:
+                check_written(written)
                 return constrained_system(written)
             except LinkwiseError as error:
-                raise LinkwiseError(with_line(str(error), Path(spec))) from error
+                raise LinkwiseError(with_line(str(error), Path(spec), {})) from error
     system = rigid_system(read_robot(spec, options))
     with within(str(spec)):
         return constrained_system(system)

@@ -27,6 +27,12 @@ def tell_run(*robots: str | Path) -> None:
         tell(f"note: {robot} is a Python program, which was run", err=True)
 
 
+def is_given(context: typer.Context, option: str) -> bool:
+    """Return whether an option stands on the command line, be it with its default."""
+    source = context.get_parameter_source(option)
+    return source is not None and source.name == "COMMANDLINE"
+
+
 def takes(
     *order: str | EllipsisType, without: Collection[str] = (), **usual: Any
 ) -> Callable[[Command], Command]:

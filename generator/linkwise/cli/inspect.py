@@ -6,17 +6,18 @@ from typing import Annotated, Any
 
 import typer
 from linkwise_runtime.rule.joint_tree import JointTree
+from linkwise_runtime.structure import IMPOSED_MOTION
 
 from linkwise import pipeline
 from linkwise.cli import Json, counted
-from linkwise.cli.flags import RobotName, takes, tell_run
-from linkwise.cli.inspect_page import SUBJECTS, page
+from linkwise.cli.flags import RobotName, is_given, takes, tell_run
+from linkwise.cli.inspect_page import SHARES, SUBJECTS, page, varying
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, listed, printable
 from linkwise.robot import Options, kept_apart, left_out
 from linkwise.robot.robot import Parameter
 from linkwise.symbolic.definition import exact_text, joint_entries, joint_tree
-from linkwise.symbolic.system import EnergySystem, System
+from linkwise.symbolic.system import EnergySystem, Share, System
 
 LESS = "…"
 """Text in place of an end that a joint does not have."""
@@ -29,6 +30,7 @@ app = typer.Typer(add_completion=False)
 @app.command()
 @takes(parameters="symbolic")
 def inspect(
+    context: typer.Context,
     robot: RobotName,
     options: Options,
     details: Annotated[
@@ -38,7 +40,7 @@ def inspect(
     as_json: Json = False,
 ) -> None:
     """Show a robot's joints, links, parameters, and what was merged, locked, ignored or left out."""
-    system, refused = _system(robot, options)
+    system, refused = _system(robot, options, not is_given(context, "parameters"))
     tell_run(robot)
     data = inspection(system, details, refused)
     if as_json:
@@ -48,13 +50,13 @@ def inspect(
     else:
         tree = joint_tree(system)
         ground = [frame.name for frame in tree.frames if frame.joint is None] if tree else None
-        print(page(data, ground, _joint, _moved_link, _constraint))
+        print(page(data, ground, _joint, _moved_link, _constraint, _share))
 
 
-def _system(robot: str, options: Options) -> tuple[System, str]:
+def _system(robot: str, options: Options, as_made: bool) -> tuple[System, str]:
     """Return the system, and why `generate` refuses it as impossible, or else an empty string."""
     try:
-        return pipeline.read_system(robot, options), ""
+        return pipeline.read_system(robot, options, as_made), ""
     except LinkwiseError as error:
         refused = str(error)
         if ALLOWING not in refused:  # it would cost the same again, to be refused again
@@ -91,11 +93,46 @@ def inspection(system: System, details: bool = False, refused: str = "") -> dict
         **(
             _constraints(tree, [c.name for c in system.coordinates]) if tree else _written_constraints(system)
         ),
+        **_shares(system),
         **({"frames": _frames(tree)} if details and tree else {}),
         "parameters": [asdict(parameter) for parameter in parameters(system)],
         "notes": [asdict(note) for note in notes],
         "refused": refused,
     }
+
+
+def _shares(system: System) -> dict[str, Any]:
+    """Return what each named share of energies is made of, time and inputs; empty for rigid bodies."""
+    if not isinstance(system, EnergySystem):
+        return {}
+    found = [
+        {
+            "name": name,
+            "kinds": [*dict.fromkeys(kind for _, share in own for kind in _kinds(share))],
+            "links": [link for link, _ in own],
+        }
+        for name in system.share_names
+        for own in [
+            [(link.name, share) for link in system.links for share in link.shares if share.name == name]
+        ]
+    ]
+    varying = {
+        "time": None if system.time is None else system.time.name,
+        "inputs": [symbol.name for symbol in system.inputs],
+    }
+    return {"shares": found, **varying}
+
+
+def _kinds(share: Share) -> list[str]:
+    """Return what a share is given by."""
+    if share.name == IMPOSED_MOTION:
+        return ["kinetic energy"]
+    given = {
+        "potential": share.potential != 0 or share.motion != 0,
+        "dissipation": share.dissipation != 0,
+        "force": bool(share.forces),
+    }
+    return [kind for kind, is_there in given.items() if is_there]
 
 
 def _written_constraints(system: System) -> dict[str, Any]:
@@ -172,6 +209,9 @@ def table(data: dict[str, Any]) -> str:
         lines += [_constraint(k, constraint) for k, constraint in enumerate(data["constraints"], 1)]
         lines.append(f"  independent: {', '.join(data['independent'])}")
         lines.append(f"  dependent: {', '.join(data['dependent'])}")
+    if data.get("shares"):
+        lines += ["", SHARES, *(_share(k, share) for k, share in enumerate(data["shares"], 1))]
+    lines += varying(data)
     if "frames" in data:
         lines += ["", "frames (of `kinematics`; on which link)"]
         lines += [f"  {f['name']}  ({f['link'] or 'the ground'})" for f in data["frames"]]
@@ -207,6 +247,10 @@ def _moved_link(number: int, link: dict[str, Any]) -> str:
 
 def _constraint(_: int, constraint: dict[str, Any]) -> str:
     return f"  {constraint['name']}  ({_held(constraint)})"
+
+
+def _share(_: int, share: dict[str, Any]) -> str:
+    return f"  {share['name']}  ({', '.join(share['kinds'])} of {listed(share['links'], SUBJECTS)})"
 
 
 def _limits(joint: dict[str, Any]) -> str:

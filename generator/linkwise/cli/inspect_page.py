@@ -12,17 +12,22 @@ SUBJECTS = 4
 """Most subjects of a remark; if there are fewer, they are shown with their details."""
 LONGEST = 90
 """Most characters of a subject with its details."""
+SHARES = "shares (of torques; of what, in which links)"
+"""Title of the table of shares that have a name."""
 OF_DETAILS = ("constraint", "promoted")
 """Kinds of remarks that tables with --details contain."""
 
 Row = Callable[[int, dict[str, Any]], str]
 
 
-def page(data: dict[str, Any], ground: Sequence[str] | None, joint: Row, link: Row, held: Row) -> str:
+def page(
+    data: dict[str, Any], ground: Sequence[str] | None, joint: Row, link: Row, held: Row, share: Row
+) -> str:
     """Return lines for a person, of `inspection`'s data; no more for a large robot than for a small one.
 
     ground: frames that stand still, none on a floating base; None where that is not known
-    joint, link, held: functions for the row of a joint, a link, a constraint, with its number from 1
+    joint, link, held, share: functions for the row of one of them, held being a constraint, with its number
+    from 1
     """
     lines = [_title(data)]
     if ground is not None:
@@ -37,11 +42,20 @@ def page(data: dict[str, Any], ground: Sequence[str] | None, joint: Row, link: R
     lines += _rows("constraints (of `robot.constraints`; on what)", data.get("constraints", ()), held)
     if "independent" in data:
         lines += [f"  {what}: {listed(data[what], ROWS)}" for what in ("independent", "dependent")]
+    lines += _rows(SHARES, data.get("shares", ()), share)
+    lines += varying(data)
     if data["parameters"]:
         count = counted(len(data["parameters"]), "parameter")
         lines += ["", f"{count} (of `load`, generated with --parameters symbolic or nonzero)"]
     lines += ["", *_remarks(note for note in data["notes"] if not note["effect"])]
     return "\n".join(map(printable, (*lines, "--details shows all")))
+
+
+def varying(data: dict[str, Any]) -> list[str]:
+    """Return lines on time and inputs, if energies have them."""
+    given = [f"time: {data['time']}"] if data.get("time") else []
+    given += [f"inputs: {listed(data['inputs'], ROWS)}"] if data.get("inputs") else []
+    return ["", f"given at run time (robot.at): {'; '.join(given)}"] if given else []
 
 
 def _title(data: dict[str, Any]) -> str:

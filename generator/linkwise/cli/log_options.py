@@ -11,6 +11,7 @@ import typer
 from linkwise.analysis.opened_robot import OpenedRobot, load_robot
 from linkwise.cli import tell
 from linkwise.cli.flags import tell_run
+from linkwise.errors import LinkwiseError
 from linkwise.package_cache import kept_package
 from linkwise.progress import Progress
 from linkwise.robot import Options
@@ -43,4 +44,7 @@ def opened_robot(robot: Path, backend: str | None, options: Options, progress: P
     tell_run(robot)
     for warning in kept.warnings:
         tell(f"warning: {warning}", err=True)
-    return load_robot(kept.directory, backend)
+    try:
+        return load_robot(kept.directory, backend)
+    except LinkwiseError as error:  # names the file of the user's, not the package that is kept of it
+        raise LinkwiseError(str(error).replace(str(kept.directory), str(robot))) from error

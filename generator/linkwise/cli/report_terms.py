@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from linkwise.cli import BUDGET, Budget, Json, LinkName, ReportOut, tell
-from linkwise.cli.flags import RobotName, takes, tell_run
+from linkwise.cli.flags import RobotName, is_given, takes, tell_run
 from linkwise.errors import LinkwiseError
 from linkwise.output import write_files
 from linkwise.package.write import require_free
@@ -29,6 +29,7 @@ app = typer.Typer(add_completion=False)
 @app.command()
 @takes(parameters="nonzero")
 def terms(
+    context: typer.Context,
     robot: RobotName,
     options: Options,
     joint: Annotated[str, typer.Option(help="Joint i: its name, its number from 1, or all")] = "1",
@@ -49,7 +50,7 @@ def terms(
         raise LinkwiseError(
             f"--order is {order}; choose 2 for acceleration, 1 for velocity, 0 for gravity and potentials"
         )
-    system = read_system(robot, options)
+    system = read_system(robot, options, as_made=not is_given(context, "parameters"))
     tell_run(robot)
     joints, links = [c.name for c in system.coordinates], system.link_names
     query = TermQuery(

@@ -65,6 +65,18 @@ def _energy_forms(system: System, link: int) -> LinkForms:
     return euler_lagrange(node(energy.kinetic), [weight], system.path(link), x, False)
 
 
+def check_written(system: EnergySystem) -> None:
+    """Raise LinkwiseError for a function that closed forms do not have, by the link or constraint with it."""
+    lower, _ = lowering(system)
+    for link in system.links:
+        with within(f"link {link.name!r}"):
+            for part in (link.kinetic, *(part for share in link.shares for part in share.parts())):
+                lower(part)
+    for one in system.constraints:
+        with within(f"constraint {one.name!r}"):
+            lower(one.expression)
+
+
 def derive(system: System, progress: Progress = silent, method: Method = "rule") -> tuple[LinkForms, ...]:
     """Return the closed forms of every link, each on a graph of its own."""
     links = []

@@ -77,7 +77,26 @@ def written_terms(link: LinkEnergy, motion: WrittenMotion) -> GivenTerms:
         if len(by_joint) < len(given):
             raise LinkwiseError(f"its force{_called(name, FORCE)} names a coordinate twice")
         terms.forces[name] = by_joint
+    _check_apart(terms)
     return terms.mapped(motion.plain)
+
+
+def _check_apart(terms: GivenTerms) -> None:
+    """Raise LinkwiseError for a name that two kinds have: their shares would be one, without a word."""
+    given = (
+        *(("potential", name, expr != 0) for name, expr in terms.potential.items()),
+        *(("dissipation", name, expr != 0) for name, expr in terms.dissipation.items()),
+        *(("force", name, any(q != 0 for q in by_joint.values())) for name, by_joint in terms.forces.items()),
+    )
+    by_name: dict[str, str] = {}
+    for kind, name, counts in given:
+        if counts:
+            if name in by_name:
+                raise LinkwiseError(
+                    f"its {by_name[name]} and its {kind} are both called {name!r}, and would be one share; "
+                    "give each a name of its own"
+                )
+            by_name[name] = kind
 
 
 def sorted_terms(

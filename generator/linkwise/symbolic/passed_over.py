@@ -19,24 +19,30 @@ SCOPES = (ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 ASSIGNMENTS = (ast.Assign, ast.AnnAssign, ast.AugAssign)
 
 
-def refuse_passed_over(source: bytes, defined: Mapping[str, object]) -> None:
+def refuse_passed_over(source: bytes, defined: Mapping[str, object], whole: bool = False) -> None:
     """Raise LinkwiseError for a name that the file defines and that neither it nor linkwise reads.
 
     An example is `dissipation`, which would count for nothing. Imports, variables of loops, symbols that are
     not used, and names that begin with _ may be left over.
 
     defined: values by name, after the file has run
+    whole: whether `system` is a whole system, beside which linkwise reads nothing
     """
     tree = ast.parse(source)
     filled = {id(node) for statement in ast.walk(tree) for node in _own_loads(statement)}
     used = {node.id for node in ast.walk(tree) if _is_load(node) and id(node) not in filled}
+    read = ("system",) if whole else READ
     for name, line in _definitions(tree):
         is_left_over = name.startswith("_") or isinstance(defined.get(name), sp.Symbol)
-        if name in defined and name not in used and name not in READ and not is_left_over:
+        if name in defined and name not in used and name not in read and not is_left_over:
+            told = (
+                "beside `system` linkwise reads nothing"
+                if whole
+                else f"linkwise reads {', '.join(nearest_first(name, READ))}"
+            )
             raise LinkwiseError(
-                f"{name!r} in line {line} would count for nothing: linkwise reads "
-                f"{', '.join(nearest_first(name, READ))}, and the file does not use it; remove it, or begin "
-                "its name with _"
+                f"{name!r} in line {line} would count for nothing: {told}, and the file does not use it; "
+                "remove it, or begin its name with _"
             )
 
 

@@ -6,14 +6,15 @@ from sys import float_info
 from typing import Any
 
 import sympy as sp
+from sympy.core.function import AppliedUndef
 
 from linkwise.errors import LinkwiseError, within
-from linkwise.escape import short
+from linkwise.escape import listed, short
 from linkwise.robot.coordinates import check_joints
 from linkwise.robot.robot import Coordinate, unusable
 from linkwise.symbolic.energy_terms import GivenTerms, sorted_terms, symbols_of, written_terms
 from linkwise.symbolic.moving_bodies import BODIES, Particle, RigidBody
-from linkwise.symbolic.system import EnergySystem, LinkEnergy, LinkTerms
+from linkwise.symbolic.system import EnergySystem, LinkEnergy, LinkTerms, WrittenConstraint
 from linkwise.symbolic.written_constraints import written_constraints
 from linkwise.symbolic.written_motion import WrittenMotion
 
@@ -69,6 +70,7 @@ def energy_system(
     held = written_constraints(
         constraints or {}, motion, lambda zero: _known(_whole(zero), motion, values, symbolic), numbers
     )
+    _check_moved(motion, checked, held)
     used |= {symbol for one in held for symbol in one.expression.free_symbols}
     kept = {symbol: value for symbol, value in values.items() if symbolic and symbol in used}
     varying = {symbol: value for symbol, value in motion.varying.items() if symbol in used}
@@ -100,9 +102,10 @@ def _requested(given: Sequence[Any], motion: WrittenMotion, held: bool) -> tuple
 
 def _check_names(name: str, coordinates: tuple[Coordinate, ...], links: tuple[Any, ...]) -> None:
     if not isinstance(name, str):
-        raise LinkwiseError(f"the robot's name is {name!r}; give a string")
-    if not coordinates or not links:
-        raise LinkwiseError("there must be at least one coordinate and one link")
+        raise LinkwiseError(f"`name` is {name!r}; give the robot's name, a string")
+    for what, items in (("coordinates", coordinates), ("links", links)):
+        if not items:
+            raise LinkwiseError(f"`{what}` is empty; give at least one")
     for what, names in (
         ("coordinate", [c.name for c in coordinates]),
         ("link", [k.name for k in links]),
@@ -127,21 +130,23 @@ def _values(parameters: Mapping[sp.Symbol, float], motion: WrittenMotion) -> dic
     for symbol in parameters:
         if symbol in motion.varying:
             raise LinkwiseError(
-                f"{symbol} is time or an input, and stands among `parameters` too; leave it out there: its "
-                "value is given at run time"
+                f"parameter {symbol} is time or an input too; leave it out of `parameters`: its value is given "
+                "at run time"
             )
     for name, count in Counter(symbol.name for symbol in (*parameters, *motion.varying)).items():
         if count > 1:
             raise LinkwiseError(
-                f"{count} different parameters are called {name}, told apart by their assumptions only; "
-                "rename all but one"
+                f"the parameters called {name} are {count} different symbols, told apart by their assumptions "
+                "only; rename all but one"
             )
     values = {}
     for symbol, value in parameters.items():
         if symbol in {*motion.positions, *motion.velocities}:
-            raise LinkwiseError(f"{symbol} is both a coordinate and a parameter; rename one")
+            raise LinkwiseError(f"parameter {symbol} is a coordinate or its velocity too; rename one")
         if isinstance(value, (str, bytes, bool)):
             raise LinkwiseError(f"parameter {symbol} is {short(repr(value))}; give a number, without quotes")
+        if isinstance(value, sp.Basic) and (varying := value.atoms(AppliedUndef) or value.free_symbols):
+            raise LinkwiseError(_not_constant(symbol, value, varying, motion))
         try:
             values[symbol] = float(value)
         except (TypeError, ValueError, OverflowError):
@@ -149,6 +154,37 @@ def _values(parameters: Mapping[sp.Symbol, float], motion: WrittenMotion) -> dic
         if fault := unusable(values[symbol]):
             raise LinkwiseError(f"parameter {symbol} has {fault} for a value; give a number")
     return values
+
+
+def _not_constant(symbol: sp.Symbol, value: sp.Basic, varying: Iterable[Any], motion: WrittenMotion) -> str:
+    """Return how to mend a parameter whose value depends on something."""
+    what = listed(f"time {one}" if one == motion.time else one for one in sorted(varying, key=str))
+    return (
+        f"parameter {symbol} is a constant, and its value {short(str(value))} depends on {what}; write that "
+        f"in the energies in place of {symbol}, `time` being the symbol of time, or make {symbol} an input"
+    )
+
+
+def _check_moved(
+    motion: WrittenMotion, links: Iterable[LinkTerms], constraints: Iterable[WrittenConstraint]
+) -> None:
+    """Raise LinkwiseError for a coordinate without velocity.
+
+    A damper, a magnet, or a constraint may tell the motion or the torque of one without a kinetic energy.
+    """
+    parts = [
+        part
+        for link in links
+        for part in (link.kinetic, *(p for share in link.shares for p in share.parts()))
+    ]
+    held = [one.expression for one in constraints]
+    for c in motion.coordinates:
+        if not any(part.has(c.qd) for part in parts) and not any(zero.has(c.q, c.qd) for zero in held):
+            raise LinkwiseError(
+                f"coordinate {c.name!r} is without velocity: no kinetic energy has it, nor a dissipation, a "
+                "force or a constraint, so that no acceleration follows from its torque; give what it moves a "
+                "mass, or leave it out"
+            )
 
 
 def _checked(

@@ -76,6 +76,7 @@ class AutogradBackend(TorchBackend):
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return c2, c1, g, tau, h1, each (..., count) in the order of `Layout`."""
+        self._check_quadratic(cast(Tensor, q), cast(Tensor, qd))
         parts: Sequence[Tensor] = self._of_links("decomposition", q, qd, qdd)
         return parts
 
@@ -115,6 +116,13 @@ class AutogradBackend(TorchBackend):
     def graph_parts(self, *asked: Any) -> Any:
         """Return the graphs of a torque's parts, see `Dynamics.graph_parts`."""
         return graph_parts_of(self, *asked)
+
+    def _check_quadratic(self, q: Tensor, qd: Tensor) -> None:
+        if transformed() or torch.compiler.is_compiling() or q.device.type == "meta" or not q.numel():
+            return  # nobody may look at numbers, or there are none
+        p = self.seen_by(q)
+        for link in self.modules:
+            link.check_quadratic(q, qd, p)
 
     def _of_links(self, call: str, *motion: Numbers) -> Any:
         """Return the result of a function of sweeps.py, or of its counterpart inside a transformation.

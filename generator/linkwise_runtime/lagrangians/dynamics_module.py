@@ -1,7 +1,8 @@
 """A robot whose links are torch modules, and which is a torch module itself."""
 
+import copy
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, Self, cast
 
 import torch
 from torch import Tensor
@@ -48,19 +49,36 @@ class LinkModules(torch.nn.Module):
         """Have a module's energies count for a link; its torques and shares follow.
 
         The module has kinetic(q, qd, p) and potential(q, p), tensors of the shape of q[k] in J, of the
-        coordinates of the link's path alone; kinetic energy is of degree two in the velocities. Other links
-        are moved by the package's own numbers. Raises ValueError for a link that is not there, TypeError for
-        another module.
+        coordinates of the link's path alone; kinetic energy is of degree two in the velocities, and calls
+        that coefficients answer refuse another, which training may have made. Other links are moved by the
+        package's own numbers. The module is then links[j].module, and the package's own, which was links[j],
+        undoes this. Raises ValueError for a link that is not there, TypeError for another module.
         """
         own = self[link]
         at = next(j for j in range(len(self)) if self[j] is own)
         self.add_module(self._keys[at], replaced(own, module))
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Have links.link2 = module mean links["link2"] = module."""
+        keys = vars(self).get("_keys", ())
+        if name in keys:
+            self[keys.index(name)] = value
+        else:
+            super().__setattr__(name, value)
 
     def __len__(self) -> int:
         return len(self.names)
 
     def __iter__(self) -> Iterator[PartialLagrangian]:
         return (self[j] for j in range(len(self)))
+
+    def with_values(self, given: RunTimeValues) -> "LinkModules":
+        """Return these modules, with the tensors that they hold, for other run-time parameters."""
+        made = {id(link): copy.copy(link) for link in self}
+        for link in made.values():
+            link._before = (made.get(id(link.before), link.before),)
+            link._backend = AutogradBackend(link._backend.structure, (link,), given)
+        return LinkModules(self.names, made.values())
 
 
 def links_and_values(
@@ -139,6 +157,23 @@ class DynamicsModule(Dynamics, torch.nn.Module):
         self.links, self.values = own.modules, own.given
         Dynamics.__init__(self, structure, backend, load, asked, check_finite)
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refuse other links as a whole: calls would not see them."""
+        if name == "links" and name in self._modules:
+            raise AttributeError("links are replaced one by one: robot.links[j] = module")
+        super().__setattr__(name, value)
+
+    def at(self, **values: Any) -> Self:
+        """Return the robot with other values, as `Dynamics.at` says, and with this robot's modules.
+
+        Both have the same tensors, but for the values given, so that gradients and training reach this one.
+        """
+        robot = super().at(**values)
+        keys = self.values.keys()
+        given = RunTimeValues({name: (robot if name in values else self).values[name] for name in keys})
+        robot._take(self.links.with_values(given), given)
+        return robot
+
     def forward(self, q: Tensor, qd: Tensor, qdd: Tensor) -> Tensor:
         """Return tau_ij, shape (..., n, N)."""
         return self.partial_torque(q, qd, qdd)
@@ -158,10 +193,15 @@ class DynamicsModule(Dynamics, torch.nn.Module):
         """Take over the modules of the robot that this one is a copy of, and whatever else was set there."""
         kept, check_finite = state
         vars(self).update(kept)
+        self._take(self.links, self.values)
+        self.check_finite = check_finite
+
+    def _take(self, links: LinkModules, values: RunTimeValues) -> None:
+        """Compute with these modules and run-time parameters."""
+        self._modules |= {"links": links, "values": values}
         kind: Any = type(self.backend)
-        own: Any = self.backend
-        self.backend = kind(own.structure, self.links, self.values, own.tree)
-        self.door = Door(self.structure, self.backend, check_finite)
+        self.backend = kind(self.structure, links, values, self.backend.tree)
+        self.door = Door(self.structure, self.backend, self.check_finite)
 
 
 class BackendOfLinks(AutogradBackend):

@@ -93,6 +93,9 @@ class Energies(Protocol):
     def potential(self, q: Values, p: Parameters) -> Number:
         """Return the potential energy in J: a tensor of the coordinates' shape, or one number for all."""
 
+    def check_quadratic(self, q: Tensor, qd: Tensor, p: "Parameters") -> None:
+        """Raise ValueError for a kinetic energy of the user's that coefficients of (..., n) do not tell."""
+
 
 def numbers_of(sources: Iterable[torch.nn.Module]) -> Iterator[Tensor]:
     """Yield every tensor that these modules and their submodules hold."""

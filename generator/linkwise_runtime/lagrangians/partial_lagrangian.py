@@ -68,6 +68,9 @@ class PartialLagrangian(Unscripted, torch.nn.Module):
         """Return the potential energy in J."""
         raise NotImplementedError
 
+    def check_quadratic(self, q: Tensor, qd: Tensor, p: Parameters) -> None:
+        """Accept the kinetic energy: linkwise wrote it; a module of the user's is looked at."""
+
     def forward(self, q: Tensor, qd: Tensor) -> Tensor:
         """Return the Lagrangian in J, shape (...); q and qd of shape (..., n)."""
         at, moved = self._read(q=q, qd=qd)
