@@ -101,7 +101,7 @@ def test_generalised_speeds_become_velocities_and_energies_those_of_lagranges_me
 
 FILE = """
 import sympy as sp
-from linkwise import from_sympy
+from linkwise import Coordinate, LinkEnergy, energy_system, from_sympy
 from sympy.physics.mechanics import PrismaticJoint, RigidBody, System
 
 wall, cart = RigidBody("wall"), RigidBody("cart", mass=2)
@@ -113,9 +113,32 @@ _system.add_joints(PrismaticJoint("slide", wall, cart, joint_axis=wall.x))
 def test_a_file_may_hold_a_whole_system(tmp_path: Path) -> None:
     (tmp_path / "cart.py").write_text(FILE + "system = from_sympy(_system, name='cart')\n")
     assert read_system(tmp_path / "cart.py").link_names == ("cart",)
-    (tmp_path / "two.py").write_text(FILE + "system = from_sympy(_system)\nlinks = []\n")
-    with pytest.raises(LinkwiseError, match=r"two\.py: the file defines 'system', and 'links' beside it"):
-        read_system(tmp_path / "two.py")
+    own = "coordinates, links = [Coordinate('x')], [LinkEnergy('a', Coordinate('x').qd ** 2)]\n"
+    made = FILE + own + "system = energy_system('own', coordinates, links)\n"
+    (tmp_path / "own.py").write_text(made)
+    assert read_system(tmp_path / "own.py").link_names == ("a",)
+
+
+@pytest.mark.parametrize(
+    ("written", "message"),
+    [
+        (
+            "system = from_sympy(_system)\nlinks = []",
+            "'links' in line 10 .*: beside `system` linkwise reads noth",
+        ),
+        ("system = _system", "line 9: `system` is a System of sympy.* system = linkwise.from_sympy"),
+        (
+            "system = from_sympy(_system, {\n    cart.mass: 'a'})",
+            "line 9: `parameters` must be a dictionary",
+        ),
+    ],
+)
+def test_what_a_file_gives_for_a_whole_system_is_refused_by_its_line(
+    written: str, message: str, tmp_path: Path
+) -> None:
+    (tmp_path / "cart.py").write_text(FILE + written)
+    with pytest.raises(LinkwiseError, match=f"cart.py: {message}"):
+        read_system(tmp_path / "cart.py")
 
 
 def test_what_is_no_system_is_refused() -> None:
@@ -134,7 +157,7 @@ def test_what_is_no_system_is_refused() -> None:
 def test_a_weight_is_that_of_its_own_body_though_another_holds_its_masscenter(
     are_numbers: bool, tmp_path: Path
 ) -> None:
-    """A wheel turns about its masscenter, at the end of a rod; gravity along axes that stand still, tilted."""
+    """A wheel turns about its masscenter, at the end of a rod; gravity falls along tilted axes."""
     values = {} if are_numbers else {M: 1.7, m: 0.4, r: 0.6, g: 9.81}
     heavy, light, length, fall = (1.7, 0.4, 0.6, 9.81) if are_numbers else (M, m, r, g)
     wall, rod, wheel = RigidBody("wall"), RigidBody("rod", mass=light), RigidBody("wheel", mass=heavy)

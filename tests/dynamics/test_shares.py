@@ -22,7 +22,8 @@ from linkwise import (
     generate,
     write_package,
 )
-from linkwise.analysis import analyze
+from linkwise.analysis import Reading, analyze
+from linkwise.analysis.opened_robot import load_robot
 from linkwise.analysis.show.page import page_data
 from linkwise.escape import column_part
 from linkwise.package.load import import_package
@@ -392,7 +393,7 @@ FUNCTIONS = {
     ),
     "time as a parameter": (
         ({X: "m"}, [X.diff(T) ** 2], {"parameters": {T: 3.0}}),
-        "t is time or an input, and stands among `parameters` too; leave it out there",
+        "parameter t is time or an input too; leave it out of `parameters`",
     ),
 }
 
@@ -433,10 +434,20 @@ def test_an_analysis_has_each_share_as_a_cause_of_its_own(tmp_path: Path) -> Non
     assert {"spring/left", "damper", "gravity"} <= set(labels)
 
 
-def test_logs_of_what_depends_on_time_or_inputs_are_refused(tmp_path: Path) -> None:
-    write_package(generate(crane(), ["numpy"]), tmp_path / "crane")
-    log = write_csv(tmp_path / "log.csv", smooth(40, 2), ["x", "theta"])
-    with pytest.raises(
-        LinkwiseError, match=r"crane: its torques depend on t, F, beside its joints' motion, and logs"
-    ):
+def test_an_analysis_moves_time_and_takes_inputs_from_the_log(tmp_path: Path) -> None:
+    write_package(generate(crane(), ["numpy", "native"]), tmp_path / "crane")
+    robot = import_package(tmp_path / "crane").load("numpy")
+    motion = np.column_stack([smooth(40, 2), np.linspace(-3.0, 4.0, 40)])
+    log = write_csv(tmp_path / "log.csv", motion, ["x", "theta", "drive"])
+    with pytest.raises(LinkwiseError, match=r"no column for input 'F' \(found 'drive'\); name it with --map"):
         analyze(log, tmp_path / "crane")
+    result = analyze(log, tmp_path / "crane", Reading(mapping={"drive": "F"}))
+    here = robot.at(t=result.time, F=motion[:, 3])
+    expected = here.named_shares(result.q, result.qd)
+    assert np.ptp(expected[:, 0], axis=0).max() > 1.0
+    np.testing.assert_allclose(result.named_shares, expected, atol=1e-12)
+    np.testing.assert_allclose(
+        result.torque, here.inverse_dynamics(result.q, result.qd, result.qdd), atol=1e-12
+    )
+    with pytest.raises(LinkwiseError, match="native has one value of for all samples"):
+        load_robot(tmp_path / "crane", "native")

@@ -173,7 +173,7 @@ def test_kinetic_energy_that_training_makes_odd_is_refused_where_shares_are_aske
     with torch.no_grad():
         learned.weight.fill_(0.1)
     assert robot.partial_torque(*motion).isfinite().all()
-    q, qd, qdd = motion
+    q, qd, _ = motion
     calls = [(robot.propagation, motion), (robot.coefficients, (q, qd)), (robot.forward_dynamics, motion)]
     for call, given in calls:
         with pytest.raises(ValueError, match="of a replaced link, Odd, is no quadratic form"):

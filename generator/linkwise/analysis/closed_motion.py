@@ -14,15 +14,20 @@ import numpy as np
 
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.disk_rows import collected
+from linkwise.analysis.filtering import derivatives
 from linkwise.analysis.samples import Samples
+from linkwise.analysis.settings import Processing
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.progress import Progress
 
 BLOCK = 4096
 """Samples closed at once."""
 APART = 16
 """Samples from one led position to the next; those between them are first guessed on a straight line."""
+SLIP = 0.05
+"""Part of a velocity constraint's terms by which a log may break it unsaid: velocities are derived."""
 NEAR = 0.1
 """Distance from its guess, in rad or m, beyond which a joint may have jumped to another way to close."""
 
@@ -61,6 +66,7 @@ def closed_samples(
     """
     if model is None:
         return samples, None
+    _refuse_lost_way(model, there)
     n, missing = len(model.joint_names), [k for k in range(len(model.joint_names)) if k not in there]
     worst = ClosedLog(None if missing else 0.0)
 
@@ -82,6 +88,43 @@ def closed_samples(
 
     whole = collected(blocks(), 1 + n, buffer)
     return replace(samples, time=whole[:, 0], q=whole[:, 1:]), worst
+
+
+def _refuse_lost_way(model: ConstrainedModel, there: Sequence[int]) -> None:
+    """Raise LinkwiseError for columns that constraints of velocities cannot make up for."""
+    written = model.structure.written
+    missing = [name for k, name in enumerate(model.joint_names) if k not in there]
+    if missing and written is not None and not all(written.holonomic):
+        name = next(name for name, own in zip(written.names, written.holonomic, strict=True) if not own)
+        raise LinkwiseError(
+            f"no column for joint {listed(map(repr, missing))}: {name} is a constraint of velocities, from "
+            "which positions of the other joints do not tell where these are; log all"
+        )
+
+
+def slip_warnings(samples: Samples, model: ConstrainedModel | None, processing: Processing) -> Iterator[str]:
+    """Yield a warning for each constraint of velocities, sum_k A_k qd_k = 0, that a log's velocities break.
+
+    The motion that is analysed keeps it: dependent joints move as independent ones want.
+    """
+    written = None if model is None else model.structure.written
+    if model is None or written is None or all(written.holonomic):
+        return
+    moved = [row for row, holds in enumerate(written.holonomic) if not holds]
+    worst, sizes = np.zeros((2, len(moved)))
+    for at in range(0, len(samples.time), BLOCK):
+        end = min(at + BLOCK, len(samples.time))
+        q, qd, _ = derivatives(samples.q, samples.rate, at, end, processing)
+        terms = np.asarray(model.constraints.jacobian(q))[:, moved] * qd[:, None, :]
+        worst = np.maximum(worst, np.abs(terms.sum(-1)).max(0))
+        sizes = np.maximum(sizes, np.abs(terms).sum(-1).max(0))
+    for row, apart, size in zip(moved, worst, sizes, strict=True):
+        if apart > SLIP * size:
+            yield (
+                f"{written.names[row]} is not kept by the log's own velocities, by up to {apart:.3g} where "
+                f"its terms come to {size:.3g}: the motion that is analysed, of "
+                f"{listed(model.constraints.dependent)}, is what the others want"
+            )
 
 
 def _larger(one: ClosedLog, other: ClosedLog) -> ClosedLog:

@@ -49,6 +49,7 @@ def select(
     beside: Collection[str] = (),
     brought: Collection[str] = (),
     coupled: Collection[str] = (),
+    inputs: Collection[str] = (),
 ) -> Selection:
     """Match columns to joints by `reading.mapping`, else by name, also as OpenSim's states name them.
 
@@ -57,6 +58,7 @@ def select(
     brought: columns that the log's format adds by itself
     coupled: joints that follow others by the robot's file; their columns and those of `brought` may be left
     out without `reading.ignore_extra`
+    inputs: those of `joints` that are inputs
 
     Raises LinkwiseError for a joint without a column, a column used twice, and a column without a joint
     where that was not allowed.
@@ -66,7 +68,9 @@ def select(
     at_column = {column: at for at, column in enumerate(columns)}
     used = {*source.values(), columns[time]}
     free = tuple(column for column in columns if column not in used and column not in beside)
-    _refuse_missing([joint for joint, column in source.items() if column not in at_column], free)
+    missing = [joint for joint, column in source.items() if column not in at_column]
+    _refuse_missing("joint", [joint for joint in missing if joint not in inputs], free)
+    _refuse_missing("input", missing, free)
     if not reading.ignore_extra:
         allowed = {*_speeds_of(used), *brought}
         _refuse_extra([one for one in free if one not in allowed and end_of_path(one) not in coupled], source)
@@ -85,11 +89,14 @@ def _speeds_of(positions: Iterable[str]) -> Iterator[str]:
             yield f"{column.removesuffix(STATE)}{SPEED}"
 
 
-def _refuse_missing(joints: Sequence[str], free: Sequence[str]) -> None:
-    """Raise LinkwiseError for joints without a column, with the nearest of the columns without a joint."""
+def _refuse_missing(what: str, joints: Sequence[str], free: Sequence[str]) -> None:
+    """Raise LinkwiseError for joints without a column, with the nearest of the columns without a joint.
+
+    what: joint or input
+    """
     if joints:
         near = with_nearest(joints, [column for column in free if not column.endswith(SPEED)])
-        raise LinkwiseError(f"no column for joint {near}; name it with --map COLUMN={joints[0]}")
+        raise LinkwiseError(f"no column for {what} {near}; name it with --map COLUMN={joints[0]}")
 
 
 def _refuse_extra(columns: Sequence[str], source: Mapping[str, str]) -> None:

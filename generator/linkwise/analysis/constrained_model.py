@@ -4,7 +4,7 @@ tau^_aj = sum_i G_ia tau_ij = sum_b c2^_ajb ydd_b + sum_b c1^_ajb yd_b + g^_aj
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -40,16 +40,21 @@ class ConstrainedModel:
     layout: TermArrays
 
     @classmethod
-    def of(cls, model: Dynamics, tree: JointTree) -> "ConstrainedModel":
-        """Return the model with the ties of its own description."""
+    def of(cls, model: Dynamics, rows: Sequence[frozenset[int]]) -> "ConstrainedModel":
+        """Return the model with the ties of its own description; rows: coordinates that each relates."""
         constraints = model.constraints
         independent = tuple(list(model.joint_names).index(name) for name in constraints.independent)
-        following = Following(independent, movers(tree, len(model.joint_names), independent))
+        following = Following(independent, movers(rows, len(model.joint_names), independent))
         return cls(model, constraints, following, _layout(model.layout, following))
 
     def __getattr__(self, name: str) -> Any:
         """Return what ties do not change: names, and attributes of the open tree."""
         return getattr(self.open, name)
+
+    def at(self, **values: Any) -> "ConstrainedModel":
+        """Return the model at a time, or with inputs, as `Dynamics.at` does."""
+        open_one = self.open.at(**values)
+        return replace(self, open=open_one, constraints=open_one.constraints)
 
     @property
     def kinematics(self) -> "ConstrainedKinematics":
@@ -107,6 +112,12 @@ class ConstrainedModel:
         """
         return tuple(self._projected(q, _array(a)) for a in self.open.passive_torque(q, qd, qdd))
 
+    def named_shares(self, q: Array, qd: Array) -> Array:
+        """Return the shares with names of tau^_aj, (S, n, N, count)."""
+        own = _array(self.open.named_shares(q, qd))
+        projected = _array(self.constraints.projected(q, own.reshape(*own.shape[:2], -1), by_link=True))
+        return self._spread(projected.reshape(*projected.shape[:2], *own.shape[2:]), 1)
+
     def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Return the regressor Y^ of tau^_aj = Y^_aj pi_j, (S, n, N, 10), zero for dependent joints."""
         own = _array(self.open.regressor(q, qd, qdd))
@@ -153,12 +164,8 @@ class ConstrainedKinematics:
         return self._projected(q, _array(self._own.load_torque(q, *load, **options)))
 
 
-def movers(tree: JointTree, n: int, independent: Sequence[int]) -> tuple[frozenset[int], ...]:
-    """Return, for each joint, the independent joints that may move it.
-
-    Dependent joints in one row of the constraints, or in rows that share a dependent joint, form a group that
-    all independent joints of its rows may move.
-    """
+def tied_in_tree(tree: JointTree) -> list[frozenset[int]]:
+    """Return the coordinates that each tie and each coupling of a tree relates."""
     paths: list[frozenset[int]] = []
     for joint in tree.joints:
         before = frozenset[int]() if joint.parent is None else paths[joint.parent]
@@ -169,7 +176,15 @@ def movers(tree: JointTree, n: int, independent: Sequence[int]) -> tuple[frozens
         return frozenset() if carrier is None else paths[carrier]
 
     rows = [path(tie.first) ^ path(tie.second) for tie in tree.ties]
-    rows += [frozenset(k for k, _ in coupling.terms) for coupling in tree.couplings]
+    return rows + [frozenset(k for k, _ in coupling.terms) for coupling in tree.couplings]
+
+
+def movers(rows: Sequence[frozenset[int]], n: int, independent: Sequence[int]) -> tuple[frozenset[int], ...]:
+    """Return, for each joint, the independent joints that may move it.
+
+    rows: coordinates that each row of the constraints relates. Dependent joints in one row, or in rows that
+    share a dependent joint, form a group that all independent joints of its rows may move.
+    """
     own = frozenset(independent)
     groups: list[frozenset[int]] = []
     for row in rows:

@@ -1,11 +1,12 @@
 """One analysis of a log, which is read, filtered and checked for its length before it is carried out."""
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from linkwise.analysis.closed_motion import ClosedLog, closed_samples
+from linkwise.analysis.closed_motion import ClosedLog, closed_samples, slip_warnings
 from linkwise.analysis.column_matching import with_columns
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.times import contact_times, switch_columns
@@ -225,6 +226,8 @@ def prepared(
         span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
+        slips = tuple(slip_warnings(samples, robot.constrained, processing))
+    samples = replace(samples, warnings=(*samples.warnings, *slips))
     borne = placed_loads(asked.loads, robot, samples.time, reading.ignore_extra, progress, buffer)
     times = contact_times(asked.contacts, opened, robot, reading, samples.time, progress, buffer)
     decomposer = Decomposer.of(robot, processing.convention, outputs.power_terms, borne, points, times)
@@ -248,9 +251,11 @@ def _samples(
     switches: columns of the log that say when contacts are on
     """
     with within(str(log.path)):
-        there = with_columns(log.columns, robot.joints, robot.dependent_joints, reading)
-    names, units = (tuple(given[k] for k in there) for given in (robot.joints, robot.units_in_logs))
-    reach = [robot.reach[k] for k in there]
+        every = with_columns(log.columns, (*robot.joints, *robot.inputs), robot.dependent_joints, reading)
+    there = [k for k in every if k < len(robot.joints)]
+    names = (*(robot.joints[k] for k in there), *robot.inputs)
+    units = (*(robot.units_in_logs[k] for k in there), *("" for _ in robot.inputs))
+    reach = [*(robot.reach[k] for k in there), *(math.inf for _ in robot.inputs)]
     samples = read_samples(log, names, units, reading, progress, buffer, switches, reach, robot.followers)
     with within(str(log.path)):
         return closed_samples(samples, there, robot.constrained, reading.loop_tolerance, progress, buffer)

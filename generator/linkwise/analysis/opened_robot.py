@@ -5,9 +5,10 @@ Loads, payloads and contacts find the bodies of the robot's file here, by name.
 
 import hashlib
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
 
@@ -18,16 +19,20 @@ from linkwise_runtime.qpos_motion import Qpos
 from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
 from linkwise_runtime.structure import PassiveJoint, Structure
 
-from linkwise.analysis.constrained_model import ConstrainedModel
+from linkwise.analysis.constrained_model import ConstrainedModel, tied_in_tree
 from linkwise.analysis.contacts.ground import GroundContacts
 from linkwise.analysis.samples import FollowingJoint
 from linkwise.analysis.settings import Payload
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, without_ending
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import Package, open_package
-from linkwise.package.manifest import FILE
+from linkwise.package.manifest import FILE, Manifest
 from linkwise.package.share_word import share_word
+
+IN_POSITIONS, IN_VELOCITIES = re.compile(r"\bq_(\d+)\b"), re.compile(r"\bqd_(\d+)\b")
+"""Coordinates in a written constraint of positions, and those whose velocities are in one of velocities."""
 
 
 def load_unit(unit: str) -> str:
@@ -83,6 +88,26 @@ class OpenedRobot:
         return any(share.forces or {share.motion, share.dissipation} != {"0"} for share in shares)
 
     @property
+    def time_name(self) -> str:
+        """Name of the time on which written energies depend; empty where they do not."""
+        energies = self.package.manifest.energies
+        return "" if energies is None else energies.time
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs of written energies."""
+        return inputs_of(self.package)
+
+    @property
+    def share_rows(self) -> tuple[tuple[int, int, int], ...]:
+        """Joint, link and number of every named share, sorted; of independent joints where some are tied."""
+        own = [(i, j, m) for i, j, m in self.structure.share_rows.tolist()]
+        if self.constrained is not None:
+            movers = self.constrained.following.movers
+            own = [(y, j, m) for i, j, m in own for y in movers[i]]
+        return tuple(sorted(set(own)))
+
+    @property
     def share_names(self) -> tuple[str, ...]:
         """Names of the shares that are not of motion: gravity of rigid links."""
         return self.structure.share_names
@@ -115,6 +140,16 @@ class OpenedRobot:
             )
         found: Qpos = self.package.module.ROBOT.qpos(order, names)
         return found
+
+    def at(self, time: Array, inputs: Array) -> "OpenedRobot":
+        """Return the robot at the time (S,) and with the inputs (S, count) of some samples.
+
+        A robot that depends on neither is itself.
+        """
+        values = dict(zip(self.inputs, inputs.T, strict=True)) if self.inputs else {}
+        if self.time_name:
+            values[self.time_name] = time
+        return replace(self, model=self.model.at(**values)) if values else self
 
     @property
     def units_in_logs(self) -> tuple[str, ...]:
@@ -211,14 +246,15 @@ class OpenedRobot:
 def load_robot(directory: Path, backend: str | None = None) -> OpenedRobot:
     """Import the package in `directory`, with `backend` or the fastest that works here.
 
-    Raises LinkwiseError for a directory without a package, a damaged one, or no back end that loads.
+    Raises LinkwiseError for a directory without a package, a damaged one, or no back end that loads or, where
+    torques depend on time or inputs, answers for samples that have their own.
     """
     package = open_package(directory)
     manifest = package.manifest
-    refuse_varying(package)
-    chosen, model = _load(package, package.fastest_first if backend is None else (backend,))
+    _refuse_one_value(package, backend)
+    chosen, model = _load(package, _backends(package) if backend is None else (backend,))
     tree = manifest.tree
-    tied = ConstrainedModel.of(model, tree) if tree is not None and tree.tied else None
+    tied = ConstrainedModel.of(model, coordinates_tied(manifest)) if manifest.tied else None
     return OpenedRobot(
         manifest.name,
         tuple(model.joint_names),
@@ -236,19 +272,38 @@ def load_robot(directory: Path, backend: str | None = None) -> OpenedRobot:
     )
 
 
-def refuse_varying(package: Package) -> None:
-    """Raise LinkwiseError for time, inputs and constraints of written energies: logs are not for them."""
+def inputs_of(package: Package) -> tuple[str, ...]:
+    """Return the names of the inputs of a package's written energies."""
     energies = package.manifest.energies
-    varying = [] if energies is None else [*filter(None, (energies.time, *energies.inputs))]
-    if varying:
+    return () if energies is None else tuple(energies.inputs)
+
+
+def coordinates_tied(manifest: Manifest) -> list[frozenset[int]]:
+    """Return the coordinates that each row of the constraints relates."""
+    if manifest.energies is None:
+        return [] if manifest.tree is None else tied_in_tree(manifest.tree)
+    rows = manifest.energies.constraints
+    words = (IN_POSITIONS if row.holonomic else IN_VELOCITIES for row in rows)
+    return [
+        frozenset(int(k) for k in word.findall(row.expression)) for row, word in zip(rows, words, strict=True)
+    ]
+
+
+def _is_varying(package: Package) -> bool:
+    energies = package.manifest.energies
+    return energies is not None and bool(energies.time or energies.inputs)
+
+
+def _backends(package: Package) -> tuple[str, ...]:
+    return tuple(name for name in package.fastest_first if not (name == "native" and _is_varying(package)))
+
+
+def _refuse_one_value(package: Package, backend: str | None) -> None:
+    """Raise LinkwiseError for a back end whose parameters have one value for all samples, where they vary."""
+    if _is_varying(package) and (backend == "native" or not _backends(package)):
         raise LinkwiseError(
-            f"{package.directory}: its torques depend on {listed(varying)}, beside its joints' motion, and "
-            "logs are not read for that; ask for them in Python, sample by sample, with robot.at(...)"
-        )
-    if energies is not None and energies.constraints:
-        raise LinkwiseError(
-            f"{package.directory}: constraints that were written with its energies tie its joints, and logs "
-            "are not read for that; ask for its torques in Python, with robot.constraints"
+            f"{package.directory}: its torques depend on time or inputs, which native has one value of for "
+            "all samples; generate it with numpy, and leave --backend native out"
         )
 
 

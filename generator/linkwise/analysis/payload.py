@@ -8,7 +8,7 @@ import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame, TreeJoint, TreeLink
 
-from linkwise.analysis.constrained_model import ConstrainedModel
+from linkwise.analysis.constrained_model import ConstrainedModel, tied_in_tree
 from linkwise.analysis.opened_robot import OpenedRobot, body_frame, told_apart
 from linkwise.analysis.settings import Payload
 from linkwise.analysis.term_rows import NAMES, TermArrays
@@ -91,7 +91,7 @@ def _models(package: Package, tree: JointTree, placed: Sequence[_Placed]) -> lis
         bodies = own._replace(masses=masses, centres=centres, inertias=np.zeros(own.inertias.shape))
         model = package.load(backend, bodies=bodies)
         if tree.tied:
-            model = cast(Dynamics, ConstrainedModel.of(model, tree))
+            model = cast(Dynamics, ConstrainedModel.of(model, tied_in_tree(tree)))
         models.append((at.link, model))
     return models
 

@@ -198,7 +198,7 @@ def torque_places(
     out += [("tau_qdd", (i, j, k)) for i, j, k, _ in terms.acceleration]
     out += [("tau_qd", (i, j, k)) for i, j, k, _ in terms.velocity]
     if robot.is_written:
-        out += [("tau_share", (i, j, m)) for i, j, m in sorted(robot.structure.share_rows.tolist())]
+        out += [("tau_share", (i, j, m)) for i, j, m in robot.share_rows]
     else:
         out += [("tau_gravity", (i, j)) for i, j, _ in terms.gravity]
     own = {name: robot.with_own(field) for name, field in PASSIVE.items()}

@@ -4,7 +4,7 @@ Columns of joints that follow others by the robot's file, or are held, are left 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -38,7 +38,7 @@ CLOCKS = {"ms": 1000, "µs": 10**6, "ns": 10**9}
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Evenly spaced samples: `time` (S,) in s, `q` (S, n) in rad or m, `rate` in Hz."""
+    """Evenly spaced samples: `time` (S,) in s, `q` (S, n) in rad or m, `inputs` (S, m), `rate` in Hz."""
 
     time: Array
     q: Array
@@ -48,6 +48,8 @@ class Samples:
     warnings: tuple[str, ...]
     first_row: int | None = None
     """Number of the first sample's row in the log; None where they were resampled."""
+    inputs: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    """Inputs of written energies; not filtered."""
 
 
 CLOSE = {"rad": 0.01, "m": 0.001}
@@ -151,7 +153,8 @@ def read_samples(
 ) -> Samples:
     """Read, convert to SI and check a log.
 
-    joint_units: one for each joint, "rad" for those that are in degrees in a log in degrees
+    joints: names of the robot's joints in the log, then of its inputs
+    joint_units: one for each joint, "rad" for those that are in degrees in a log in degrees, "" for an input
     buffer: a directory on whose disk, as a rule, a buffer keeps the samples; None keeps them in memory
     beside: columns that are read elsewhere
     reach: the largest magnitude that each joint's limits allow, in its unit, of all joints or none
@@ -160,7 +163,9 @@ def read_samples(
     Raises LinkwiseError that names file, row and column for what cannot be analysed.
     """
     with within(str(log.path)):
-        selection = select(log.columns, joints, reading, beside, log.brought, [one.name for one in followers])
+        inputs = [name for name, unit in zip(joints, joint_units, strict=True) if not unit]
+        coupled = [one.name for one in followers]
+        selection = select(log.columns, joints, reading, beside, log.brought, coupled, inputs)
     angles = [at for at, unit in enumerate(joint_units, 1) if unit == "rad"]
     factor = radians_per_unit(log, reading)
     width = 1 + len(joints)
@@ -189,7 +194,8 @@ def read_samples(
     with within(str(log.path)):
         warnings += _size_warnings(log, reading, joint_units, tuple(largest))
     first_row = log.first_row if reading.resample is None else None
-    return Samples(time, samples[:, 1:], rate, selection.ignored, warnings, first_row)
+    n = 1 + sum(unit != "" for unit in joint_units)
+    return Samples(time, samples[:, 1:n], rate, selection.ignored, warnings, first_row, samples[:, n:])
 
 
 def _size_warnings(

@@ -106,7 +106,9 @@ def stream(
                 end = min(at + inner, last)
                 q, qd, qdd = derivatives(samples.q, samples.rate, at, end, processing)
                 out = block[:, at - first : end - first]
-                if not sums.add(out, decomposer.fill(out, samples.time[at:end], q, qd, qdd)):
+                time = samples.time[at:end]
+                here = decomposer.at(time, samples.inputs[at:end])
+                if not sums.add(out, here.fill(out, time, q, qd, qdd)):
                     raise _overflow(samples, decomposer, out, at)
             sums.closure |= against_recursion(decomposer.robot, decomposer.loads, rows, block)
             sums.closure.check()

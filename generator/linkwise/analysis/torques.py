@@ -1,7 +1,7 @@
 """Torque terms of a block of samples, from its positions, velocities and accelerations."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -81,6 +81,15 @@ class Decomposer:
         return cls(
             robot, tuple(loads), convention, rows, sources, parts, wholes, induced, forces, times, terms
         )
+
+    def at(self, time: Array, inputs: Array) -> "Decomposer":
+        """Return the decomposer of the robot at the time (S,) and with the inputs (S, count) of samples."""
+        robot = self.robot.at(time, inputs)
+        if robot is self.robot:
+            return self
+        sources = replace(self.induced.sources, robot=robot)
+        induced = replace(self.induced, robot=robot, sources=sources)
+        return replace(self, robot=robot, induced=induced, forces=replace(self.forces, robot=robot))
 
     def fill(self, out: Array, time: Array, q: Array, qd: Array, qdd: Array) -> Closure:
         """Fill `out` (rows, S) from time (S,) and q, qd, qdd (S, n); return how well it closes.

@@ -55,8 +55,8 @@ class ReplacedLink(PartialLagrangian):
             wrong = abs(left) > torch.finfo(qd.dtype).eps ** 0.5 * size
         if bool(wrong.any()):
             raise ValueError(
-                f"the kinetic energy of a replaced link, {type(self.module).__name__}, is no quadratic form of the "
-                f"velocities, so that no coefficients own its forces; {REMEDY}"
+                f"the kinetic energy of a replaced link, {type(self.module).__name__}, is no quadratic form "
+                f"of the velocities, so that no coefficients own its forces; {REMEDY}"
             )
 
     def __getattr__(self, name: str) -> Any:
@@ -134,13 +134,13 @@ def _check_energy(name: str, energy: object, batch: Sequence[int], by: str) -> N
         raise TypeError(f"{name} answers with {kind}; give a tensor of real numbers, made by torch from {by}")
     if energy.shape != batch:
         raise TypeError(
-            f"{name} answers with shape {tuple(energy.shape)} where each q[k] has shape {tuple(batch)}; give one "
-            "energy in J for each sample"
+            f"{name} answers with shape {tuple(energy.shape)} where each q[k] has shape {tuple(batch)}; give "
+            "one energy in J for each sample"
         )
     known = energy.detach() if energy.device.type != "meta" else energy.new_zeros(1, device="cpu")
     varies = bool((known.nan_to_num() != known.nan_to_num().reshape(-1)[0]).any())
     if varies and not energy.requires_grad:
         raise TypeError(
-            f"{name} changes with the motion, but torch cannot differentiate it by {by}: the module detaches it, "
-            "or computes it without gradients"
+            f"{name} changes with the motion, but torch cannot differentiate it by {by}: the module detaches "
+            "it, or computes it without gradients"
         )
