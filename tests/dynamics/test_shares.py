@@ -161,6 +161,15 @@ def rolling_in_pieces() -> EnergySystem:
     return energy_system("pieces", [x, y], links)
 
 
+@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler)])
+def test_an_equality_holds_at_its_place_alone(backend: str, tmp_path: Path) -> None:
+    robot = loaded(rolling_in_pieces(), tmp_path, backend)
+    q, rest = np.array([[1.0, 0.2], [1.0 + 1e-9, 0.2]]), np.zeros((2, 2))
+    motion = given(backend, q, rest, rest)
+    at, beside = values_of(robot.inverse_dynamics(*motion))
+    np.testing.assert_allclose(at - beside, [0.0, -3.0], atol=1e-6)
+
+
 @pytest.mark.parametrize("backend", ["numpy", pytest.param("native", marks=needs_compiler)])
 def test_motions_are_those_of_scipy_and_their_energy_is_accounted_for(backend: str, tmp_path: Path) -> None:
     integrate = pytest.importorskip("scipy.integrate")
