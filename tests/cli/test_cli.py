@@ -390,6 +390,46 @@ def test_energies_take_no_option_of_rigid_bodies(linkwise: Run) -> None:
     assert named in done.stderr
 
 
+ENERGIES = """import sympy as sp
+from linkwise import Coordinate, LinkEnergy, energy_system
+
+x = Coordinate("x", "m")
+k, b, F, t = sp.symbols("k b F t")
+_links = [
+    LinkEnergy("cart", x.qd**2, {"spring": k * x.q**2}, {"damper": b * x.qd**2}, {"push": {x: F * t}}),
+    LinkEnergy("wall", 0, {"spring": 3 * x.q**2}),
+]
+system = energy_system("cart", [x], _links, {k: 40.0, b: 0.8}, time=t, inputs=[F])
+"""
+
+
+def test_inspect_shows_energies_with_numbers_unless_symbols_are_asked_for(
+    linkwise: Run, tmp_path: Path
+) -> None:
+    (tmp_path / "cart.py").write_text(ENERGIES)
+    data = json.loads(linkwise("inspect", "cart.py", "--json").stdout)
+    assert data["shares"] == [
+        {"name": "spring", "kinds": ["potential"], "links": ["cart", "wall"]},
+        {"name": "damper", "kinds": ["dissipation"], "links": ["cart"]},
+        {"name": "push", "kinds": ["force"], "links": ["cart"]},
+    ]
+    assert (data["time"], data["inputs"]) == ("t", ["F"])
+    for details in ((), ("--details",)):
+        told = linkwise("inspect", "cart.py", *details).stdout
+        assert "  spring  (potential of cart, wall)\n  damper  (dissipation of cart)\n" in told
+        assert "given at run time (robot.at): time: t; inputs: F\n" in told
+    refused = linkwise("inspect", "cart.py", "--parameters", "symbolic")
+    assert refused.returncode == 2
+    assert "cart.py: line 10: `system` is made with numbers; give symbolic=True there" in refused.stderr
+
+
+def test_analyze_names_the_file_of_energies_that_it_cannot_take(linkwise: Run, tmp_path: Path) -> None:
+    (tmp_path / "cart.py").write_text(ENERGIES)
+    (tmp_path / "log.csv").write_text("time,x\n0,0\n")
+    done = linkwise("analyze", "log.csv", "--robot", "cart.py", "--out", "out", "--backend", "native")
+    assert done.stderr.splitlines()[-1].startswith("linkwise: error: cart.py: its torques depend on ")
+
+
 HAND = """<mujoco><worldbody><body name="palm"><joint name="a" axis="0 0 1" armature="0.1" damping="0.2"/>
 <geom size="0.1"/><body name="finger"><joint name="b" axis="0 1 0" stiffness="3"/><geom size="0.1"/></body>
 <body name="thumb"><joint name="c" axis="0 1 0" damping="0.3"/><geom size="0.1"/></body></body></worldbody>

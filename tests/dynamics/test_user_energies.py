@@ -215,7 +215,9 @@ def test_two_parameters_of_one_name_are_refused(symbolic: bool) -> None:
     x = Coordinate("x", "m")
     m, m2 = sp.Symbol("m"), sp.Symbol("m", positive=True)
     links = [LinkEnergy("a", m * x.qd**2 / 2, m2 * x.q)]
-    with pytest.raises(LinkwiseError, match=r"^2 different parameters are called m, told apart by their"):
+    with pytest.raises(
+        LinkwiseError, match=r"^the parameters called m are 2 different symbols, told apart by"
+    ):
         energy_system("puck", [x], links, {m: 1.0, m2: 5.0}, symbolic)
     with pytest.raises(LinkwiseError, match=r"^link 'a': the symbol m is not the one among `parameters`"):
         energy_system("puck", [x], links, {m: 1.0}, symbolic)
@@ -263,25 +265,37 @@ FILES = {
         "running the file failed in line 7: Z",
     ),
     "no Python": (HEAD + "x = = 1\n", "running the file failed in line 4: SyntaxError: invalid syntax"),
-    "number": (GOOD + "coordinates = [Coordinate(3)]", "the coordinate name 3 is not a string"),
-    "twice": (GOOD + "coordinates = [x, x]", "the coordinate name 'x' is used twice; give each its own"),
+    "number": (GOOD + "coordinates = [Coordinate(3)]", "line 6: the coordinate name 3 is not a string"),
+    "twice": (
+        GOOD + "coordinates = [x, x]",
+        "line 3: the coordinate name 'x' is used twice; give each its own",
+    ),
     "blank": (
         GOOD + "coordinates = [Coordinate(' ')]",
-        "the coordinate name ' ' is empty; give each its own",
+        "line 6: the coordinate name ' ' is empty; give each its own",
     ),
-    "own words": (GOOD + "raise LinkwiseError('in my own words')", "in my own words"),
-    "unit": (GOOD + "coordinates = [Coordinate('x', 'deg')]", "coordinate 'x' has the unit 'deg'; give rad"),
-    "link": (GOOD + "links = [LinkEnergy(None, x.qd**2, 0)]", "the link name None is not a string"),
-    "name": (GOOD + "name = 3", "the robot's name is 3; give a string"),
+    "own words": (GOOD + "raise LinkwiseError('in my own words')", "line 6: in my own words"),
+    "unit": (
+        GOOD + "coordinates = [Coordinate('x', 'deg')]",
+        "line 6: coordinate 'x' has the unit 'deg'; give rad",
+    ),
+    "link": (GOOD + "links = [LinkEnergy(None, x.qd**2, 0)]", "line 6: the link name None is not a string"),
+    "name": (GOOD + "name = 3", "line 6: `name` is 3; give the robot's name"),
     "no links": (HEAD + "coordinates = [x]", "the file must define 'links', a list of linkwise.LinkEnergy"),
-    "one of two": (GOOD + "links += [3]", "the file must define 'links', a list of linkwise.LinkEnergy"),
-    "list": (GOOD + "parameters = [3]", "`parameters` must be a dictionary of SymPy symbols"),
-    "text": (GOOD + "parameters = {'m': 1}", "`parameters` must be a dictionary of SymPy symbols"),
+    "one of two": (
+        GOOD + "links += [3]",
+        "line 6: the file must define 'links', a list of linkwise.LinkEnergy",
+    ),
+    "list": (GOOD + "parameters = [3]", "line 6: `parameters` must be a dictionary of SymPy symbols"),
+    "text": (GOOD + "parameters = {'m': 1}", "line 6: `parameters` must be a dictionary of SymPy symbols"),
     "digits": (
         GOOD + "parameters = {sp.Symbol('m'): '1'}",
-        "parameter m is '1'; give a number, without quotes",
+        "line 6: parameter m is '1'; give a number, without quotes",
     ),
-    "word": (GOOD + "parameters = {sp.Symbol('m'): [1]}", "parameter m has no value as a real number"),
+    "word": (
+        GOOD + "parameters = {sp.Symbol('m'): [1]}",
+        "line 6: parameter m has no value as a real number",
+    ),
     "a name that nobody reads": (
         GOOD + "k = sp.Symbol('k')\ndissipation = k * x.qd**2 / 2",
         "'dissipation' in line 7 would count for nothing: linkwise reads ",
@@ -322,9 +336,66 @@ FILES = {
         GOOD + "links = [\n    LinkEnergy('b', 0, x.q),\n    LinkEnergy('a', sp.Symbol('mu') * x.qd**2),\n]",
         "line 8: link 'a': the symbol mu is neither a coordinate",
     ),
-    "complex": (GOOD + "parameters = {sp.Symbol('m'): sp.I}", "parameter m has no value as a real number"),
-    "huge": (GOOD + "parameters = {sp.Symbol('m'): 10**400}", "parameter m has no value as a real number"),
-    "infinite": (GOOD + "parameters = {sp.Symbol('m'): sp.oo}", "parameter m has NaN or infinity"),
+    "complex": (
+        GOOD + "parameters = {sp.Symbol('m'): sp.I}",
+        "line 6: parameter m has no value as a real number",
+    ),
+    "huge": (
+        GOOD + "parameters = {sp.Symbol('m'): 10**400}",
+        "line 6: parameter m has no value as a real number",
+    ),
+    "infinite": (GOOD + "parameters = {sp.Symbol('m'): sp.oo}", "line 6: parameter m has NaN or infinity"),
+    "without velocity": (
+        GOOD + "y = Coordinate('y')\ncoordinates = [x, y]\nlinks += [LinkEnergy('b', 0, x.q * y.q)]",
+        "line 6: coordinate 'y' is without velocity: no kinetic energy has it",
+    ),
+    "without velocity, as a function": (
+        HEAD + "t = sp.Symbol('t'); del x\nu, w = sp.Function('x')(t), sp.Function('y')(t)\n"
+        "coordinates = {\n    u: 'm',\n    w: 'm',\n}\nlinks = [LinkEnergy('a', u.diff(t) ** 2, u * w)]",
+        "line 8: coordinate 'y' is without velocity",
+    ),
+    "without a mass": (
+        GOOD + "m = sp.Symbol('m')\nparameters = {m: 0}\nlinks = [LinkEnergy('a', m * x.qd**2, x.q)]",
+        "line 3: coordinate 'x' is without velocity: no kinetic energy has it (a mass of zero gives none)",
+    ),
+    "time in a constant": (
+        GOOD + "t, k = sp.symbols('t k_1')\ntime = t\nparameters = {\n    k: 2 * t,\n}",
+        "line 9: parameter k_1 is a constant, and its value 2*t depends on time t; write that in",
+    ),
+    "motion in a constant": (
+        GOOD + "k = sp.Symbol('k')\nparameters = {}\nparameters[k] = x.q",
+        "line 8: parameter k is a constant, and its value x depends on x; write that in",
+    ),
+    "two links of one name": (
+        GOOD + "links += [LinkEnergy('a', x.qd**2)]",
+        "line 6: the link name 'a' is used twice",
+    ),
+    "an input that is a coordinate": (
+        GOOD + "inputs = [x.q]",
+        "line 6: the input x is a coordinate or its velocity too",
+    ),
+    "a function without a closed form": (
+        GOOD + "links += [\n    LinkEnergy('b', 0, sp.erf(x.q)),\n]",
+        "line 7: link 'b': the function erf is not supported; use one of",
+    ),
+    "pieces without an end": (
+        GOOD + "links += [LinkEnergy('b', 0, sp.Piecewise((x.q**2, x.q > 0)))]",
+        "line 6: link 'b': a Piecewise has no value where none of its conditions is true",
+    ),
+    "one name for two shares": (
+        GOOD + "links += [LinkEnergy('b', 0, {'s': x.q**2}, {'s': x.qd**2})]",
+        "line 6: link 'b': its potential and its dissipation are both called 's', and would be one share",
+    ),
+    "a system that is none": (GOOD + "system = 3", "line 6: `system` is 3; give what linkwise.from_sympy"),
+    "raised by linkwise": (
+        GOOD + "links += [LinkEnergy('b', 0, interpolated(x.q, [0], [1]))]",
+        "line 6: a table of degree 3 needs 4 places, and has 1",
+    ),
+    "of a call in the file": (
+        HEAD + "system = energy_system(\n    'a',\n    [x],\n    [LinkEnergy('a', x.qd**2)],\n"
+        "    {sp.Symbol('m'): 'a'},\n)",
+        "line 4: parameter m is 'a'; give a number",
+    ),
 }
 
 
@@ -335,6 +406,24 @@ def test_defect_of_a_python_file_is_named(case: str, tmp_path: Path) -> None:
     with pytest.raises(LinkwiseError) as caught:
         read_system(tmp_path / "bad.py")
     assert str(caught.value).startswith(f"{tmp_path / 'bad.py'}: {message}")
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"links": [LinkEnergy("damped", 0, Y.q**2, Y.qd**2)]},
+        {"links": [LinkEnergy("driven", 0, forces={Y: sp.Symbol("c") * Y.qd})]},
+        {"constraints": {"gear": Y.q - 3 * X.q}},
+    ],
+    ids=["dissipation", "force", "constraint"],
+)
+def test_a_coordinate_without_mass_is_taken_where_something_else_has_its_velocity(
+    more: dict[str, Any],
+) -> None:
+    links = [LinkEnergy("disc", X.qd**2), *more.get("links", [])]
+    constraints = more.get("constraints")
+    made = energy_system("puck", [X, Y], links, {sp.Symbol("c"): 2.0}, constraints=constraints)
+    assert made.coordinates == (X, Y)
 
 
 def test_a_python_file_is_no_robot_and_what_reads_it_is_told(tmp_path: Path) -> None:

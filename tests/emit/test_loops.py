@@ -311,7 +311,11 @@ def test_formulas_asked_for_by_name_are_derived(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("robot", "asked", "told"),
     [
-        (TURNTABLE, {"kernel": "loops"}, "--kernel loops goes over rigid bodies, and here are energies"),
+        (
+            TURNTABLE,
+            {"kernel": "loops"},
+            "turntable.py: --kernel loops goes over rigid bodies, and here are energies",
+        ),
         (
             "planar3",
             {"kernel": "loops", "backends": ["formulas"]},

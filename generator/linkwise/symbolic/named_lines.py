@@ -16,8 +16,8 @@ NAMED = re.compile(
     r"|.*; choose (?P<asked>independent)="
 )
 """Beginning of an error that names a thing of its kind, or a name that linkwise reads."""
-COORDINATES = ("Coordinate",)
-SYMBOLS = ("Symbol", "symbols", "dynamicsymbols", "Function", *COORDINATES)
+COORDINATE = "Coordinate"
+NO_LINKS = ("Symbol", "symbols", "dynamicsymbols", "Function", COORDINATE)
 """Functions whose first argument is the name of something else than a link."""
 
 
@@ -33,7 +33,9 @@ def with_line(told: str, path: Path, defined: Mapping[str, object], otherwise: i
     if found is not None:
         kind, name = found["kind"], found["name"]
         given = f"{kind}s" if kind else found["lacking"] or found["given"] or found["asked"]
-        assignments = [node for node in ast.walk(tree) if _assigns(node, given)]
+        assignments = [
+            node for node in ast.walk(tree) if isinstance(node, ast.stmt) and _assigns(node, given)
+        ]
         inside = [node for one in assignments for node in ast.walk(one)]
         for nodes in (inside, [*ast.walk(tree)]) if kind and name else ():
             lines = lines or [line for node in nodes for line in _naming(node, kind, _text(name), defined)]
@@ -46,7 +48,7 @@ def _text(name: str) -> str:
     return str(ast.literal_eval(name)) if re.fullmatch(TEXT, name) else name
 
 
-def _assigns(node: ast.AST, name: str) -> bool:
+def _assigns(node: ast.stmt, name: str) -> bool:
     """Return whether a statement gives a value to a name, or more to it or to an element of it."""
     if isinstance(node, ast.Assign):
         targets = node.targets
@@ -60,26 +62,22 @@ def _assigns(node: ast.AST, name: str) -> bool:
 
 def _naming(node: ast.AST, kind: str, name: str, defined: Mapping[str, object]) -> Iterator[int]:
     """Yield the line of a call that makes what has this name, or where a table has it as a key."""
-    if isinstance(node, ast.Call):
-        if kind == "link" and _maker(node) not in SYMBOLS and _is_named(node, name):
-            yield node.lineno
-        elif kind == "coordinate" and _maker(node) in COORDINATES and _is_named(node, name):
-            yield node.lineno
-        elif kind == "constraint":
+    match node:
+        case ast.Call() if kind == "constraint":
             yield from (keyword.value.lineno for keyword in node.keywords if keyword.arg == name)
-    elif kind == "link":
-        return
-    elif isinstance(node, ast.Dict):
-        yield from (key.lineno for key in node.keys if key is not None and _is(key, kind, name, defined))
-    elif isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
-        if _is(node.slice, kind, name, defined):
+        case ast.Call() if _makes(node, kind) and _is_named(node, name):
+            yield node.lineno
+        case ast.Dict():
+            yield from (key.lineno for key in node.keys if key is not None and _is(key, kind, name, defined))
+        case ast.Subscript(ctx=ast.Store()) if _is(node.slice, kind, name, defined):
             yield node.lineno
 
 
-def _maker(call: ast.Call) -> str:
-    """Return the name of the function that is called, without its module."""
+def _makes(call: ast.Call, kind: str) -> bool:
+    """Return whether a call may make a link, or a coordinate, by the name of its function."""
     function = call.func
-    return function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+    called = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+    return called == COORDINATE if kind == "coordinate" else kind == "link" and called not in NO_LINKS
 
 
 def _is_named(call: ast.Call, name: str) -> bool:
@@ -91,7 +89,7 @@ def _is(key: ast.expr, kind: str, name: str, defined: Mapping[str, object]) -> b
     """Return whether a key of a table is the name of a constraint, or a symbol or function of this name."""
     if isinstance(key, ast.Constant):
         return kind == "constraint" and key.value == name
-    if kind == "constraint" or not isinstance(key, ast.Name):
+    if kind not in ("coordinate", "parameter") or not isinstance(key, ast.Name):
         return False
     value = defined.get(key.id)
     called = value.func.__name__ if isinstance(value, AppliedUndef) else getattr(value, "name", key.id)

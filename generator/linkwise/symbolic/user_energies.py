@@ -130,14 +130,14 @@ def _values(parameters: Mapping[sp.Symbol, float], motion: WrittenMotion) -> dic
     for symbol in parameters:
         if symbol in motion.varying:
             raise LinkwiseError(
-                f"parameter {symbol} is time or an input too; leave it out of `parameters`: its value is given "
-                "at run time"
+                f"parameter {symbol} is time or an input too; leave it out of `parameters`: its value is "
+                "given at run time"
             )
     for name, count in Counter(symbol.name for symbol in (*parameters, *motion.varying)).items():
         if count > 1:
             raise LinkwiseError(
-                f"the parameters called {name} are {count} different symbols, told apart by their assumptions "
-                "only; rename all but one"
+                f"the parameters called {name} are {count} different symbols, told apart by their "
+                "assumptions only; rename all but one"
             )
     values = {}
     for symbol, value in parameters.items():
@@ -181,9 +181,9 @@ def _check_moved(
     for c in motion.coordinates:
         if not any(part.has(c.qd) for part in parts) and not any(zero.has(c.q, c.qd) for zero in held):
             raise LinkwiseError(
-                f"coordinate {c.name!r} is without velocity: no kinetic energy has it, nor a dissipation, a "
-                "force or a constraint, so that no acceleration follows from its torque; give what it moves a "
-                "mass, or leave it out"
+                f"coordinate {c.name!r} is without velocity: no kinetic energy has it (a mass of zero gives "
+                "none), no dissipation, force or constraint, so that no acceleration follows from its "
+                "torque; give what it moves a mass, or leave it out"
             )
 
 
