@@ -161,7 +161,9 @@ def rolling_in_pieces() -> EnergySystem:
     return energy_system("pieces", [x, y], links)
 
 
-@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler)])
+@pytest.mark.parametrize(
+    "backend", ["numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler)]
+)
 def test_an_equality_holds_at_its_place_alone(backend: str, tmp_path: Path) -> None:
     robot = loaded(rolling_in_pieces(), tmp_path, backend)
     q, rest = np.array([[1.0, 0.2], [1.0 + 1e-9, 0.2]]), np.zeros((2, 2))

@@ -463,6 +463,24 @@ def test_a_whole_power_that_is_written_with_a_point_is_one_for_negative_position
     assert found.ravel().tolist() == pytest.approx(expected, rel=1e-14)
 
 
+@pytest.mark.parametrize("exponent", [sp.Rational(3, 2), sp.Rational(5, 2), 2.3])
+@pytest.mark.parametrize(
+    "backend", ["numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler)]
+)
+def test_a_spring_of_any_power_is_slack_where_it_begins(exponent: Any, backend: str, tmp_path: Path) -> None:
+    """Hertz's contact, k d^(5/2), and others: at d = 0 the force is 0, and not unknown."""
+    link = LinkEnergy("disc", X.qd**2, 3 * sp.Max(0, X.q) ** exponent + sp.Abs(X.q) ** exponent)
+    write_package(generate(energy_system("puck", [X], [link]), [backend]), tmp_path / "puck")
+    states = np.array([[[0.0], [0.2], [-0.2]], *np.zeros((2, 3, 1))])
+    if backend in ("torch", "autograd"):
+        states = pytest.importorskip("torch").from_numpy(states)
+    robot = import_package(tmp_path / "puck").load(backend)
+    n = float(exponent)
+    force = n * 0.2 ** (n - 1)
+    assert np.ravel(robot.partial_torque(*states)) == pytest.approx([0.0, 4 * force, -force], abs=1e-14)
+    assert not [result for result in check_package(tmp_path / "puck", 20) if result.failed]
+
+
 def test_a_half_power_that_is_written_with_a_point_is_a_root() -> None:
     text = generate(puck(X.qd**2, (X.q**2 + 1) ** 1.5), ["numpy"])["forms/link_1.py"]  # type: ignore[arg-type]
     assert "log" not in text

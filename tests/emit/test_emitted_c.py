@@ -505,7 +505,10 @@ def test_links_of_energies_with_and_without_linear_terms_go_together(tmp_path: P
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_a_force_that_no_motion_changes_compiles_without_a_warning(compiler: str, tmp_path: Path) -> None:
     x = Coordinate("x", "m")
-    write_package(generate(energy_system("weight", [x], [LinkEnergy("a", 0, 3 * x.q)])), tmp_path / "weight")
+    write_package(
+        generate(energy_system("weight", [x], [LinkEnergy("a", 0, 3 * x.q), LinkEnergy("b", x.qd**2)])),
+        tmp_path / "weight",
+    )
     check_syntax(tmp_path / "weight", strict(compiler))
 
 

@@ -37,8 +37,8 @@ ROBOTS = ("planar3", "puma560 loops")
 
 PLAIN = {
     "math.h": """
-double sin(double), cos(double), sqrt(double), fabs(double), atan2(double, double);
-float sinf(float), cosf(float), sqrtf(float), fabsf(float), atan2f(float, float);
+double sin(double), cos(double), sqrt(double), fabs(double), atan2(double, double), pow(double, double);
+float sinf(float), cosf(float), sqrtf(float), fabsf(float), atan2f(float, float), powf(float, float);
 #define HUGE_VAL ((double)((float)(1e+300 * 1e+300)))
 """,
     "float.h": """

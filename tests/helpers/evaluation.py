@@ -30,6 +30,8 @@ def evaluate(graph: Graph, outputs: Iterable[Node], inputs: Mapping[str, float])
                 value[node] = value[a] / value[b]
             case "atan2":
                 value[node] = math.atan2(value[a], value[b])
+            case "pow":
+                value[node] = value[a] ** value[b]
             case "lt":
                 value[node] = value[a] < value[b]
             case "le":

@@ -34,6 +34,9 @@ class FormulaPrinter(Printer):
             text, _ = super().print(entry, operands)
             inner = f"({operands[2][0]}, True))"
             return text.replace(inner, operands[2][0].removeprefix("Piecewise(")), ATOM
+        if entry[0] == "pow":
+            (a, pa), (b, pb) = operands
+            return f"{wrapped(a, pa, ATOM)}**{wrapped(b, pb, ATOM)}", POWER
         if entry[0] != "mul":
             return super().print(entry, operands)
         (a, pa), (b, pb) = operands
@@ -69,7 +72,7 @@ class _Latex:
                 return (r" \cdot " if factors[1][0].isdigit() else " ").join(factors)
             case ast.BinOp(left=left, op=ast.Div(), right=right):
                 return rf"\frac{{{self.text(left)}}}{{{self.text(right)}}}"
-            case ast.BinOp(left=ast.Name() | ast.Call() as base, op=ast.Pow(), right=right):
+            case ast.BinOp(left=base, op=ast.Pow(), right=right):
                 return rf"{self._bracketed(base)}^{{{self.text(right)}}}"
             case ast.Call(func=ast.Name(id=name), args=arguments):
                 return self._call(name, arguments)

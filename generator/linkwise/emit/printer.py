@@ -54,8 +54,8 @@ class Printer:
                 return f"-{wrapped(a, pa, PRODUCT)}", SUM
             case "call", ((a, _),):
                 return f"{self.function(entry[1])}({a})", ATOM
-            case "atan2", ((a, _), (b, _)):
-                return f"{self.function('atan2')}({a}, {b})", ATOM
+            case ("atan2" | "pow") as name, ((a, _), (b, _)):
+                return f"{self.function(name)}({a}, {b})", ATOM
             case ("lt" | "le") as op, ((a, _), (b, _)):
                 return self.comparison(a, SIGNS[op], b), COMPARISON
             case "select", ((condition, _), (then, _), (other, _)):

@@ -37,7 +37,7 @@ def count_operations(graph: Graph, outputs: Iterable[Node], given: Container[Nod
     """Return the operations that `outputs` take from what is `given`; a sign in front of a value is free."""
     needed = reachable(graph, outputs, given)
     ops = Counter(graph.nodes[node][0] for node in needed if node not in given)
-    functions = sum(ops[op] for op in ("call", "atan2", "select", *CONDITIONS))
+    functions = sum(ops[op] for op in ("call", "atan2", "pow", "select", *CONDITIONS))
     return OperationCount(ops["add"] + ops["sub"], ops["mul"], ops["div"], functions)
 
 

@@ -36,6 +36,16 @@ def _tangent(graph: Graph, node: Node, da: Expression | None, db: Expression | N
         y, x = Expression(graph, a), Expression(graph, b)
         zero = Expression(graph, graph.zero)
         return (x * (da or zero) - y * (db or zero)) / (x * x + y * y)
+    if op == "pow":
+        # Not f b / a, which is NaN where a is 0 and the slope is not.
+        base, exponent = Expression(graph, a), Expression(graph, b)
+        lower = Expression(graph, graph.pow(a, (exponent - exponent.number(1.0)).node))
+        by_base = None if da is None else exponent * lower * da
+        if db is None:
+            assert by_base is not None
+            return by_base
+        by_exponent = Expression(graph, node) * base.call("log") * db
+        return by_exponent if by_base is None else by_base + by_exponent
     if db is None and da is not None:
         if op in ("add", "sub"):
             return da

@@ -1,9 +1,9 @@
 """A hash-consed expression graph: equal expressions are one node.
 
-A node is an index into `Graph.nodes`; an entry is `(op, a, b)`. Operands of `add`, `sub`, `mul`, `div`, `neg`
-and `atan2` are nodes, and those of the conditions `lt` and `le`, a < b and a ≤ b, which are true or false; a
-`select` holds a condition, and a pair of nodes, one where it is true and one where not. A `const` holds its
-value, a `symbol` its name, a `call` its function's name and argument.
+A node is an index into `Graph.nodes`; an entry is `(op, a, b)`. Operands of `add`, `sub`, `mul`, `div`,
+`neg`, `atan2` and `pow` are nodes, and those of the conditions `lt` and `le`, a < b and a ≤ b, which are true
+or false; a `select` holds a condition, and a pair of nodes, one where it is true and one where not. A `const`
+holds its value, a `symbol` its name, a `call` its function's name and argument.
 Construction folds constants, drops zeros and ones, and pulls signs outward, so that x − y and y − x, or
 (−x)·y and x·y, share their work. A number stands for the decimal that it prints as: 0.6 · 0.125 folds to
 0.075, not to 0.07499999999999998, and what is emitted is short wherever the robot's numbers are.
@@ -42,7 +42,7 @@ ARITHMETIC = frozenset({"add", "sub", "mul", "div"})
 """Operations that count as arithmetic."""
 CONDITIONS = frozenset({"lt", "le"})
 """Operations on two nodes that are true or false."""
-PAIRS = ARITHMETIC | CONDITIONS | {"atan2"}
+PAIRS = ARITHMETIC | CONDITIONS | {"atan2", "pow"}
 """Operations on two nodes."""
 
 
@@ -212,6 +212,15 @@ class Graph:
         if known[0] is not None and known[1] is not None:
             return self.const(math.atan2(known[0], known[1]))
         return self._node("atan2", y, x)
+
+    def pow(self, a: Node, b: Node) -> Node:
+        """Return a**b, for exponents that `power` and square roots do not have."""
+        base, exponent = self.value(a), self.value(b)
+        if base is not None and exponent is not None:
+            return self.const(base**exponent)
+        if exponent is not None and exponent.is_integer():
+            return self.power(a, int(exponent))
+        return self.call("sqrt", a) if exponent == 0.5 else self._node("pow", a, b)
 
     def lt(self, a: Node, b: Node) -> Node:
         """Return whether a < b; of numbers, 1 or 0."""

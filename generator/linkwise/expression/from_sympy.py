@@ -67,7 +67,7 @@ class Lowering:
         if expr.is_Mul:
             return self._product(expr)
         if expr.is_Pow:
-            return self._power(expr)
+            return self._power(expr) if (pieces := _in_pieces(expr, expr.base)) is None else self(pieces)
         if isinstance(expr, sp.Piecewise):
             return self._pieces(expr.args)
         if isinstance(expr, sp.Max | sp.Min):
@@ -79,6 +79,8 @@ class Lowering:
         function = SYMPY_FUNCTIONS.get(expr.func)
         if function is None:
             raise LinkwiseError(f"the function {expr.func.__name__} is not supported; use one of {KNOWN}")
+        if function in DEFINED and (pieces := _in_pieces(expr, expr.args[0])) is not None:
+            return self(pieces)
         return g.call(function, self._defined(function, self(expr.args[0])))
 
     def _product(self, expr: sp.Expr) -> Node:
@@ -95,9 +97,9 @@ class Lowering:
         g, base, exponent = self.graph, self(expr.base), expr.exp
         if exponent.is_Integer:
             return g.power(self._kept(base, 1.0) if exponent < 0 else base, int(exponent))
-        if (2 * exponent).is_Integer:
+        if (2 * exponent).is_Integer and (exponent < 1 or expr.base.is_positive):
             return g.power(g.call("sqrt", self._defined("sqrt", base)), int(2 * exponent))
-        return g.call("exp", g.mul(self(exponent), g.call("log", self._defined("log", base))))
+        return g.pow(self._kept(base, 1.0), self(exponent))
 
     def _extreme(self, expr: sp.Expr) -> Node:
         """Return the largest or smallest argument."""
@@ -169,3 +171,14 @@ class Lowering:
         for condition, holds in reversed(self._where):
             a = g.select(condition, *((a, other) if holds else (other, a)))
         return a
+
+
+def _in_pieces(expr: sp.Expr, argument: sp.Expr) -> sp.Piecewise | None:
+    """Return a function whose argument is in pieces as pieces of that function; None for another.
+
+    Max(0, x)**(3/2) has no slope of its own where x < 0: that of the root, 1/0, would meet that of Max, 0.
+    """
+    if (expr.is_Pow and expr.exp.is_Integer) or not argument.has(sp.Piecewise, sp.Max, sp.Min):
+        return None
+    found = sp.piecewise_fold(expr.rewrite((sp.Max, sp.Min), sp.Piecewise))
+    return found if isinstance(found, sp.Piecewise) else None

@@ -29,6 +29,7 @@ FUNCTIONS = frozenset(
         "sqrt",
         "abs",
         "atan2",
+        "pow",
     )
 )
 """Functions of closed forms; C has fabs in place of abs."""
