@@ -65,6 +65,12 @@ class Dynamics(RobotCalls):
     ambiguity; the message names the argument.
     """
 
+    def __init__(self, *made: Any) -> None:
+        """Set up the robot, as `RobotCalls` does."""
+        super().__init__(*made)
+        if self.backend.takes_tensors and self.backend.tree is not None:
+            _ = self.kinematics  # no compiler follows how a first look makes it
+
     def __dir__(self) -> Iterable[str]:
         """Return the names of this robot's attributes: torch.jit reads each of them, and none may raise."""
         absent = {"kinematics"} if self.backend.tree is None else set()

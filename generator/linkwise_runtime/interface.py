@@ -7,7 +7,8 @@ With them, the library that numbers belong to, their precision, and how they lie
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeVar, cast
+from types import FunctionType
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,6 +147,14 @@ class Library(Protocol):
         """Return the number of samples to compute at once, if `most` fit in the cache; None for all."""
 
 
+class TableKind(NamedTuple):
+    """Dtype and device of tables, which are made for it as for numbers that have these."""
+
+    dtype: Any
+    device: Any
+    """None for NumPy."""
+
+
 class ClosedForms(Protocol):
     """Closed forms of one link over its path, forms/link_k.py, for arrays of the namespace `xp`.
 
@@ -226,11 +235,26 @@ def epsilon_of(values: Numbers) -> float:
 
 
 class Unscripted:
-    """Base of what torch.jit.script is given and cannot compile, as it knows a part of Python alone."""
+    """Base of what torch.jit.script is given and cannot compile, as it knows a part of Python alone.
+
+    Methods too refuse it: torch.jit.script looks for the same function on whatever it is given.
+    """
+
+    def __init_subclass__(cls) -> None:
+        """Have the methods of a class refuse it."""
+        super().__init_subclass__()
+        for method in vars(cls).values():
+            if isinstance(method, FunctionType):
+                vars(method)["__prepare_scriptable__"] = refuse_script
 
     def __prepare_scriptable__(self) -> NoReturn:
         """Raise TypeError, which says what works instead; torch.jit.script calls this first."""
-        raise TypeError(
-            "torch.jit.script compiles a part of Python alone, which this is not written in; take "
-            "torch.compile or torch.export, or torch.jit.trace of the back end torch"
-        )
+        refuse_script()
+
+
+def refuse_script() -> NoReturn:
+    """Raise TypeError, which says what to take in place of torch.jit.script."""
+    raise TypeError(
+        "torch.jit.script compiles a part of Python alone, which this is not written in; take "
+        "torch.compile or torch.export, or torch.jit.trace of the back end torch"
+    )

@@ -363,25 +363,52 @@ def test_a_compiler_takes_energies_and_torques_whole(package_of: Callable[[str],
 
 
 @pytest.mark.parametrize("backend", ["torch", "autograd"])
-def test_a_call_is_compiled_once(planar2: ModuleType, backend: str) -> None:
-    motion, robot = states(2, 5), planar2.load(backend)
-    for call, count in (
-        ("partial_torque", 3),
-        ("propagation", 3),
-        ("mass_matrix", 1),
-        ("forward_dynamics", 3),
-    ):
-        compiled: list[Any] = []
+@pytest.mark.parametrize("robot", ["planar2", "cart"])
+def test_a_call_is_compiled_once_and_once_more_for_any_number_of_samples(
+    robot: str, backend: str, planar2: ModuleType, cart: ModuleType
+) -> None:
+    from torch._dynamo.testing import CompileCounter
 
-        def kept(graph: Any, _: Any, compiled: list[Any] = compiled) -> Any:
-            compiled.append(graph)
-            return graph.forward
-
+    folder = Path(str((planar2 if robot == "planar2" else cart).__file__)).parent
+    for call, count in (("propagation", 3), ("forward_dynamics", 3)):
         torch._dynamo.reset()
-        run = torch.compile(getattr(robot, call), fullgraph=True, backend=kept)
-        for _ in range(3):
-            run(*motion[:count])
-        assert len(compiled) == 1, call
+        fresh, counted = import_package(folder).load(backend), CompileCounter()
+        run = torch.compile(getattr(fresh, call), fullgraph=True, backend=counted)
+        for samples, compiled in ((5, 1), (5, 1), (7, 2), (3, 2), (5, 2)):
+            motion = states(2, samples)[:count]
+            found = run(*motion)
+            assert counted.frame_count == compiled, (call, samples)
+        pairs = [(found, expected)] if torch.is_tensor(expected := getattr(fresh, call)(*motion)) else []
+        for one, other in pairs or zip(found, expected, strict=True):
+            assert relative_error(one, other) <= 1e-12, call
+
+
+def test_a_frame_is_compiled_once_whatever_else_is_asked(directory_of: Callable[[str], Path]) -> None:
+    from torch._dynamo.testing import CompileCounter
+
+    torch._dynamo.reset()
+    robot, counted = import_package(directory_of("planar3")).load("torch"), CompileCounter()
+    run = torch.compile(lambda q: robot.kinematics.pose(q, "link3"), fullgraph=True, backend=counted)
+    for samples, compiled in ((5, 1), (5, 1), (7, 2), (3, 2)):
+        (q, *_) = states(3, samples)
+        found = run(q)
+        assert counted.frame_count == compiled
+        robot.kinematics.pose(q.float(), "link2")
+        assert relative_error(found, robot.kinematics.pose(q, "link3")) <= 1e-13
+
+
+def test_robots_compiled_one_after_the_other_do_not_share_tables(
+    package_of: Callable[[str], ModuleType],
+) -> None:
+    def torque(robot: Any, *motion: Any) -> Any:
+        return robot.inverse_dynamics(*motion), robot.kinematics.centre_of_mass(motion[0])
+
+    torch._dynamo.reset()
+    run, motion = torch.compile(torque, fullgraph=True, backend="eager"), states(3, 4)
+    for name in ("planar3", "planar3 symbolic", "planar3"):
+        robot = package_of(name).load("torch", kernel="rule")
+        for one, other in zip(run(robot, *motion), torque(robot, *motion), strict=True):
+            assert relative_error(one, other) <= 1e-13
 
 
 @pytest.mark.parametrize(("call", "broken"), [("partial_torque", 1), ("mass_matrix", 0)])
@@ -414,7 +441,12 @@ def test_a_call_of_native_is_one_graph_beside_its_callers(
 @pytest.mark.parametrize("backend", ["torch", "autograd", "numpy"])
 def test_torch_jit_script_is_refused_by_its_name(planar2: ModuleType, backend: str) -> None:
     robot = planar2.load(backend)
-    for one in (robot, *((robot.module("partial_torque"), robot.links[0]) if backend == "autograd" else ())):
+    own = (
+        (robot.module("partial_torque"), robot.links[0], robot.links[0].torque)
+        if backend == "autograd"
+        else ()
+    )
+    for one in (robot, robot.partial_torque, robot.kinematics, robot.kinematics.pose, *own):
         with pytest.raises(
             TypeError, match=r"^torch.jit.script compiles a part of Python .* take torch.compile"
         ):

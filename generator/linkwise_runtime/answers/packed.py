@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..interface import Library, Namespace, Numbers
+from ..interface import Dtype, Library, Namespace, Numbers, TableKind
 from ..quantities import PARAMETERS
 from ..structure import Indices, Layout, Structure
 
@@ -127,14 +127,14 @@ class PackedTables:
         self._sums: dict[object, SumTable] = {}
         for like in backend.examples:
             for field in self._shapes:
-                self._table(field, like)
+                packed_table(self, field, _device(like))
             for field in ("acceleration", "velocity"):
-                self._sum_table(field, like)
-            self._joint_sums(like)
+                packed_sums(self, field, _device(like))
+            packed_joint_sums(self, like.dtype, _device(like))
 
     def spread(self, values: Numbers, field: str) -> Numbers:
         """Return a field of `Layout` (..., count) as (..., n, N) or (..., n, N, n), zeros elsewhere."""
-        table, batch = self._table(field, values), values.shape[:-1]
+        table, batch = packed_table(self, field, _device(values)), values.shape[:-1]
         if isinstance(values, np.ndarray):
             padded = np.zeros((*batch, values.shape[-1] + 1), values.dtype)
             padded[..., :-1] = values
@@ -148,18 +148,18 @@ class PackedTables:
         """Return rows of 10 (..., 10 count) of a field in (..., n, N[, n], 10), zeros elsewhere."""
         padded = self._backend.concatenate([values, self._backend.zeros(values, PARAMETERS)])
         rows = padded.reshape(*values.shape[:-1], len(getattr(self._layout, field)) + 1, PARAMETERS)
-        entries = rows[..., self._table(field, values), :]
+        entries = rows[..., packed_table(self, field, _device(values)), :]
         dense: Numbers = entries.reshape(*values.shape[:-1], *self._shapes[field], PARAMETERS)
         return dense
 
     def sum_over_links(self, tau: Numbers) -> Numbers:
         """Return packed torques (..., count) summed over the links, (..., n)."""
-        return tau @ self._joint_sums(tau)
+        return tau @ packed_joint_sums(self, tau.dtype, _device(tau))
 
     def matrices(self, values: Numbers, field: str) -> Numbers:
         """Return the sums sum_j c_ijk (..., n, n) of values (..., count) of a field with rows (i, j, k)."""
         # Any: a table of arrays or of tensors, as the values are.
-        table: Any = self._sum_table(field, values)
+        table: Any = packed_sums(self, field, _device(values))
         size = self._n * self._n
         sums = self._backend.zeros(values, size)
         if not isinstance(values, np.ndarray):
@@ -174,29 +174,6 @@ class PackedTables:
         matrices: Numbers = sums.reshape(*values.shape[:-1], self._n, self._n)
         return matrices
 
-    def _table(self, field: str, like: Numbers) -> Numbers:
-        key = field, getattr(like, "device", None)
-        if key not in self._places:
-            self._places[key] = self._backend.index(self._positions(field), like)
-        return self._places[key]
-
-    def _joint_sums(self, like: Numbers) -> Numbers:
-        """Return zeros (count, n), with ones where a packed torque is on a joint."""
-        key = like.dtype, getattr(like, "device", None)
-        if key not in self._places:
-            rows = self._layout.torque
-            sums = np.zeros((len(rows), self._n))
-            sums[np.arange(len(rows)), rows[:, 0]] = 1.0
-            self._places[key] = self._backend.constant(sums, like)
-        return self._places[key]
-
-    def _sum_table(self, field: str, like: Numbers) -> SumTable:
-        key = field, getattr(like, "device", None)
-        if key not in self._sums:
-            listed = sum_table(self._layout, field, self._n)
-            self._sums[key] = SumTable(*(self._backend.index(a, like) for a in listed))
-        return self._sums[key]
-
     def _positions(self, field: str) -> Indices:
         """Return for each entry of the dense tensor its packed position, or that of the zero behind."""
         rows = self._rows[field]
@@ -205,6 +182,46 @@ class PackedTables:
         if field == "acceleration":
             positions[rows[:, 2], rows[:, 1], rows[:, 0]] = np.arange(len(rows))
         return positions.reshape(-1)
+
+
+def packed_table(tables: PackedTables, field: str, device: object) -> Numbers:
+    """Return the packed position of each dense entry of a field.
+
+    As the two functions below, it makes tables when first asked for; compilers take them as they are, and do
+    not follow this.
+    """
+    key = field, device
+    if key not in tables._places:
+        tables._places[key] = tables._backend.index(tables._positions(field), _like(None, device))
+    return tables._places[key]
+
+
+def packed_joint_sums(tables: PackedTables, dtype: Dtype, device: object) -> Numbers:
+    """Return zeros (count, n), with ones where a packed torque is on a joint."""
+    key = dtype, device
+    if key not in tables._places:
+        rows = tables._layout.torque
+        sums = np.zeros((len(rows), tables._n))
+        sums[np.arange(len(rows)), rows[:, 0]] = 1.0
+        tables._places[key] = tables._backend.constant(sums, _like(dtype, device))
+    return tables._places[key]
+
+
+def packed_sums(tables: PackedTables, field: str, device: object) -> SumTable:
+    """Return the positions by which a field is summed over the links."""
+    key = field, device
+    if key not in tables._sums:
+        listed = sum_table(tables._layout, field, tables._n)
+        tables._sums[key] = SumTable(*(tables._backend.index(a, _like(None, device)) for a in listed))
+    return tables._sums[key]
+
+
+def _device(values: Numbers) -> object:
+    return getattr(values, "device", None)
+
+
+def _like(dtype: Dtype | None, device: object) -> Numbers:
+    return cast("Numbers", TableKind(dtype, device))
 
 
 def sum_table(layout: Layout, field: str, n: int) -> tuple[NDArray[np.intp], ...]:

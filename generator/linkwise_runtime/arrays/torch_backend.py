@@ -11,6 +11,7 @@ from torch import Tensor
 from torch._subclasses.fake_tensor import unset_fake_temporarily
 from torch.fx.experimental.proxy_tensor import disable_proxy_modes_tracing
 
+from ..answers.packed import packed_joint_sums, packed_sums, packed_table
 from ..arguments import (
     NOTHING,
     Beside,
@@ -24,13 +25,16 @@ from ..arguments import (
     samples_of,
 )
 from ..interface import ClosedForms, EnergyForms, Entries, Namespace, Numbers
+from ..kinematics.frame_answers import make_frame_tables
 from ..parameter_values import fits
-from ..rule.calls import RigidRule
+from ..rule.calls import RigidRule, kept_rule_tables
 from ..rule.joint_tree import Bodies, JointTree
 from ..structure import Structure
 from .backend import ArrayBackend, Crossing
 from .torch_modules import CallModule, ReloadableRobot
 
+for makes_tables in (packed_table, packed_joint_sums, packed_sums, kept_rule_tables, make_frame_tables):
+    torch.compiler.assume_constant_result(makes_tables)  # type: ignore[no-untyped-call, unused-ignore]
 KINDS = {"float32": torch.float32, "float64": torch.float64}
 FLOATS = ({torch.float32}, {torch.float64})
 CROSSINGS = {
@@ -75,8 +79,12 @@ class TorchBackend(ArrayBackend):
             k: v if torch.is_tensor(v) else torch.as_tensor(v, dtype=torch.float64)
             for k, v in parameters.items()
         }
-        # Otherwise torch.compile would trace how numbers are summed up, and how tables are made.
-        _ = structure.passive_sums, self.answers
+        # Otherwise torch.compile would trace how numbers are summed up, and how tables are made: it cannot
+        # follow the lock of a cached property, which Python 3.11 has.
+        _ = structure.n, structure.N, structure.layout, structure.sizes, structure.passive_sums
+        _ = structure.share_names, self.answers.shapes
+        if self.tree:
+            _ = self.frames
         if self.rule and self.kernel != "straight":
             for like in self.examples:
                 self.rule.tables(self, like)

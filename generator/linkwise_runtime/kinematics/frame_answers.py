@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from types import MethodType
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar, cast
 
 from ..answers.answers import answer_shapes
 from ..answers.packed import PackedBackend
 from ..arguments import Beside
 from ..chosen_names import choice, known_as, short, whole_number
-from ..interface import Namespace, Numbers, side_by_side
+from ..interface import Dtype, Namespace, Numbers, TableKind, side_by_side
 from ..rule.joint_tree import JointTree
 from ..rule.kinematics import Twists
 from ..rule.tables import converted
@@ -173,6 +174,21 @@ ANSWERS: Mapping[str, Callable[[OnFrames], Numbers]] = {
 """Functions for the rows of the table by their names; samples are the last axis."""
 
 
+def make_frame_tables(
+    answers: "FrameAnswers", owner: Any, part: object, dtype: Dtype, device: object
+) -> None:
+    """Make the tree's numbers, and the table of a part that `owner` lists and keeps, unless they are there.
+
+    Compilers run this while they compile, do not follow it, and then find both made.
+    """
+    key, like = (dtype, device), cast("Numbers", TableKind(dtype, device))
+    if key not in answers._own:
+        own: OwnNumbers = own_numbers(answers.tree), formula_sources(answers.tree)
+        answers._own[key] = converted(own, answers.backend, like)
+    if (part, key) not in owner._tables:
+        owner._tables[part, key] = converted(owner._listed(part), answers.backend, like)
+
+
 class FrameAnswers:
     """Calls on frames on one back end; tables are made when first needed, for each dtype and device."""
 
@@ -221,15 +237,12 @@ class FrameAnswers:
     ) -> FrameRequest[Tables]:
         """Return the constants, numbers and motion of a call, with samples innermost.
 
-        tables: those of parts, for each dtype and device; listed: makes the one of a part, in float64
+        tables: those of parts, for each dtype and device; listed: method of their owner that makes the one of
+        a part, in float64
         """
         q, xp = motion[0], self.backend.xp
         key = q.dtype, getattr(q, "device", None)
-        if key not in self._own:
-            own: OwnNumbers = own_numbers(self.tree), formula_sources(self.tree)
-            self._own[key] = converted(own, self.backend, q)
-        if (part, key) not in tables:
-            tables[part, key] = converted(listed(part), self.backend, q)
+        make_frame_tables(self, cast(MethodType, listed).__self__, part, *key)
         numbers = self._numbers(self._own[key], q)
         flat = [xp.swapaxes(a.reshape(-1, a.shape[-1]), 0, 1) for a in motion]
         placed = {name: xp.swapaxes(a.reshape(-1, 3), 0, 1)[:, None] for name, a in vectors.items()}

@@ -6,7 +6,7 @@ from typing import Any, Generic, Protocol
 
 from ..call_table import CALLS
 from ..door import Door
-from ..interface import Array, Library, Numbers
+from ..interface import Array, Library, Numbers, Unscripted
 from ..out_argument import accepted
 from .frame_answers import ALL, LINKS, FrameAnswers, frame_index, vectors_beside
 
@@ -30,7 +30,7 @@ class FramedRobot(Protocol):
         """Entry at which motion is read."""
 
 
-class Kinematics(Generic[Array]):
+class Kinematics(Unscripted, Generic[Array]):
     """Poses, Jacobians and their rates of a robot's frames; `Dynamics.kinematics` of any back end.
 
     A frame is a body of the robot's file, also one that was merged into another, stands on the ground or has

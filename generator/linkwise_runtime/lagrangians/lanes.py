@@ -8,7 +8,7 @@ gradient of each of them. What a link passes on to the links it carries is compu
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
-from typing import TypeVar, cast
+from typing import NamedTuple, TypeVar, cast
 
 import numpy as np
 import torch
@@ -96,47 +96,43 @@ def carried(function: Method) -> Method:
     return cast(Method, part)
 
 
-@dataclass(frozen=True)
-class Plan:
-    """Order of the lanes: each link's own, `counts` of them, then those of the branches it carries."""
+class Plan(NamedTuple):
+    """Order of the lanes: each link's own, `counts` of them, then those of the branches it carries.
+
+    A compiler makes one of its fields, as it cannot follow how these are computed once and kept.
+    """
 
     paths: tuple[tuple[int, ...], ...]
     parents: tuple[int | None, ...]
     counts: tuple[int, ...]
+    totals: tuple[int, ...]
+    """Number of lanes of each link and of all links that it carries."""
+    starts: tuple[int, ...]
+    """First lane of each link."""
+    branches: tuple[tuple[int, ...], ...]
+    """Links that each link carries directly."""
+    lanes: int
+    """Number of lanes of all links together."""
 
-    @cached_property
-    def lanes(self) -> int:
-        """Number of lanes of all links together."""
-        return sum(self.counts)
-
-    @cached_property
-    def totals(self) -> tuple[int, ...]:
-        """Number of lanes of each link and of all links that it carries."""
-        totals = list(self.counts)
-        for j, parent in reversed(list(enumerate(self.parents))):
+    @classmethod
+    def of(
+        cls, paths: tuple[tuple[int, ...], ...], parents: tuple[int | None, ...], counts: tuple[int, ...]
+    ) -> "Plan":
+        """Return the plan for links with so many lanes each."""
+        totals, starts = list(counts), list[int]()
+        branches: list[list[int]] = [[] for _ in parents]
+        for j, parent in reversed(list(enumerate(parents))):
             if parent is not None:
                 totals[parent] += totals[j]
-        return tuple(totals)
-
-    @cached_property
-    def starts(self) -> tuple[int, ...]:
-        """First lane of each link."""
-        starts: list[int] = []
         free: dict[int | None, int] = {None: 0}
-        for count, total, parent in zip(self.counts, self.totals, self.parents, strict=True):
+        for j, (count, parent) in enumerate(zip(counts, parents, strict=True)):
             starts.append(free[parent])
-            free[len(starts) - 1] = free[parent] + count
-            free[parent] += total
-        return tuple(starts)
-
-    @cached_property
-    def branches(self) -> tuple[tuple[int, ...], ...]:
-        """Links that each link carries directly."""
-        found: list[list[int]] = [[] for _ in self.parents]
-        for j, parent in enumerate(self.parents):
+            free[j] = free[parent] + count
+            free[parent] += totals[j]
             if parent is not None:
-                found[parent].append(j)
-        return tuple(map(tuple, found))
+                branches[parent].append(j)
+        carried_by = tuple(map(tuple, branches))
+        return cls(paths, parents, counts, tuple(totals), tuple(starts), carried_by, sum(counts))
 
     def lay(self, leaf: Leaf, dim: int) -> "Motion":
         """Return the lanes of one quantity, q or qd, whose variables, of `dim` axes, `leaf` makes."""
@@ -177,12 +173,12 @@ class LaneEntries:
     @cached_property
     def plan(self) -> Plan:
         """Plan with a lane of link j for each k on its path."""
-        return Plan(self.paths, self.parents, tuple(map(len, self.paths)))
+        return Plan.of(self.paths, self.parents, tuple(map(len, self.paths)))
 
     @cached_property
     def single(self) -> Plan:
         """Plan with one lane for each link."""
-        return Plan(self.paths, self.parents, (1,) * len(self.paths))
+        return Plan.of(self.paths, self.parents, (1,) * len(self.paths))
 
     @cached_property
     def paths_in_lanes(self) -> tuple[Indices, Indices]:

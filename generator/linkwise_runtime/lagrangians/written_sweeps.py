@@ -121,8 +121,7 @@ class WrittenLink:
 
     def owned(self) -> list[Tensor]:
         """Return rows c1_ik (..., n) for i of the path."""
-        points, weights = np.polynomial.legendre.leggauss((self.link.degree + 1) // 2)
-        nodes = [(float(x + 1.0) / 2.0, float(w) / 2.0) for x, w in zip(points, weights, strict=True)]
+        nodes = _gauss_nodes((self.link.degree + 1) // 2)
         slopes = [[w * row for row in rows(self.force, x * self.qd, self.link.path)] for x, w in nodes]
         return [sum(parts[1:], parts[0]) for parts in zip(*slopes, strict=True)]
 
@@ -245,6 +244,13 @@ def named_shares(links: Links, p: Parameters, q: Tensor, qd: Tensor) -> Tensor:
         for name in link.shares
     ]
     return torch.cat(found, -1) if found else q.new_zeros((*q.shape[:-1], 0))
+
+
+@torch.compiler.assume_constant_result  # type: ignore[untyped-decorator, unused-ignore]
+def _gauss_nodes(count: int) -> list[tuple[float, float]]:
+    """Return Gauss's points from 0 to 1 with their weights; compilers take them as they are."""
+    points, weights = np.polynomial.legendre.leggauss(count)
+    return [(float(x + 1.0) / 2.0, float(w) / 2.0) for x, w in zip(points, weights, strict=True)]
 
 
 def _torque_at(link: WrittenLink, qdd: Tensor, qd: Tensor) -> Tensor:

@@ -3,11 +3,12 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..interface import Dtype, Library, Numbers
+from ..interface import Dtype, Library, Numbers, TableKind
 from ..quantities import PARAMETERS
 from .joint_tree import Bodies, JointTree, Own
 from .kinematics import gather, poses, twists
@@ -33,6 +34,14 @@ Innermost = Callable[[Sequence[Numbers], TreeArrays, LinkNumbers], list[Numbers]
 """Function of motion, the tree's numbers and its links' that returns answers, all with samples innermost."""
 
 
+def kept_rule_tables(rule: "RigidRule", library: Library, dtype: Dtype, device: object) -> RuleTables:
+    """Return a rule's constants, made once; compilers take them as they are, and do not follow this."""
+    key = library.xp.__name__, dtype, device
+    if key not in rule._tables:
+        rule._tables[key] = converted(rule._listed, library, cast("Numbers", TableKind(dtype, device)))
+    return rule._tables[key]
+
+
 class RigidRule:
     """Rigid-link rule for a robot's tree; tables are made when first asked for, for each dtype and device."""
 
@@ -51,10 +60,7 @@ class RigidRule:
 
     def tables(self, library: Library, like: Numbers) -> RuleTables:
         """Return the constants to compute with `like`."""
-        key = library.xp.__name__, like.dtype, getattr(like, "device", None)
-        if key not in self._tables:
-            self._tables[key] = converted(self._listed, library, like)
-        return self._tables[key]
+        return kept_rule_tables(self, library, like.dtype, getattr(like, "device", None))
 
     def bodies(self) -> Bodies[NDArray[np.float64]]:
         """Return the bodies that the links carry, as the package has them."""
