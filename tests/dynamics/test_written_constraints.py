@@ -329,7 +329,7 @@ def test_a_knife_edge_turns_through_all_headings(backend: str, method: str, tmp_
     blade = {"blade": Y.qd * sp.cos(YAW.q) - X.qd * sp.sin(YAW.q)}
     system = energy_system("skate", [X, Y, YAW], [body], constraints=blade, independent=["x", "yaw"])
     robot = loaded(system, tmp_path, backend)
-    yaw, speed, turning = np.array([0.0, 1.3]), np.array([1.2, -0.7]), np.array([1.6, -2.1])
+    yaw, speed, turning = np.array([0.0, np.pi / 2]), np.array([1.2, -0.7]), np.array([1.6, -2.1])
     time = np.linspace(0, 5, 11)
     heading = yaw + turning * time[:, None]
     ways = np.sin(heading) - np.sin(yaw), np.cos(yaw) - np.cos(heading)
@@ -366,20 +366,33 @@ def test_an_analysis_holds_a_log_to_the_constraints(tmp_path: Path) -> None:
     aside = write_csv(tmp_path / "aside.csv", np.stack([time, x, 0 * y, yaw], 1), ["x", "y", "yaw"])
     (told,) = analyze(aside, tmp_path / "skate").warnings
     assert "blade is not kept by the log's own velocities" in told
+    late = np.stack([time + 1.5 * np.pi, x, y, yaw + 1.4], 1)
+    late[:, 1:3] = np.stack([np.cos(1.4) * x - np.sin(1.4) * y, np.sin(1.4) * x + np.cos(1.4) * y], 1)
+    late = late[(np.abs(late[:, 3] - np.pi / 2) > 0.01) & (late[:, 3] < np.pi / 2)]
+    (told,) = analyze(write_csv(tmp_path / "late.csv", late, ["x", "y", "yaw"]), tmp_path / "skate").warnings
+    assert "y move" in told
+    assert "times as fast as x, yaw" in told
     short = write_csv(tmp_path / "short.csv", np.stack([time, x, yaw], 1), ["x", "yaw"])
     with pytest.raises(LinkwiseError, match="no column for joint 'y': blade is a constraint of velocities"):
         analyze(short, tmp_path / "skate")
 
 
 def test_a_wire_brings_back_what_a_log_leaves_out(tmp_path: Path) -> None:
-    system = energy_system("wire", [X, Y], [BEAD], constraints={"wire": Y.q - X.q**2}, independent=["x"])
+    """A bead on a wire, y = x^2, and a wheel that it turns, which hangs on coordinates that follow alone."""
+    wheel = LinkEnergy("wheel", YAW.qd**2 / 5, {"spring": 3 * Y.q})
+    held = {"wire": Y.q - X.q**2, "gear": YAW.q - 2 * X.q}
+    system = energy_system("wire", [X, Y, YAW], [BEAD, wheel], constraints=held, independent=["x"])
     write_package(generate(system, ["numpy"]), tmp_path / "wire")
     table = smooth(60, 1)
     result = analyze(write_csv(tmp_path / "log.csv", table, ["x"]), tmp_path / "wire")
-    np.testing.assert_allclose(result.q[:, 1], table[:, 1] ** 2, atol=1e-9)
+    np.testing.assert_allclose(result.q[:, 1:], np.stack([table[:, 1] ** 2, 2 * table[:, 1]], 1), atol=1e-9)
     slope, xd, xdd = 2 * result.q[:, 0], result.qd[:, 0], result.qdd[:, 0]
-    pushed = (1 + slope**2) * xdd + slope * 2 * xd**2 + 9.81 * slope
-    np.testing.assert_allclose(result.torque[:, 0], pushed, atol=1e-9)
+    bead = (1 + slope**2) * xdd + slope * 2 * xd**2 + 9.81 * slope
+    np.testing.assert_allclose(result.partial_torque[:, 0, 0], bead, atol=1e-9)
+    np.testing.assert_allclose(result.partial_torque[:, 0, 1], 1.6 * xdd + 3 * slope, atol=1e-9)
+    off = np.column_stack([table, table[:, 1] ** 2 + 0.02])
+    with pytest.raises(LinkwiseError, match=r"'y' is 0\.02 \(m or rad\) from where wire, gear close"):
+        analyze(write_csv(tmp_path / "off.csv", off, ["x", "y"]), tmp_path / "wire")
 
 
 def test_a_place_where_coordinates_do_not_follow_is_told_with_others_to_choose(tmp_path: Path) -> None:

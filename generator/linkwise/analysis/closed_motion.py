@@ -26,6 +26,8 @@ BLOCK = 4096
 """Samples closed at once."""
 APART = 16
 """Samples from one led position to the next; those between them are first guessed on a straight line."""
+STEEP = 20.0
+"""Largest velocity of a dependent joint by a unit of an independent one that is taken unsaid."""
 SLIP = 0.05
 """Part of a velocity constraint's terms by which a log may break it unsaid: velocities are derived."""
 NEAR = 0.1
@@ -78,7 +80,8 @@ def closed_samples(
             q = np.zeros((len(time), n))
             q[:, list(there)] = samples.q[start : start + BLOCK]
             if missing:
-                q = _without_leaps(model, time, q, there, last)
+                q, given = _without_leaps(model, time, q, there, last), q
+                _refuse_far(model, time, q, given, there, tolerance)
             else:
                 worst = _larger(worst, _checked(model, time, q, tolerance))
                 q = _closed(model, time, q)
@@ -103,7 +106,9 @@ def _refuse_lost_way(model: ConstrainedModel, there: Sequence[int]) -> None:
 
 
 def slip_warnings(samples: Samples, model: ConstrainedModel | None, processing: Processing) -> Iterator[str]:
-    """Yield a warning for each constraint of velocities, sum_k A_k qd_k = 0, that a log's velocities break.
+    """Yield warnings about constraints of velocities, sum_k A_k qd_k = 0.
+
+    A log's velocities may break them, and independent joints hardly tell the others.
 
     The motion that is analysed keeps it: dependent joints move as independent ones want.
     """
@@ -111,13 +116,22 @@ def slip_warnings(samples: Samples, model: ConstrainedModel | None, processing: 
     if model is None or written is None or all(written.holonomic):
         return
     moved = [row for row, holds in enumerate(written.holonomic) if not holds]
-    worst, sizes = np.zeros((2, len(moved)))
+    (worst, sizes), steepest, when = np.zeros((2, len(moved))), 0.0, 0.0
     for at in range(0, len(samples.time), BLOCK):
         end = min(at + BLOCK, len(samples.time))
         q, qd, _ = derivatives(samples.q, samples.rate, at, end, processing)
         terms = np.asarray(model.constraints.jacobian(q))[:, moved] * qd[:, None, :]
         worst = np.maximum(worst, np.abs(terms.sum(-1)).max(0))
         sizes = np.maximum(sizes, np.abs(terms).sum(-1).max(0))
+        slopes = np.abs(np.asarray(model.constraints.velocity_map(q))).max((1, 2))
+        if slopes.max() > steepest:
+            steepest, when = float(slopes.max()), float(samples.time[at + int(slopes.argmax())])
+    if steepest > STEEP:
+        yield (
+            f"at {when:.6g} s {listed(model.constraints.dependent)} move {steepest:.3g} times as fast as "
+            f"{listed(model.constraints.independent)}, of which torques are told: errors of the log grow by "
+            "that; choose others as `independent` in the file"
+        )
     for row, apart, size in zip(moved, worst, sizes, strict=True):
         if apart > SLIP * size:
             yield (
@@ -144,6 +158,21 @@ def _checked(model: ConstrainedModel, time: Array, q: Array, tolerance: float) -
             f" ({', '.join(model.constraints.dependent)}), or say --loop-tolerance"
         )
     return ClosedLog(largest, name)
+
+
+def _refuse_far(
+    model: ConstrainedModel, time: Array, q: Array, given: Array, there: Sequence[int], tolerance: float
+) -> None:
+    """Raise LinkwiseError for a dependent joint of the log that is not where ties close without it."""
+    own = [k for k in there if k not in model.following.independent]
+    apart = np.abs(q[:, own] - given[:, own])
+    if apart.max(initial=0.0) > tolerance:
+        sample, k = np.unravel_index(int(apart.argmax()), apart.shape)
+        raise LinkwiseError(
+            f"time {time[sample]:.6g} s: {model.joint_names[own[int(k)]]!r} is {apart[sample, k]:.3g} (m or "
+            f"rad) from where {listed(model.constraints.names)} close, more than {tolerance:g}; mend the "
+            "log, leave its column out, or say --loop-tolerance"
+        )
 
 
 def _closed(model: ConstrainedModel, time: Array, q: Array) -> Array:

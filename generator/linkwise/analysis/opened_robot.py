@@ -32,7 +32,7 @@ from linkwise.package.manifest import FILE, Manifest
 from linkwise.package.share_word import share_word
 
 IN_POSITIONS, IN_VELOCITIES = re.compile(r"\bq_(\d+)\b"), re.compile(r"\bqd_(\d+)\b")
-"""Coordinates in a written constraint of positions, and those whose velocities are in one of velocities."""
+"""Coordinates, from 1, in a written constraint of positions, and those that move in one of velocities."""
 
 
 def load_unit(unit: str) -> str:
@@ -285,7 +285,8 @@ def coordinates_tied(manifest: Manifest) -> list[frozenset[int]]:
     rows = manifest.energies.constraints
     words = (IN_POSITIONS if row.holonomic else IN_VELOCITIES for row in rows)
     return [
-        frozenset(int(k) for k in word.findall(row.expression)) for row, word in zip(rows, words, strict=True)
+        frozenset(int(k) - 1 for k in word.findall(row.expression))
+        for row, word in zip(rows, words, strict=True)
     ]
 
 

@@ -152,6 +152,8 @@ class ChosenConstraints:
     row_names: tuple[str, ...]
     """Name of the constraint that each row belongs to."""
     independent: tuple[int, ...]
+    of_positions: bool
+    """True if positions of the independent joints tell those of the others; rolling is of velocities."""
     _structure: Structure
     _own: tuple[int, ...]
     """Independent joints of the package; empty where it has none."""
@@ -266,6 +268,7 @@ class TreeConstraints(ChosenConstraints):
         self.row_names = tuple(
             [one.name for one in self.held for _ in one.row_names] + [c.name for c in tree.couplings]
         )
+        self.of_positions = not any(any(one.arm) for one in self.held)
         self._choose(independent, at, loose_base(tree) if contacts else (), bool(contacts))
 
     def _closed(self) -> Closing:

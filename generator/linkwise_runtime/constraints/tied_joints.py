@@ -20,6 +20,7 @@ from .closed_places import (
     closed_place,
     independent_torque,
     tie_forces,
+    ties_at,
     times,
 )
 from .independent_joints import JointColumns, joint_columns
@@ -82,6 +83,10 @@ class TiedJoints:
         """Return how joints follow once dependent joints close the ties; see `closed`."""
         at = self.closed(backend, q, held_at, columns)
         return checked_place(at, columns or self.columns(backend, at.q), self._names)
+
+    def scaled_rows(self, backend: ArrayBackend, q: Numbers) -> Numbers:
+        """Return A (..., C, n) at any q, with its rows divided by their sizes."""
+        return ties_at(self.rows(backend), self.columns(backend, q), q).rows
 
     def motion(
         self, backend: ArrayBackend, place: ClosedPlace, qd: Numbers, tau: Numbers, passive: bool

@@ -68,6 +68,7 @@ class WrittenChoice(ChosenConstraints):
         self._own, self._own_position = written.independent, written.closed_position
         self.names = self.rows = self.row_names = written.names
         self.row_units = ("",) * len(written.names)
+        self.of_positions = all(written.holonomic)
         self._choose(independent, at, loose=())
 
     def _closed(self) -> Closing:

@@ -16,13 +16,15 @@ from ..chosen_names import short
 from ..constraints.robot_constraints import Constraints
 from ..interface import Numbers, array_of, namespace
 from ..quantities import Trajectory
-from .equations_of_motion import EquationsOfMotion, Given, ReadLoads, State, TiedMotion, varying_of
+from .equations_of_motion import EquationsOfMotion, Given, ReadLoads, State, TiedMotion, TiesLost, varying_of
 from .induced_accelerations import DrivenRobot, constraints_of
 from .source_forces import loads_of
 
 Rates = Callable[[float, State], State]
 ADAPTIVE = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 """Methods of SciPy's solve_ivp."""
+PARTS = 17
+"""Instants of a solver's step at which it is looked at, if it is too long to be told at once."""
 
 
 def in_fixed_steps(
@@ -65,24 +67,51 @@ def by_scipy(
         ) from None
 
     exact = State(*(np.asarray(a, float) for a in start))
+    lost: list[TiesLost] = []
 
     def flat_rates(t: float, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return _flat(rates(float(t), _shaped(values, exact)))
+        try:
+            return _flat(rates(float(t), _shaped(values, exact)))
+        except TiesLost as error:  # of a state that is tried; solvers take a shorter step for what is NaN
+            lost.append(error)
+            return np.full_like(values, np.nan)
 
     yield start
     rest, (rtol, atol) = list(times[1:]), tolerances
     if not rest:
         return
-    most = math.inf if step is None else step
-    solver = getattr(solvers, method)(
-        flat_rates, times[0], _flat(exact), times[-1], max_step=most, rtol=rtol, atol=atol
-    )
+    most, again = math.inf if step is None else step, -math.inf
+
+    def begun(t: float, values: NDArray[np.float64]) -> Any:
+        make = getattr(solvers, method)
+        return make(flat_rates, t, values, times[-1], max_step=most, rtol=rtol, atol=atol)
+
+    solver = begun(times[0], _flat(exact))
     while rest:
-        message = solver.step()
+        known = len(lost)
+        try:
+            message = solver.step()
+        except ValueError:
+            # Implicit methods grow the way by which they ask for slopes while nothing changes along it, and
+            # what they find there is NaN where a joint has become independent since: they begin anew.
+            if not lost:
+                raise
+            if solver.t == again:
+                raise lost[-1] from None
+            again = solver.t
+            solver = begun(solver.t, solver.y)
+            continue
         if solver.status == "failed":
+            if len(lost) > known:
+                raise lost[-1]
             raise ValueError(f"{method} gave up after t = {solver.t:g} s: {message}")
-        settle(float(solver.t), _shaped(solver.y, exact))
         between = solver.dense_output()
+        begin, end = float(solver.t_old), float(solver.t)
+        try:
+            settle(end, _shaped(between(end), exact))
+        except TiesLost:  # of a step that is too long to tell, perhaps
+            for part in np.linspace(begin, end, PARTS)[1:]:
+                settle(float(part), _shaped(between(part), exact))
         while rest and rest[0] <= solver.t:
             yield _shaped(between(rest.pop(0)), start)
 
@@ -188,8 +217,8 @@ def _started(
     work = 0.0 * q.sum(-1)
     if constraints is None:
         return free, State(q, qd, work)
-    place = constraints.ties.closed_place(free.backend, q, q)
-    ties = TiedMotion(constraints.ties, free.backend, place)
+    ties = TiedMotion(constraints.ties, free.backend, q)
+    place = ties.start
     return replace(free, ties=ties), State(place.q, place.velocity(place.own(qd)), work)
 
 
