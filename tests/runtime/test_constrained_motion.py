@@ -172,7 +172,7 @@ def test_gradients_flow_through_steps_of_a_tied_robot(package_of: Callable[[str]
     [
         ("numpy", {"method": "DOP853", "rtol": 1e-12, "atol": 1e-12}, 1e-9),
         ("torch", {"step": 4e-3}, 0.02),
-        ("numpy", {"method": "Radau", "rtol": 1e-4, "atol": 1e-6}, 0.02),
+        ("numpy", {"method": "Radau", "rtol": 1e-5, "atol": 1e-7}, 0.02),
     ],
 )
 def test_motions_go_on_where_their_independent_joints_tell_nothing(
