@@ -55,13 +55,14 @@ def energy_system(
     _check_names(name, motion.coordinates, links)
     motion.check_apart()
     values = _values(parameters or {}, motion)
-    checked, used = [], set[sp.Symbol]()
+    checked, used, moving = [], set[sp.Symbol](), False
     for link in links:
         with within(f"link {link.name!r}"):
             written = link.energies(motion.rate, values) if isinstance(link, BODIES) else link
             terms = written_terms(written, motion)
             found = _checked(link.name, terms, motion, values, symbolic)
             used |= symbols_of(terms.all())
+            moving |= terms.kinetic != 0
             checked.append(found)
     for symbol in motion.inputs:
         if symbol not in used:
@@ -70,7 +71,8 @@ def energy_system(
     held = written_constraints(
         constraints or {}, motion, lambda zero: _known(_whole(zero), motion, values, symbolic), numbers
     )
-    _check_moved(motion, checked, held)
+    if moving:  # torques of statics may be all that is asked for
+        _check_moved(motion, checked, held)
     used |= {symbol for one in held for symbol in one.expression.free_symbols}
     kept = {symbol: value for symbol, value in values.items() if symbolic and symbol in used}
     varying = {symbol: value for symbol, value in motion.varying.items() if symbol in used}
