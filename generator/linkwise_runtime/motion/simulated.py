@@ -16,9 +16,10 @@ from ..chosen_names import short
 from ..constraints.robot_constraints import Constraints
 from ..interface import Numbers, array_of, namespace
 from ..quantities import Trajectory
-from .equations_of_motion import EquationsOfMotion, Given, ReadLoads, State, TiedMotion, TiesLost, varying_of
+from .equations_of_motion import EquationsOfMotion, Given, ReadLoads, State, varying_of
 from .induced_accelerations import DrivenRobot, constraints_of
 from .source_forces import loads_of
+from .tied_motion import TiedMotion, TiesLost
 
 Rates = Callable[[float, State], State]
 ADAPTIVE = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
