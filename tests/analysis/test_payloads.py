@@ -11,7 +11,7 @@ from linkwise import Payload, generate, read_system, write_package
 from linkwise.analysis import Processing, analyze
 from linkwise.analysis.choices import carried
 from linkwise.analysis.job import Outputs, Request
-from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import page_data

@@ -12,7 +12,7 @@ from helpers import urdf_text
 from helpers.motion_logs import JOINTS, PLANAR3, smooth, write_csv
 from linkwise import generate, read_system, write_package
 from linkwise.analysis import Load, Reading, analyze
-from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.show import figure_png
 from linkwise.analysis.show.drawn_curves import largest_few

@@ -7,7 +7,7 @@ from helpers import urdf_text
 from helpers.motion_logs import write_csv
 from linkwise import Options, generate, read_system, write_package
 from linkwise.analysis import analyze
-from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.samples import Samples, pole_warnings
 
 

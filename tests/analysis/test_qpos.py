@@ -22,8 +22,8 @@ from linkwise import (
     read_system,
     write_package,
 )
+from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.logs import open_log
-from linkwise.analysis.opened_robot import load_robot
 from linkwise.cli.app import app
 from linkwise.package.load import import_package
 from linkwise.study import run_study

@@ -10,7 +10,7 @@ import pytest
 from helpers.motion_logs import JOINTS, LEG, PLANAR3, PUMA560, smooth, write_csv, write_mot
 from linkwise import Options, generate, read_system, write_package
 from linkwise.analysis import Lowpass, Processing, Reading, analyze, stream
-from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.paper_motions import MOTIONS, SIMULATED, write_motions
 from linkwise.analysis.verify import Closure
 from linkwise.errors import LinkwiseError

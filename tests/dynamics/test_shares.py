@@ -23,7 +23,7 @@ from linkwise import (
     write_package,
 )
 from linkwise.analysis import Reading, analyze
-from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.show.page import page_data
 from linkwise.escape import column_part
 from linkwise.package.load import import_package

@@ -25,7 +25,7 @@ from linkwise import (
     write_package,
 )
 from linkwise.analysis import analyze
-from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.show.page import page_data
 from linkwise.emit.c.quantity_table import potential, quantity_lines
 from linkwise.graphs import overlay, part_label

@@ -9,7 +9,7 @@ import pytest
 from helpers.motion_logs import write_csv
 from helpers.shown_model import ShownModel
 from linkwise import generate, read_robot, read_system, write_package
-from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.load_robot import load_robot
 from linkwise.cli.app import app
 from typer.testing import CliRunner
 

@@ -11,7 +11,7 @@ from conftest import DATA
 from helpers.motion_logs import write_csv
 from helpers.urdf_text import joint, link, mimic, robot
 from linkwise import LinkwiseError, generate, read_robot, read_system, write_package
-from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.load_robot import load_robot
 from linkwise.cli.app import app
 from linkwise.identification.pseudo_inertia import shared_mass
 from typer.testing import CliRunner

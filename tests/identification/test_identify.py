@@ -26,7 +26,8 @@ from linkwise import (
     write_package,
 )
 from linkwise.analysis import Lowpass, Processing, Reading
-from linkwise.analysis.opened_robot import OpenedRobot, load_robot
+from linkwise.analysis.load_robot import load_robot
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.cli.app import app
 from linkwise.identification.base_parameters import base_parameters
 from linkwise.identification.identified_files import page

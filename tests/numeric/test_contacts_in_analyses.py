@@ -9,7 +9,7 @@ import pytest
 from helpers.motion_logs import smooth, write_csv
 from linkwise import LinkwiseError, Load, Options, generate, read_system, write_package
 from linkwise.analysis import Contacts, WhileColumn, analyze
-from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.load_robot import load_robot
 from linkwise_runtime.quantities import Contact
 from tools.corpus import ROBOTS
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from linkwise import Fitting, LinkwiseError, Options, generate, identify, read_system, write_package
-from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.load_robot import load_robot
 from linkwise.identification.identified_robot import identified_robot
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest

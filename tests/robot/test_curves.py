@@ -15,7 +15,7 @@ from linkwise import (
     read_system,
     write_package,
 )
-from linkwise.analysis.opened_robot import load_robot
+from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.show.page import stick_figure
 from linkwise.package.load import import_package
 from linkwise.robot.curve import Curve

@@ -243,3 +243,19 @@ def test_constraints_that_are_not_the_robots_are_refused(package_of: Callable[[s
         robot.induced_accelerations(q, qd, tau, constraints=other)
     with pytest.raises(TypeError, match=r"^constraints is True; give what robot.constrained\(...\) makes"):
         robot.simulate(q, qd, [0.0, 0.1], constraints=True)
+
+
+@pytest.mark.parametrize("method", ["RK4", "RK45", "Radau"])
+def test_an_error_of_the_users_own_comes_through(
+    method: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    robot = package_of(CRANK).load("numpy")
+    q = states(robot, 4)[0][0]
+
+    def pull(t: float, q: Any, qd: Any) -> Any:
+        if t > 0.1:
+            raise ValueError("the motor is out of breath")
+        return np.array([0.0, 0.0, 30.0])
+
+    with pytest.raises(ValueError, match="the motor is out of breath"):
+        robot.simulate(q, 0.0 * q, [0.0, 0.5], pull, method=method, constraints=robot.constrained(["knee"]))

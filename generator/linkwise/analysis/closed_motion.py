@@ -108,9 +108,8 @@ def _refuse_lost_way(model: ConstrainedModel, there: Sequence[int]) -> None:
 def slip_warnings(samples: Samples, model: ConstrainedModel | None, processing: Processing) -> Iterator[str]:
     """Yield warnings about constraints of velocities, sum_k A_k qd_k = 0.
 
-    A log's velocities may break them, and independent joints hardly tell the others.
-
-    The motion that is analysed keeps it: dependent joints move as independent ones want.
+    A log's velocities may break them, which the motion that is analysed keeps: dependent joints move as
+    independent ones want. And these may hardly tell how.
     """
     written = None if model is None else model.structure.written
     if model is None or written is None or all(written.holonomic):

@@ -3,14 +3,10 @@
 Loads, payloads and contacts find the bodies of the robot's file here, by name.
 """
 
-import hashlib
 import math
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import cast
 
 from linkwise_runtime.chosen_names import known_as, nearest_first
 from linkwise_runtime.dynamics import Dynamics
@@ -19,7 +15,7 @@ from linkwise_runtime.qpos_motion import Qpos
 from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
 from linkwise_runtime.structure import PassiveJoint, Structure
 
-from linkwise.analysis.constrained_model import ConstrainedModel, tied_in_tree
+from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.contacts.ground import GroundContacts
 from linkwise.analysis.samples import FollowingJoint
 from linkwise.analysis.settings import Payload
@@ -27,12 +23,8 @@ from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, without_ending
 from linkwise.oracle.newton_euler import NewtonEuler
-from linkwise.package.load import Package, open_package
-from linkwise.package.manifest import FILE, Manifest
+from linkwise.package.load import Package
 from linkwise.package.share_word import share_word
-
-IN_POSITIONS, IN_VELOCITIES = re.compile(r"\bq_(\d+)\b"), re.compile(r"\bqd_(\d+)\b")
-"""Coordinates, from 1, in a written constraint of positions, and those that move in one of velocities."""
 
 
 def load_unit(unit: str) -> str:
@@ -96,7 +88,8 @@ class OpenedRobot:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs of written energies."""
-        return inputs_of(self.package)
+        energies = self.package.manifest.energies
+        return () if energies is None else tuple(energies.inputs)
 
     @property
     def share_rows(self) -> tuple[tuple[int, int, int], ...]:
@@ -241,91 +234,6 @@ class OpenedRobot:
     def with_own(self, field: str) -> tuple[int, ...]:
         """Return the numbers of the joints that have a passive element, by the name of its number."""
         return tuple(sorted({own.coordinate for own in self.passive if getattr(own, field)}))
-
-
-def load_robot(directory: Path, backend: str | None = None) -> OpenedRobot:
-    """Import the package in `directory`, with `backend` or the fastest that works here.
-
-    Raises LinkwiseError for a directory without a package, a damaged one, or no back end that loads or, where
-    torques depend on time or inputs, answers for samples that have their own.
-    """
-    package = open_package(directory)
-    manifest = package.manifest
-    _refuse_one_value(package, backend)
-    chosen, model = _load(package, _backends(package) if backend is None else (backend,))
-    tree = manifest.tree
-    tied = ConstrainedModel.of(model, coordinates_tied(manifest)) if manifest.tied else None
-    return OpenedRobot(
-        manifest.name,
-        tuple(model.joint_names),
-        tuple(model.joint_units),
-        tuple(model.link_names),
-        chosen,
-        model if tied is None else cast(Dynamics, tied),
-        tree,
-        _up(tree.gravity if tree is not None else None),
-        hashlib.sha256((directory / FILE).read_bytes()).hexdigest(),
-        package,
-        NewtonEuler(manifest, tree) if tree is not None else None,
-        manifest.passive,
-        constrained=tied,
-    )
-
-
-def inputs_of(package: Package) -> tuple[str, ...]:
-    """Return the names of the inputs of a package's written energies."""
-    energies = package.manifest.energies
-    return () if energies is None else tuple(energies.inputs)
-
-
-def coordinates_tied(manifest: Manifest) -> list[frozenset[int]]:
-    """Return the coordinates that each row of the constraints relates."""
-    if manifest.energies is None:
-        return [] if manifest.tree is None else tied_in_tree(manifest.tree)
-    rows = manifest.energies.constraints
-    words = (IN_POSITIONS if row.holonomic else IN_VELOCITIES for row in rows)
-    return [
-        frozenset(int(k) - 1 for k in word.findall(row.expression))
-        for row, word in zip(rows, words, strict=True)
-    ]
-
-
-def _is_varying(package: Package) -> bool:
-    energies = package.manifest.energies
-    return energies is not None and bool(energies.time or energies.inputs)
-
-
-def _backends(package: Package) -> tuple[str, ...]:
-    return tuple(name for name in package.fastest_first if not (name == "native" and _is_varying(package)))
-
-
-def _refuse_one_value(package: Package, backend: str | None) -> None:
-    """Raise LinkwiseError for a back end whose parameters have one value for all samples, where they vary."""
-    if _is_varying(package) and (backend == "native" or not _backends(package)):
-        raise LinkwiseError(
-            f"{package.directory}: its torques depend on time or inputs, which native has one value of for "
-            "all samples; generate it with numpy, and leave --backend native out"
-        )
-
-
-def _up(gravity: Sequence[float] | None) -> tuple[float, float, float]:
-    if not gravity or not any(gravity):
-        return 0.0, 0.0, 1.0
-    x, y, z = (-float(component) for component in gravity)
-    return x, y, z
-
-
-def _load(package: Package, backends: Sequence[str]) -> tuple[str, Dynamics]:
-    reasons = []
-    for backend in backends:
-        try:
-            return backend, package.load(backend)
-        except Exception as error:  # A back end may lack its compiler, its library or its files.
-            reasons.append(f"{backend}: {error}")
-    raise LinkwiseError(
-        f"{package.directory}: no back end for the analysis ({'; '.join(reasons) or 'the package has none'});"
-        " generate the robot again, with a back end that can be loaded here"
-    )
 
 
 def body_frame(what: str, body: str, robot: OpenedRobot) -> TreeFrame:

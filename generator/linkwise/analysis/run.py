@@ -11,8 +11,9 @@ from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.standing import with_contacts
 from linkwise.analysis.disk_rows import EverySample
 from linkwise.analysis.job import Analysis, Outputs, Request, prepared
+from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.loads import Load, Loads
-from linkwise.analysis.opened_robot import OpenedRobot, load_robot
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.outputs import open_table
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.phases import Phase

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from linkwise.analysis.opened_robot import OpenedRobot, load_robot
+from linkwise.analysis.load_robot import load_robot
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.cli import tell
 from linkwise.cli.flags import tell_run
 from linkwise.errors import LinkwiseError

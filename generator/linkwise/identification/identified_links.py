@@ -9,7 +9,8 @@ import numpy as np
 from linkwise_runtime.rule.joint_tree import Bodies
 from linkwise_runtime.rule.regressors import inertial_parameters
 
-from linkwise.analysis.opened_robot import OpenedRobot, load_robot
+from linkwise.analysis.load_robot import load_robot
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.settings import Processing, Reading, pairs
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within

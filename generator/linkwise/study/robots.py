@@ -7,7 +7,8 @@ from pathlib import Path
 
 from linkwise_runtime.version import VERSION
 
-from linkwise.analysis.opened_robot import OpenedRobot, load_robot
+from linkwise.analysis.load_robot import load_robot
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.package.manifest import FILE, Manifest

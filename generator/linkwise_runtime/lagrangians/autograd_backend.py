@@ -120,9 +120,8 @@ class AutogradBackend(TorchBackend):
     def _check_quadratic(self, q: Tensor, qd: Tensor) -> None:
         if transformed() or torch.compiler.is_compiling() or q.device.type == "meta" or not q.numel():
             return  # nobody may look at numbers, or there are none
-        p = self.seen_by(q)
         for link in self.modules:
-            link.check_quadratic(q, qd, p)
+            link.check_quadratic(q, qd, self.seen_by)
 
     def _of_links(self, call: str, *motion: Numbers) -> Any:
         """Return the result of a function of sweeps.py, or of its counterpart inside a transformation.

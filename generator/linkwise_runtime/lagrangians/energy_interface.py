@@ -3,7 +3,7 @@
 Calls differentiate whatever grad mode the caller is in.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -93,7 +93,7 @@ class Energies(Protocol):
     def potential(self, q: Values, p: Parameters) -> Number:
         """Return the potential energy in J: a tensor of the coordinates' shape, or one number for all."""
 
-    def check_quadratic(self, q: Tensor, qd: Tensor, p: "Parameters") -> None:
+    def check_quadratic(self, q: Tensor, qd: Tensor, seen: Callable[[Tensor], "Parameters"]) -> None:
         """Raise ValueError for a kinetic energy of the user's that coefficients of (..., n) do not tell."""
 
 

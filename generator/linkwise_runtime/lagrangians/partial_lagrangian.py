@@ -1,6 +1,6 @@
 """The Lagrangian of one link as a torch module, and that of a rigid link, whose numbers the module holds."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, ClassVar, cast
 
 import torch
@@ -68,7 +68,7 @@ class PartialLagrangian(Unscripted, torch.nn.Module):
         """Return the potential energy in J."""
         raise NotImplementedError
 
-    def check_quadratic(self, q: Tensor, qd: Tensor, p: Parameters) -> None:
+    def check_quadratic(self, q: Tensor, qd: Tensor, seen: Callable[[Tensor], Parameters]) -> None:
         """Accept the kinetic energy: linkwise wrote it; a module of the user's is looked at."""
 
     def forward(self, q: Tensor, qd: Tensor) -> Tensor:

@@ -1,6 +1,6 @@
 """Link whose energies a module of the user's has in place of the package's: one that is learned, say."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import torch
@@ -40,12 +40,15 @@ class ReplacedLink(PartialLagrangian):
         found: Number = self.module.potential(q, p)  # type: ignore[operator]
         return float(found) if isinstance(found, int) else found
 
-    def check_quadratic(self, q: Tensor, qd: Tensor, p: Parameters) -> None:
+    def check_quadratic(self, q: Tensor, qd: Tensor, seen: Callable[[Tensor], Parameters]) -> None:
         """Raise ValueError for a kinetic energy that is no quadratic form of the velocities (..., n).
 
         It is one if K(a + b) + K(a - b) = 2 K(a) + 2 K(b), here at a = qd and one b; only then do
         coefficients own its forces. A weight that training has moved may have changed it.
+
+        seen: function of q that returns the parameters as a call computes with them
         """
+        p = seen(q)
         with torch.no_grad():
             other = (1.0 + abs(qd).amax()) * torch.linspace(0.3, 1.1, qd.shape[-1]).to(qd).expand(qd.shape)
             at = q.unbind(-1)
@@ -118,7 +121,7 @@ def _check_energies(link: ReplacedLink) -> None:
         _check_energy("potential", potential, batch, "q")
         if device.type != "meta":
             try:
-                link.check_quadratic(q, qd, given)
+                link.check_quadratic(q, qd, link._backend.seen_by)
             except ValueError as found:
                 raise TypeError(str(found)) from None
         return

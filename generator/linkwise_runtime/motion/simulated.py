@@ -68,14 +68,19 @@ def by_scipy(
         ) from None
 
     exact = State(*(np.asarray(a, float) for a in start))
-    lost: list[TiesLost] = []
+    lost: TiesLost | None = None
+    told: ValueError | None = None
 
     def flat_rates(t: float, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        nonlocal lost, told
         try:
             return _flat(rates(float(t), _shaped(values, exact)))
         except TiesLost as error:  # of a state that is tried; solvers take a shorter step for what is NaN
-            lost.append(error)
+            lost = error.with_traceback(None)
             return np.full_like(values, np.nan)
+        except ValueError as error:
+            told = error
+            raise
 
     yield start
     rest, (rtol, atol) = list(times[1:]), tolerances
@@ -89,22 +94,22 @@ def by_scipy(
 
     solver = begun(times[0], _flat(exact))
     while rest:
-        known = len(lost)
+        known = lost
         try:
             message = solver.step()
-        except ValueError:
+        except ValueError as error:
             # Implicit methods grow the way by which they ask for slopes while nothing changes along it, and
             # what they find there is NaN where a joint has become independent since: they begin anew.
-            if not lost:
+            if lost is None or error is told:
                 raise
             if solver.t == again:
-                raise lost[-1] from None
+                raise lost from None
             again = solver.t
             solver = begun(solver.t, solver.y)
             continue
         if solver.status == "failed":
-            if len(lost) > known:
-                raise lost[-1]
+            if lost is not None and lost is not known:
+                raise lost
             raise ValueError(f"{method} gave up after t = {solver.t:g} s: {message}")
         between = solver.dense_output()
         begin, end = float(solver.t_old), float(solver.t)

@@ -45,7 +45,7 @@ class TiedMotion:
 
         Raises ValueError where they cannot be closed, or constraints take fewer freedoms than elsewhere.
         """
-        self._ties, self._backend, self._held_at = ties, backend, q
+        self._ties, self._backend = ties, backend
         self.start = self._settled = self._first(q)
         """Closed place of the start."""
         self._held_at = self.start.q
