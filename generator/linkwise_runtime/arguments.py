@@ -10,6 +10,7 @@ tensors that are not dense, or on different devices. Numbers that belong to a ro
 masks, are converted to that precision.
 """
 
+import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -205,6 +206,23 @@ def check_numbers(
         joints = beside[name].joints if name in beside else joint_names
         what = f"for joint {joints[entry[0]]!r}" if joints else f"in entry {', '.join(map(str, entry))}"
         raise ValueError(f"{name} is {seen[tuple(at)]:g} {where}{what}")
+
+
+def rising_instants(name: str, value: object) -> list[float]:
+    """Return instants in s; raises ValueError, which names them, for what is not a list of rising numbers."""
+    instants = as_array(name, value)
+    if instants.ndim != 1 or not len(instants) or instants.dtype.kind not in "iuf":
+        raise ValueError(
+            f"{name} has shape {instants.shape} and dtype {instants.dtype}; give the instants in s, such as "
+            "numpy.linspace(0, 1, 101)"
+        )
+    values: list[float] = instants.astype(float).tolist()
+    for k, (one, after) in enumerate(zip(values, [*values[1:], math.inf], strict=True)):
+        if not one < after or not math.isfinite(one):
+            raise ValueError(
+                f"{name}[{k}] is {one:g}; instants must be finite, each later than the one before"
+            )
+    return values
 
 
 def _array_of_tensor(name: str, tensor: "Tensor") -> NDArray[Any]:

@@ -7,6 +7,7 @@ through which it is loaded, k the coordinate that moves, which here is called th
 from collections.abc import Mapping
 
 from .call import ORDER, PACKED, Call, Quantity
+from .motion_quantities import TracedMotion
 from .quantities import (
     Coefficients,
     ConstrainedMotion,
@@ -287,6 +288,31 @@ MOTIONS = (
             "atol": 1e-12,
             "constraints": None,
             "inputs": None,
+        },
+        own="passive",
+        ties="kept",
+        out=False,
+    ),
+    Call(
+        "trace",
+        QDD,
+        (
+            Quantity("time", (), "s", "time"),
+            Quantity("velocity", ("joint", "origin", "window"), "velocity:joint", "velocity from the source"),
+            Quantity("energy", ("origin", "window"), "J", "energy of the velocity from the source"),
+            Quantity("power", ("origin", "window"), "W", "rate of that energy"),
+            Quantity("work", ("origin", "window"), "J", "integral of that power"),
+        ),
+        TracedMotion,
+        options={
+            "time": REQUIRED,
+            "tau": None,
+            "loads": (),
+            "passive": True,
+            "constraints": None,
+            "windows": (),
+            "restarts": (),
+            "by_link": False,
         },
         own="passive",
         ties="kept",

@@ -99,6 +99,15 @@ def choice(given: object, names: Iterable[str], whole: str) -> str:
     return f"near it are {near}, and `{whole}` has all {len(known)}"
 
 
+def numbered(names: Iterable[str]) -> tuple[str, ...]:
+    """Return names that differ: one that was there before has its count behind it, as in "hand (2)"."""
+    found: list[str] = []
+    for name in names:
+        count = sum(other == name or other.startswith(f"{name} (") for other in found)
+        found.append(f"{name} ({count + 1})" if count else name)
+    return tuple(found)
+
+
 def plain(name: str) -> str:
     """Return a name such that it fits into one line."""
     return name if name.isprintable() and len(name) <= LONGEST else short(name)

@@ -26,6 +26,8 @@ from .kinematics.robot_kinematics import Kinematics
 from .labelled import labelled
 from .motion.induced_accelerations import Driven, induced_accelerations, induced_reactions
 from .motion.simulated import Simulated, simulate_motion
+from .motion.traced import Traced, trace_motion
+from .motion_quantities import TracedMotion
 from .quantities import (
     Coefficients,
     Contact,
@@ -530,6 +532,43 @@ class Dynamics(RobotCalls):
         given = Simulated(q, qd, time, tau, loads, passive, step, method, rtol, atol, constraints, inputs)
         trajectory: Trajectory[Array] = simulate_motion(self, given)
         return trajectory
+
+    def trace(
+        self,
+        q: Array,
+        qd: Array,
+        qdd: Array,
+        time: Any,
+        tau: Array | None = None,
+        loads: Any = (),
+        passive: bool = True,
+        constraints: Any = None,
+        windows: Any = (),
+        restarts: Any = (),
+        by_link: bool = False,
+    ) -> TracedMotion[Array]:
+        """Return a motion's velocities by the forces that gave them: parts that sum to qd.
+
+        Part s of source s, along the motion (T, ..., n) that took place at the instants `time`, (T,), is what
+        M dv_s/dt + C(q, qd) v_s = F_s says, with C_ik = sum_j c1_ijk, from zero at the start on; under
+        constraints it keeps them. Its energy is changed by its own source alone. It tells where the momentum
+        that is there came from, not what the motion would have been without the source, and it depends on the
+        coordinates, and on the symmetric split c1 of the velocity forces.
+
+        tau: torques of the actuators, (T, ..., n): what is left of the motion is then the source "residual";
+        unless given, actuators give what the motion needs, less what loads do
+        loads, passive, constraints: as in `induced_accelerations`; loads of T samples
+        windows: length in s, or instants, (W - 1,): sources are cut there, at the samples next to them
+        restarts: instants at which the trace begins anew: all velocities are those of the start there
+        by_link: whether gravity is a source for each link
+
+        Between samples velocities go by cubics that have the accelerations of the samples. Raises ValueError
+        for a gap in time, for instants outside the motion, for kinetic energies of degree three or more in
+        the velocities, and as `forward_dynamics` and `Constraints` do.
+        """
+        given = Traced(q, qd, qdd, time, tau, loads, passive, constraints, windows, restarts, by_link)
+        traced: TracedMotion[Array] = trace_motion(self, given)
+        return traced
 
     def induced_reactions(
         self,

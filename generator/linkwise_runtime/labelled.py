@@ -1,7 +1,7 @@
 """Answers of any call of a robot with names along the axes."""
 
 import inspect
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from operator import attrgetter
 from typing import Any
 
@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from .arguments import has_tensors
 from .call import Call
 from .call_table import CALLS
-from .chosen_names import choice, short
+from .chosen_names import choice, numbered, short
 from .named_arrays import Part, SampleAxes, alone, arrays_in_order, dataset, samples_along, xarray
 from .quantities import AppliedLoad
 from .robot_axes import NamedAxis, axes_of, tied_axes
 
 TIED = "constraints."
+OVER_TIME = ("simulate", "trace")
+"""Calls whose first answer is the time along the others."""
 ALONE = ("constraints.closed", "simulate")
 """Calls that accept the independent joints alone in place of all joints."""
 
@@ -36,7 +38,7 @@ def labelled(
         raise TypeError("labelled makes arrays of its own; leave out away")
     key = rows[0].name
     asked = arguments.get("constraints")
-    is_kept = key == "simulate" and asked is not False and robot.backend.ties_joints
+    is_kept = key in OVER_TIME and asked is not False and robot.backend.ties_joints
     if asked or is_kept or key.startswith(TIED) or key == "induced_reactions":
         ties = ties or asked or robot.constraints
     arguments, samples = arrays_in_order(
@@ -45,12 +47,20 @@ def labelled(
     answer = function(**arguments)
     row = _chosen(rows, arguments)
     values = answer if isinstance(answer, tuple) else (answer,)
-    parts = list(zip(row.answers, map(_array, values), strict=True))
-    instants = parts.pop(0)[1] if key == "simulate" else None
-    before = _before(parts[-1], instants, samples, along)
+    # What a record has beside its arrays, such as names, follows them.
+    parts = list(zip(row.answers, map(_array, values[: len(row.answers)]), strict=True))
+    instants = parts.pop(0)[1] if key in OVER_TIME else None
+    if key == "trace" and samples is None and along is None:
+        more = values[1].ndim - len(row.answers[1].axes) - 1
+        along = ["time", *(f"sample_{at}" for at in range(more))]
+    before = _before(parts[-1], instants, samples, along, key == "simulate")
     about = {"robot": robot.name, "backend": robot.backend.name, "call": call}
     about |= {"convention": answer.convention} if hasattr(answer, "convention") else {}
-    return alone(dataset(parts, _axes(robot, ties, key, arguments), *before, about))
+    axes = _axes(robot, ties, key, arguments)
+    if key == "trace":
+        windows = tuple(f"{begin:g}..{end:g} s" for begin, end in answer.windows)
+        axes |= {"origin": NamedAxis("origin", answer.sources), "window": NamedAxis("window", windows)}
+    return alone(dataset(parts, axes, *before, about))
 
 
 def _rows(of_ties: bool, call: str) -> list[Call]:
@@ -82,11 +92,14 @@ def _is_so(arguments: Mapping[str, object], name: str, value: object) -> bool:
 
 
 def _before(
-    part: Part, instants: NDArray[Any] | None, samples: SampleAxes | None, along: Any
+    part: Part, instants: NDArray[Any] | None, samples: SampleAxes | None, along: Any, is_made: bool
 ) -> tuple[list[str], dict[str, Any]]:
-    """Return the dimensions before those of the quantities, and the coordinates along them."""
+    """Return the dimensions before those of the quantities, and the coordinates along them.
+
+    is_made: whether the call has made the axis of time, which the samples of its arguments do not have
+    """
     quantity, values = part
-    first = [] if instants is None else ["time"]
+    first = ["time"] if is_made else []
     shape = values.shape[len(first) : values.ndim - len(quantity.axes)]
     if samples is None:
         samples = samples_along(along, shape)
@@ -97,8 +110,10 @@ def _before(
             f"the arguments with names are of {samples.shape} samples, with the others there are "
             f"{shape}; give names to those that have more"
         )
-    over = {} if instants is None else {"time": ("time", instants, {"units": "s"})}
-    return [*first, *samples.dimensions], samples.coordinates | over
+    dimensions = [*first, *samples.dimensions]
+    if instants is None or "time" not in dimensions:
+        return dimensions, samples.coordinates
+    return dimensions, {"time": ("time", instants, {"units": "s"})} | samples.coordinates
 
 
 def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict[str, NamedAxis]:
@@ -120,16 +135,15 @@ def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict
 
 def _names_of(loads: Any, robot: Any) -> tuple[str, ...]:
     """Return the names of loads: those of their frames, numbered where a frame has several."""
-    names: list[str] = []
-    for load in [loads] if isinstance(loads, AppliedLoad) else loads:
-        several: Iterable[Any] = [load] if isinstance(load, AppliedLoad) else load
-        frames = [
-            one.frame if isinstance(one.frame, str) else robot.kinematics.frames[one.frame] for one in several
+    every = [loads] if isinstance(loads, AppliedLoad) else loads
+    frames = (
+        [
+            one.frame if isinstance(one.frame, str) else robot.kinematics.frames[one.frame]
+            for one in ([load] if isinstance(load, AppliedLoad) else load)
         ]
-        name = " and ".join(dict.fromkeys(frames))
-        count = sum(other == name or other.startswith(f"{name} (") for other in names)
-        names.append(f"{name} ({count + 1})" if count else name)
-    return tuple(names)
+        for load in every
+    )
+    return numbered(" and ".join(dict.fromkeys(names)) for names in frames)
 
 
 def _array(value: Any) -> NDArray[Any]:

@@ -109,6 +109,7 @@ def given(load: Load, row: Call, batch: tuple[int, ...] = (), which: str = "tied
     """Return a row's arguments, in arrays: the motion, in which the loop closes, and what has to be given
     too."""
     draw, (n, m) = np.random.default_rng(2), SIZES.get(which, (4, 2))
+    batch = (len(INSTANTS), *batch) if row.key == "trace" else batch
     sizes = {"q": n, "qd": n, "qdd": n, "tau": n, "yd": m, "ydd": m}
     motion = {name: draw.uniform(-1.0, 1.0, (*batch, size)) for name, size in sizes.items()}
     if m:
@@ -155,7 +156,7 @@ def answered(robot: Any, row: Call, asked: Mapping[str, Any], **more: Any) -> tu
     """The arrays of a row's answer, in its record."""
     answer = attrgetter(row.name)(robot)(**{**asked, **row.chosen, **more})
     assert type(answer) is row.record if row.record else not isinstance(answer, tuple)
-    return answer if row.record else (answer,)
+    return tuple(answer)[: len(row.answers)] if row.record else (answer,)
 
 
 def shape_of(
@@ -170,7 +171,12 @@ def shape_of(
         sizes["frame"] = len(robot.kinematics.frames)
     sizes |= {name: len(axis.names) for name, axis in axes.items() if name != "part"}
     sizes["moved"] = sizes["constraint" if row.key == "induced_reactions" else "joint"]
-    samples = (len(INSTANTS), *batch) if row.key == "simulate" else batch
+    samples = (len(INSTANTS), *batch) if row.key in ("simulate", "trace") else batch
+    sums = robot.structure.passive_sums
+    own = [*(k or f for k, f in zip(sums.stiffness, sums.pull, strict=True)), *sums.damping, *sums.friction]
+    # By joint, by share, by what joints have of their own, by load; the residual and the start.
+    sizes["origin"] = robot.n + len(robot.share_names) + np.count_nonzero(own) + loads + 2
+    sizes["window"] = 1
     return (*(samples[:1] if quantity.name == "time" else samples), *(sizes[axis] for axis in quantity.axes))
 
 
@@ -343,7 +349,8 @@ def test_compiled_calls_answer_on_a_gpu(load: Load) -> None:
 
 
 def same(some: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
-    return all(np.allclose(a, b, rtol=1e-13, atol=1e-13) for a, b in zip(some, others, strict=True))
+    pairs = list(zip(some, others, strict=True))
+    return all(a.shape == b.shape and np.allclose(a, b, rtol=1e-13, atol=1e-13) for a, b in pairs)
 
 
 @for_every_row

@@ -42,7 +42,6 @@ def lagrange() -> dict[str, Any]:
                     (matrix[i, s].diff(q[k]) + matrix[i, k].diff(q[s]) - matrix[s, k].diff(q[i])) * qd[k] / 2
                     for k in range(3)
                 )
-                * qd[s]
                 for s in range(3)
             ]
             for i in range(3)
@@ -51,7 +50,7 @@ def lagrange() -> dict[str, Any]:
         start = start + turn * sp.Matrix([length, 0])
     ties = (start - sp.Matrix(PIN)).jacobian(q)
     rate = sum((ties.diff(a) * b for a, b in zip(q, qd, strict=True)), sp.zeros(2, 3))
-    parts = {"mass": [a for a, _, _ in found], "velocity": [b for _, b, _ in found]}
+    parts = {"mass": [a for a, _, _ in found], "coriolis": [b for _, b, _ in found]}
     parts |= {"gravity": [c for _, _, c in found], "A": ties, "Ad": rate}
     return {name: sp.lambdify((q, qd), part) for name, part in parts.items()}
 
@@ -63,7 +62,7 @@ def multipliers(q: Any, qd: Any, tau: Any) -> tuple[dict[str, Any], dict[str, An
     whole = np.block([[mass, -ties.T], [ties, np.zeros((2, 2))]])
     sources = {
         "actuators": np.diag(tau),
-        "velocity": -values["velocity"].swapaxes(0, 1).reshape(3, 9),
+        "velocity": -(values["coriolis"] * qd).swapaxes(0, 1).reshape(3, 9),
         "gravity": -values["gravity"][:, :, 0].T,
     }
     found = {

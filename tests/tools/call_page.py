@@ -15,6 +15,7 @@ from linkwise_runtime.call_table import (
     Quantity,
 )
 from linkwise_runtime.named_arrays import units_of
+from linkwise_runtime.motion_quantities import TracedMotion
 from linkwise_runtime.quantities import Trajectory
 from linkwise_runtime.robot_axes import NamedAxis, axes_of, tied_axes
 
@@ -57,6 +58,9 @@ BESIDE_IN_C = {
 }
 """Functions of C that no row has."""
 
+OVER_TIME = (Trajectory, TracedMotion)
+"""Records whose answers have instants before their samples."""
+
 
 def signature(row: Call) -> str:
     """Return the call that is this row, as it is written."""
@@ -70,7 +74,12 @@ def axes() -> dict[str, NamedAxis]:
     """Axes of a robot that has joints, and rows of constraints, of both kinds."""
     kinds = ("rad", "m")
     found = axes_of(kinds, kinds, ["link"], ["share"]) | tied_axes(kinds, kinds, kinds, kinds)
-    return found | {"frame": NamedAxis("frame", ()), "load": NamedAxis("load", ())}
+    return found | {
+        "frame": NamedAxis("frame", ()),
+        "load": NamedAxis("load", ()),
+        "origin": NamedAxis("origin", ()),
+        "window": NamedAxis("window", ()),
+    }
 
 
 def unit(quantity: Quantity) -> str:
@@ -92,7 +101,7 @@ def shape(row: Call, quantity: Quantity) -> str:
     """Return the quantity's axes behind those of the samples; of a motion over time, instants stand before
     these."""
     axes = (WORDS.get(axis, axis) for axis in quantity.axes)
-    before = ["…"] if row.record is not Trajectory else ["time", "…"][: 1 + (quantity.name != "time")]
+    before = ["…"] if row.record not in OVER_TIME else ["time", "…"][: 1 + (quantity.name != "time")]
     return f"({', '.join([*before, *axes])})"
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import as_array, check_numbers, shape_of
+from ..arguments import check_numbers, rising_instants, shape_of
 from ..chosen_names import short
 from ..constraints.robot_constraints import Constraints
 from ..interface import Numbers, array_of, namespace
@@ -182,7 +182,7 @@ def simulate_motion(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
     tau = cast(Given, asked.tau) if callable(asked.tau) else motion.get("tau", 0.0 * start)
     pulls = ReadLoads(loads, numbers[len(named) :])
     given = cast(Given, asked.loads) if callable(asked.loads) else pulls
-    times = _instants(asked.time)
+    times = rising_instants("time", asked.time)
     step = None if asked.step is None else _positive("step", asked.step)
     tolerances = _positive("rtol", asked.rtol), _positive("atol", asked.atol)
     passive = asked.passive and bool(backend.structure.passive)
@@ -252,21 +252,6 @@ def _collected(
     xp = namespace(like)
     columns = (xp.stack(column) for column in zip(*rows, strict=True))
     return Trajectory(equations.backend.weights("time", list(times), like), *columns)
-
-
-def _instants(time: object) -> list[float]:
-    """Return the instants in s; raises ValueError for what is not a list of rising finite numbers."""
-    instants = as_array("time", time)
-    if instants.ndim != 1 or not len(instants) or instants.dtype.kind not in "iuf":
-        raise ValueError(
-            f"time has shape {instants.shape} and dtype {instants.dtype}; give the instants in s, such as "
-            "numpy.linspace(0, 1, 101)"
-        )
-    values: list[float] = instants.astype(float).tolist()
-    for k, (one, after) in enumerate(zip(values, [*values[1:], math.inf], strict=True)):
-        if not one < after or not math.isfinite(one):
-            raise ValueError(f"time[{k}] is {one:g}; instants must be finite, each later than the one before")
-    return values
 
 
 def _positive(name: str, value: object) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arguments import Beside
 from ..arrays.backend import ArrayBackend
-from ..chosen_names import known_kind
+from ..chosen_names import known_kind, numbered
 from ..interface import Numbers, namespace
 from ..kinematics.frame_answers import frame_index, vectors_beside
 from ..kinematics.robot_kinematics import check_load
@@ -86,6 +86,11 @@ class AppliedLoads:
     each: Sequence[Sequence[OnFrame]]
     """Forces and moments of each load."""
     beside: Mapping[str, Beside]
+
+    def names(self, backend: ArrayBackend) -> tuple[str, ...]:
+        """Return names of the loads: those of their frames, numbered where a frame has several."""
+        frames = ([backend.frames.names[one.frame] for one in load] for load in self.each)
+        return numbered(" and ".join(dict.fromkeys(names)) for names in frames)
 
     def torques(self, backend: ArrayBackend, q: Numbers, vectors: Sequence[Numbers]) -> list[Numbers]:
         """Return the torques that each load adds to those that joints need, (..., n).

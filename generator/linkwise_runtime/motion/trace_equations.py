@@ -1,0 +1,182 @@
+"""Equations of motion split by source along a motion that took place.
+
+    M v'_s + C(q, qd) v_s = F_s + A^T lambda_s        A v'_s = -dA/dt v_s under constraints A qd = 0
+
+for each source s of forces, with C_ik = sum_j c1_ijk. Their sum over s is the equation of motion, so that the
+v_s sum to qd. As dM/dt = C + C^T, each 1/2 v_s^T M v_s changes by v_s^T F_s alone.
+
+Under constraints v_s = G w_s of the independent coordinates, with
+
+    G^T M G w'_s + G^T (M dG/dt + C G) w_s = G^T F_s
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arrays.backend import ArrayBackend
+from ..constraints.closed_places import ClosedPlace
+from ..constraints.robot_constraints import Constraints
+from ..interface import Numbers, namespace
+from .between_samples import SampledMotion
+from .collocation import LinearEquations
+
+TORQUE, LOAD, RESIDUAL, START = "torque", "load", "residual", "start"
+"""First parts of the names of sources, before those of joints and loads."""
+
+
+class TraceAt(NamedTuple):
+    """Equations of all sources at instants, and the motion there."""
+
+    qd: Numbers
+    """Velocities of all joints, (..., n)."""
+    equations: LinearEquations
+    """Equations of the independent coordinates, whose columns are the sources."""
+    place: ClosedPlace | None
+
+    def velocity(self, own: Numbers) -> Numbers:
+        """Return the velocities (..., n, X) of all joints for those of the independent ones, (..., m, X)."""
+        return own if self.place is None else self.place.found.map @ own
+
+    @property
+    def own_velocity(self) -> Numbers:
+        """Velocities of the independent joints, (..., m)."""
+        return self.qd if self.place is None else self.place.own(self.qd)
+
+
+@dataclass(frozen=True)
+class TraceEquations:
+    """Equations of motion of a robot for each source of forces."""
+
+    backend: ArrayBackend
+    constraints: Constraints[Any] | None
+    passive: bool
+    torques_given: bool
+    """True if the first of the given columns is what the actuators gave; else they give what motion needs."""
+    loads: tuple[str, ...]
+    """Names of the loads, whose forces are the columns after that."""
+    by_link: bool
+    """True if gravity, or each share with a name, is a source for each link."""
+
+    @cached_property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the independent joints, in the order of the equations."""
+        return (
+            self.backend.structure.joint_names if self.constraints is None else self.constraints.independent
+        )
+
+    @cached_property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the sources, in the order of the columns; the last one is the motion at the start."""
+        structure = self.backend.structure
+        joints = structure.joint_names if self.torques_given else self.coordinates
+        shares = [
+            f"{share}/{link}" if self.by_link else share
+            for share in structure.share_names
+            for link in (structure.link_names if self.by_link else ("",))
+        ]
+        own = [f"{kind}/{structure.joint_names[i]}" for kind, joints in self._passive.items() for i in joints]
+        residual = [RESIDUAL] if self.torques_given else []
+        return (
+            *(f"{TORQUE}/{joint}" for joint in joints),
+            *shares,
+            *own,
+            *(f"{LOAD}/{name}" for name in self.loads),
+            *residual,
+            START,
+        )
+
+    @cached_property
+    def _passive(self) -> dict[str, list[int]]:
+        """Joints that have a spring, damping or friction."""
+        if not (self.passive and self.backend.structure.passive):
+            return {}
+        sums = self.backend.structure.passive_sums
+        springs = [bool(k or f) for k, f in zip(sums.stiffness, sums.pull, strict=True)]
+        having = {"spring": springs, "damping": sums.damping, "friction": sums.friction}
+        return {kind: np.flatnonzero(own).tolist() for kind, own in having.items()}
+
+    def at(self, motion: SampledMotion, is_sample: bool) -> TraceAt:
+        """Return the equations at instants of a motion.
+
+        is_sample: whether they are samples of a log, where constraints have to hold; between these, dependent
+        joints are closed first
+        """
+        backend = self._at(motion)
+        q, qd, qdd = motion.q, motion.qd, motion.qdd
+        place = None if self.constraints is None else self._place(backend, q, is_sample)
+        if place is not None:
+            q, qd = place.q, place.velocity(place.own(qd))
+            qdd = place.velocity(place.own(qdd)) + place.bias(qd)
+        c2, c1, g = backend.answers.coefficients(q, qd)
+        mass, coriolis = c2.sum(-2), c1.sum(-2)
+        if self.passive and backend.structure.passive:
+            mass = mass + backend.constant(np.diag(backend.structure.passive_sums.armature), q)
+        forces = self._forces(backend, q, qd, g, motion.given)
+        needed = _times(mass, qdd) + _times(coriolis, qd) - forces.sum(-1)
+        if place is not None:
+            found, rate = place.found.map, place.map_rate(qd)
+            coriolis = found.mT @ (mass @ rate + coriolis @ found)
+            mass, forces = found.mT @ mass @ found, found.mT @ forces
+            needed = _times(found.mT, needed)
+        columns = self._with_actuators(backend, place, needed, forces, motion.given)
+        return TraceAt(qd, LinearEquations(mass, coriolis, columns), place)
+
+    def _at(self, motion: SampledMotion) -> ArrayBackend:
+        """Return the back end at these instants, where the robot depends on time."""
+        if not self.backend.structure.time:
+            return self.backend
+        backend = self.backend.separate()
+        times = motion.time.reshape(-1, *[1] * (motion.q.ndim - 2))
+        backend.set_parameters({backend.structure.time: times})
+        return backend
+
+    def _place(self, backend: ArrayBackend, q: Numbers, is_sample: bool) -> ClosedPlace:
+        assert self.constraints is not None
+        ties = self.constraints.ties
+        return ties.place(backend, q) if is_sample else ties.closed_place(backend, q, q)
+
+    def _forces(self, backend: ArrayBackend, q: Numbers, qd: Numbers, g: Numbers, given: Numbers) -> Numbers:
+        """Return the forces (..., n, Y) of all sources but the actuators and the residual."""
+        xp, structure = namespace(q), backend.structure
+        shares = g[..., None]
+        if structure.shares:
+            (shares,) = backend.answers.named_shares(q, qd)
+        # (..., n, N, M) in the order of the names: by share, then by link.
+        by_link = xp.swapaxes(shares, -1, -2)
+        kinds = [-by_link.reshape(*q.shape, -1) if self.by_link else -shares.sum(-2)]
+        if self._passive:
+            own = backend.answers.passive_torque(q, qd, 0.0 * q)[:3]
+            identity = np.eye(structure.n)
+            for torque, joints in zip(own, self._passive.values(), strict=True):
+                kinds.append(-backend.constant(identity[:, joints], q) * torque[..., None])
+        kinds.append(given[..., 1:] if self.torques_given else given)
+        return xp.concat(kinds, -1)
+
+    def _with_actuators(
+        self,
+        backend: ArrayBackend,
+        place: ClosedPlace | None,
+        needed: Numbers,
+        forces: Numbers,
+        given: Numbers,
+    ) -> Numbers:
+        """Return the forces (..., m, X) of all sources, with what the actuators give, and the start's zeros.
+
+        needed: torques (..., m) that the motion needs of the actuators
+        """
+        xp, start = namespace(forces), 0.0 * needed[..., None]
+        if not self.torques_given:
+            own = backend.constant(np.eye(needed.shape[-1]), needed) * needed[..., None]
+            return xp.concat([own, forces, start], -1)
+        own = backend.constant(np.eye(given.shape[-2]), given) * given[..., :1]
+        if place is not None:
+            own = place.found.map.mT @ own
+        left = needed - own.sum(-1)
+        return xp.concat([own, forces, left[..., None], start], -1)
+
+
+def _times(matrix: Numbers, vector: Numbers) -> Numbers:
+    return (matrix @ vector[..., None])[..., 0]

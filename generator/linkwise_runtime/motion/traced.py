@@ -1,0 +1,159 @@
+"""Tracing of a motion's velocities to their sources: arguments are read and checked, blocks are joined."""
+
+from collections.abc import Sequence
+from numbers import Real
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arguments import as_array, check_numbers, rising_instants
+from ..arrays.backend import ArrayBackend
+from ..chosen_names import short
+from ..interface import Numbers, namespace
+from ..motion_quantities import TracedMotion
+from .between_samples import SampledMotion, sample_slopes
+from .induced_accelerations import DrivenRobot, constraints_of
+from .source_forces import AppliedLoads, loads_of
+from .trace_equations import TraceEquations
+from .tracer import TraceParts, Tracer
+
+GAP = 5.0
+"""Steps longer than this many usual ones are a gap in the log."""
+
+
+class Traced(NamedTuple):
+    """Arguments of `Dynamics.trace`."""
+
+    q: object
+    qd: object
+    qdd: object
+    time: object
+    tau: object
+    loads: object
+    passive: bool
+    constraints: object
+    windows: object
+    restarts: object
+    by_link: bool
+
+
+def trace_motion(robot: DrivenRobot, asked: Traced) -> TracedMotion[Any]:
+    """Return the answer of `Dynamics.trace`."""
+    constraints = constraints_of(robot, asked.constraints)
+    loads = loads_of(robot.backend, asked.loads)
+    named = {"q": asked.q, "qd": asked.qd, "qdd": asked.qdd}
+    named |= {} if asked.tau is None else {"tau": asked.tau}
+    backend, numbers = robot.door.read(named, beside=loads.beside)
+    motion = dict(zip(named, numbers[: len(named)], strict=True))
+    check_numbers(motion, robot.joint_names)
+    times = _instants(asked.time, motion["q"])
+    _check_traceable(backend, motion["q"])
+    parts, windows = _parts(asked, times)
+    equations = TraceEquations(
+        backend, constraints, bool(asked.passive), "tau" in motion, loads.names(backend), asked.by_link
+    )
+    samples = _sampled(backend, loads, times, motion, numbers[len(named) :])
+    blocks = list(Tracer(equations, parts).blocks(samples.some, len(times), tuple(motion["q"].shape[1:-1])))
+    xp = namespace(motion["q"])
+    joined: Any = [xp.concat(list(values), 0) for values in zip(*blocks, strict=True)]
+    coordinates = tuple(robot.joint_names.index(name) for name in equations.coordinates)
+    return TracedMotion._make([*joined, equations.sources, windows, coordinates])
+
+
+def _sampled(
+    backend: ArrayBackend,
+    loads: AppliedLoads,
+    times: Sequence[float],
+    motion: dict[str, Numbers],
+    vectors: Sequence[Numbers],
+) -> SampledMotion:
+    """Return the motion with the forces that are given: of actuators, where they are, then of loads."""
+    q, qd, qdd, *tau = motion.values()
+    columns = [*tau, *(-torque for torque in loads.torques(backend, q, vectors))]
+    time = backend.weights("time", times, q)
+    if not columns:
+        nothing = backend.zeros(q, 0)[..., None, :] + 0.0 * q[..., None]
+        return SampledMotion(time, q, qd, qdd, nothing, nothing)
+    given = namespace(q).stack(columns, -1)
+    return SampledMotion(time, q, qd, qdd, given, sample_slopes(time, given))
+
+
+def _instants(time: object, q: Numbers) -> list[float]:
+    """Return the instants of the samples; raises ValueError for others than those of q, and for a gap."""
+    times = rising_instants("time", time)
+    if q.ndim < 2 or q.shape[0] != len(times):
+        raise ValueError(
+            f"time has {len(times)} instants, but q, qd and qdd have shape {tuple(q.shape)}; their first "
+            "axis is that of time, (T, ..., n)"
+        )
+    if len(times) < 2:
+        raise ValueError("time has one instant; a motion to trace has two or more")
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    if (steps > GAP * usual).any():
+        at = int((steps > GAP * usual).argmax())
+        raise ValueError(
+            f"time has a gap of {steps[at]:.4g} s after {times[at]:.6g} s, where samples follow each other "
+            f"by {usual:.4g} s; trace the parts before and after it alone"
+        )
+    return times
+
+
+def _check_traceable(backend: ArrayBackend, q: Numbers) -> None:
+    """Raise ValueError for a robot whose motion has no such parts, or has parameters for each instant."""
+    structure = backend.structure
+    for link, degree in zip(structure.link_names, structure.degrees, strict=False):
+        if degree > 2:
+            raise ValueError(
+                f"the kinetic energy of {link} has velocities of degree {degree}: forces then give no parts "
+                "of a velocity that sum up"
+            )
+    if len(backend.samples) >= q.ndim - 1:
+        raise ValueError(
+            f"parameters have samples of shape {backend.samples}, beside motion (T, ..., n) of shape "
+            f"{tuple(q.shape)}; they cannot change with time here"
+        )
+
+
+def _parts(asked: Traced, times: Sequence[float]) -> tuple[TraceParts, tuple[tuple[float, float], ...]]:
+    """Return where the trace begins anew and where windows are cut, and begin and end of each window."""
+    cuts = _places("windows", _window_begins(asked.windows, times), times)
+    restarts = _places("restarts", asked.restarts, times)
+    ends = [*cuts[1:], len(times) - 1]
+    windows = tuple((times[begin], times[end]) for begin, end in zip(cuts, ends, strict=True))
+    return TraceParts(restarts, cuts), windows
+
+
+def _window_begins(windows: object, times: Sequence[float]) -> object:
+    """Return the instants at which windows begin, where their length is given."""
+    if isinstance(windows, bool) or not isinstance(windows, Real):
+        return windows
+    length = float(windows)
+    if not length >= min(np.diff(times)):
+        raise ValueError(
+            f"windows is {short(windows)} s; give a length of at least a step between samples, "
+            f"{min(np.diff(times)):.4g} s, or the instants at which sources are cut"
+        )
+    count = int(np.ceil((times[-1] - times[0]) / length * (1.0 - 1e-12)))
+    return [times[0] + k * length for k in range(1, count)]
+
+
+def _places(name: str, given: object, times: Sequence[float]) -> list[int]:
+    """Return 0 and the samples next to instants; raises ValueError for one outside the motion, or twice."""
+    found = [0]
+    if as_array(name, given).size == 0:
+        return found
+    for k, instant in enumerate(rising_instants(name, given)):
+        if not times[0] < instant < times[-1]:
+            raise ValueError(
+                f"{name}[{k}] is {instant:.6g} s, which is not within the motion, from {times[0]:.6g} to "
+                f"{times[-1]:.6g} s"
+            )
+        place = int(np.abs(np.asarray(times) - instant).argmin())
+        if place in (found[-1], len(times) - 1):
+            raise ValueError(
+                f"{name}[{k}] is {instant:.6g} s, next to the sample at {times[place]:.6g} s, where another "
+                "one is or the motion ends; give instants that are farther apart"
+            )
+        found.append(place)
+    return found

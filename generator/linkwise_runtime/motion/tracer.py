@@ -1,0 +1,135 @@
+"""Steps of a trace, block by block: from one sample to the next, and what is told at each."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..interface import Numbers, namespace
+from .between_samples import SampledMotion
+from .collocation import STAGES, B, linear_steps
+from .trace_equations import TraceAt, TraceEquations
+
+AT_ONCE = 1 << 22
+"""Numbers of the steps that are computed at once."""
+Samples = Callable[[int, int], SampledMotion]
+"""Function that returns the samples of a motion from a number up to, but not including, another."""
+
+
+class TraceParts(NamedTuple):
+    """Where a trace begins anew, and the windows of its sources, by the numbers of samples."""
+
+    restarts: Sequence[int]
+    """First sample of each part that is traced by itself, ascending, 0 first."""
+    cuts: Sequence[int]
+    """First sample of each window, ascending, 0 first."""
+
+    def acting(self, first: int, count: int) -> NDArray[np.float64]:
+        """Return a one for the window in which each of some samples lies, and zeros, (count, W)."""
+        windows = np.searchsorted(self.cuts, np.arange(first, first + count), side="right") - 1
+        return np.eye(len(self.cuts))[windows]
+
+
+class TraceState(NamedTuple):
+    """State at a sample, by window."""
+
+    w: Numbers
+    """(W, ..., m, X)"""
+    work: Numbers
+    """(W, ..., X)"""
+
+
+class TraceBlock(NamedTuple):
+    """Arrays of a `TracedMotion` for some of its samples."""
+
+    time: Numbers
+    velocity: Numbers
+    energy: Numbers
+    power: Numbers
+    work: Numbers
+    coriolis: Numbers
+
+    def without_last(self) -> "TraceBlock":
+        """Return the block without its last sample."""
+        return TraceBlock(*(a[:-1] for a in self))
+
+
+@dataclass(frozen=True)
+class Tracer:
+    """Traces a motion in blocks."""
+
+    equations: TraceEquations
+    parts: TraceParts
+
+    def blocks(self, samples: Samples, count: int, batch: tuple[int, ...]) -> Iterator[TraceBlock]:
+        """Yield the trace of `count` samples in blocks that follow each other.
+
+        batch: shape of the motions that are traced at once
+        """
+        size = self._block_size(math.prod(batch))
+        for first, end in pairwise([*self.parts.restarts, count - 1]):
+            state: TraceState | None = None
+            for begin in range(first, end, size):
+                stop = min(begin + size, end)
+                block, state = self._block(samples(begin, stop + 1), begin, state)
+                # Its last sample is the first of the next block, which may begin anew there.
+                yield block if stop == count - 1 else block.without_last()
+
+    def _block_size(self, motions: int) -> int:
+        """Return the number of steps to compute at once."""
+        structure = self.equations.backend.structure
+        n, links, windows = structure.n, structure.N, len(self.parts.cuts)
+        m, columns = len(self.equations.coordinates), len(self.equations.sources)
+        coefficients, solved, told = 2 * n * links * n, 3 * m * (4 * m + 2 * columns), n * columns * windows
+        return max(1, AT_ONCE // ((3 * (coefficients + solved) + told) * max(1, motions)))
+
+    def _block(
+        self, motion: SampledMotion, first: int, begin: TraceState | None
+    ) -> tuple[TraceBlock, TraceState]:
+        """Return the trace of some samples, and the state at the last one.
+
+        first: number of the first sample; begin: the state there, None where the trace starts
+        """
+        equations = self.equations
+        xp, at = namespace(motion.q), equations.at(motion, True)
+        acting = equations.backend.weights("windows", self.parts.acting(first, len(motion.time)), motion.q)
+        wide = acting.reshape(*acting.shape, *[1] * motion.q.ndim)
+        begin = begin or self._start(at, wide[0])
+        stages = [equations.at(motion.within_steps(part), False).equations for part in STAGES]
+        lengths = motion.lengths.reshape(-1, *[1] * (motion.q.ndim - 2))
+        steps = linear_steps(equations.backend, stages, lengths, equations.coordinates)
+        states = [begin.w]
+        for k in range(len(lengths)):
+            states.append(steps.transition[k] @ states[-1] + wide[k] * steps.gain[k])
+        w = xp.stack(states, 0)
+        own = (wide[:-1] * w[:-1]).sum(1)
+        power = [
+            ((transition @ own + gain) * stage.forces).sum(-2)
+            for (transition, gain), stage in zip(steps.stages, stages, strict=True)
+        ]
+        gained = lengths[..., None] * sum(weight * a for weight, a in zip(B, power, strict=True))
+        by_window = wide[:-1, ..., 0] * gained[:, None]
+        work = xp.cumsum(xp.concat([begin.work[None], by_window], 0), 0)
+        return self._told(motion, at, wide, w, work), TraceState(w[-1], work[-1])
+
+    def _start(self, at: TraceAt, acting: Numbers) -> TraceState:
+        """Return the state where a trace starts: all velocities are those of the start."""
+        own = at.own_velocity[0][..., None]
+        unit = np.eye(len(self.equations.sources))[-1]
+        w = acting * (own * self.equations.backend.constant(unit, own))
+        return TraceState(w, 0.0 * w.sum(-2))
+
+    def _told(
+        self, motion: SampledMotion, at: TraceAt, wide: Numbers, w: Numbers, work: Numbers
+    ) -> TraceBlock:
+        """Return velocities, energies and powers for w (T, W, ..., m, X)."""
+        xp, equations = namespace(w), at.equations
+        velocity = w if at.place is None else at.place.found.map[:, None] @ w
+        energy = 0.5 * (w * (equations.mass[:, None] @ w)).sum(-2)
+        power = (wide * w * equations.forces[:, None]).sum(-2)
+        velocity, energy, power, work = (xp.moveaxis(a, 1, -1) for a in (velocity, energy, power, work))
+        return TraceBlock(motion.time, velocity, energy, power, work, equations.coriolis)

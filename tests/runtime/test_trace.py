@@ -1,0 +1,175 @@
+"""`robot.trace`: windows, restarts, given torques, loads, losses, back ends and gradients; messages."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import DATA, needs_compiler
+from linkwise import generate, read_system, write_package
+from linkwise.package.load import import_package
+
+torch = pytest.importorskip("torch")
+
+Packages = Callable[[str], ModuleType]
+CRANE, LEG = f"{DATA / 'crane.urdf'} loops", f"{DATA / 'leg.toml'} loops"
+SPRUNG = """schema = 1
+name = "sprung"
+gravity = [0, 0, -9.81]
+link = [
+  {name = "base"},
+  {name = "slider", mass = 1.0, com = [0, 0, 0.1], inertia = {xx = 0.1, yy = 0.1, zz = 0.05}},
+  {name = "rod", mass = 2.0, com = [0.3, 0, 0], inertia = {xx = 0.1, yy = 0.1, zz = 0.05}},
+]
+[[joint]]
+name = "lift"
+type = "prismatic"
+parent = "base"
+child = "slider"
+axis = [0, 0, 1]
+damping = 1.5
+[[joint]]
+name = "turn"
+parent = "slider"
+child = "rod"
+axis = [0, 1, 0]
+stiffness = 9.0
+rest = 0.4
+damping = 0.3
+friction = 0.2
+armature = 0.05
+"""
+BACKENDS = ("numpy", "torch", "autograd", pytest.param("native", marks=needs_compiler))
+TIME = np.linspace(0.2, 0.6, 81)
+
+
+def motion_of(n: int, time: Any = TIME) -> tuple[Any, Any, Any]:
+    rates = 2.0 + np.arange(n)
+    phase = rates * time[:, None] + np.arange(n)
+    return 0.5 * np.sin(phase), 0.5 * rates * np.cos(phase), -0.5 * rates**2 * np.sin(phase)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_parts_sum_to_the_velocities_on_every_back_end(backend: str, package_of: Packages) -> None:
+    package = package_of(CRANE)
+    robot = package.load(backend)
+    motion = motion_of(robot.n)
+    load = package.AppliedLoad(robot.link_names[-1], np.outer(np.sin(9.0 * TIME), [3.0, -2.0, 9.0]))
+    given: tuple[Any, ...] = tuple(map(torch.from_numpy, motion)) if robot.backend.takes_tensors else motion
+    found = robot.trace(*given, TIME, loads=[load], windows=[0.3, 0.4], by_link=True)
+    assert isinstance(found.velocity, type(given[0]))
+    assert np.abs(np.asarray(found.total) - motion[1]).max() <= 1e-8
+    expected = package.load("numpy").trace(*motion, TIME, loads=[load], windows=[0.3, 0.4], by_link=True)
+    np.testing.assert_allclose(np.asarray(found.velocity), expected.velocity, rtol=1e-9, atol=1e-11)
+    assert found.sources == (
+        *(f"torque/{name}" for name in robot.joint_names),
+        *(f"gravity/{name}" for name in robot.link_names),
+        f"load/{robot.link_names[-1]}",
+        "start",
+    )
+
+
+def test_motions_side_by_side_are_traced_as_each_alone(package_of: Packages) -> None:
+    robot = package_of(CRANE).load()
+    one, other = (motion_of(robot.n, TIME + shift) for shift in (0.0, 0.7))
+    both = robot.trace(*(np.stack(pair, 1) for pair in zip(one, other, strict=True)), TIME, windows=0.1)
+    for k, motion in enumerate((one, other)):
+        alone = robot.trace(*motion, TIME, windows=0.1)
+        for found, expected in zip(both[1:6], alone[1:6], strict=True):
+            np.testing.assert_allclose(found[:, k], expected, rtol=1e-9, atol=1e-12)
+
+
+def test_windows_tell_when_a_source_acted(package_of: Packages) -> None:
+    robot = package_of(CRANE).load()
+    motion = motion_of(robot.n)
+    whole, cut = robot.trace(*motion, TIME), robot.trace(*motion, TIME, windows=0.1)
+    assert np.allclose(cut.windows, [(0.2, 0.3), (0.3, 0.4), (0.4, 0.5), (0.5, 0.6)], atol=1e-12)
+    np.testing.assert_allclose(cut.velocity.sum(-1), whole.velocity[..., 0], rtol=1e-10, atol=1e-12)
+    assert not cut.velocity[:20, ..., 1:].any(), "nothing has come yet of a window that lies ahead"
+    assert not cut.power[41:, ..., :2].any(), "a window that is over adds no energy"
+    np.testing.assert_allclose(
+        cut.of("torque"), cut.velocity[..., : robot.n, :].sum((-2, -1)), rtol=1e-12, atol=1e-14
+    )
+    np.testing.assert_allclose(
+        cut.velocity_torque.sum((-3, -2, -1)),
+        (robot.coriolis_matrix(*motion[:2]) @ motion[1][..., None])[..., 0],
+        rtol=1e-6,
+        atol=1e-8,
+    )
+
+
+def test_a_trace_that_begins_anew_has_all_velocities_at_its_start(package_of: Packages) -> None:
+    robot = package_of(CRANE).load()
+    motion = motion_of(robot.n)
+    found = robot.trace(*motion, TIME, restarts=[0.4])
+    np.testing.assert_array_equal(found.of("start")[40], motion[1][40])
+    assert not found.work[40].any()
+    assert not found.velocity[40, :, :-1].any()
+    later = robot.trace(*(a[40:] for a in motion), TIME[40:])
+    np.testing.assert_allclose(found.velocity[40:], later.velocity, rtol=1e-10, atol=1e-13)
+
+
+def test_what_given_torques_leave_of_a_motion_is_the_residual(package_of: Packages) -> None:
+    robot = package_of(LEG).load()
+    motion = motion_of(robot.n)
+    needed = robot.inverse_dynamics(*motion) + robot.passive_torque(*motion).total
+    closed = robot.trace(*motion, TIME, tau=needed)
+    assert np.abs(closed.of("residual")).max() <= 1e-6 * np.abs(closed.of("torque")).max()
+    missing = robot.trace(*motion, TIME, tau=0.5 * needed)
+    np.testing.assert_allclose(missing.of("residual"), missing.of("torque"), rtol=1e-6, atol=1e-5)
+    assert np.abs(missing.total - motion[1]).max() <= 1e-8
+
+
+def test_springs_and_losses_are_sources_where_joints_have_them(tmp_path: Path) -> None:
+    (tmp_path / "sprung.toml").write_text(SPRUNG)
+    write_package(generate(read_system(tmp_path / "sprung.toml"), ["numpy"]), tmp_path / "sprung")
+    robot = import_package(tmp_path / "sprung").load()
+    found = robot.trace(*motion_of(2), TIME)
+    assert found.sources == (
+        *("torque/lift", "torque/turn", "gravity"),
+        *("spring/turn", "damping/lift", "damping/turn", "friction/turn", "start"),
+    )
+    assert np.abs(found.total - motion_of(2)[1]).max() <= 1e-9
+    gained = found.energy - found.energy[:1] - found.work
+    assert np.abs(gained).max() <= 1e-8 * np.abs(found.energy).max()
+    bare = robot.trace(*motion_of(2), TIME, passive=False)
+    assert bare.sources == ("torque/lift", "torque/turn", "gravity", "start")
+
+
+def test_gradients_flow_through_a_trace(package_of: Packages) -> None:
+    robot = package_of("planar3").load("torch")
+    q, qd, qdd = (torch.tensor(a[:9], requires_grad=True) for a in motion_of(3))
+
+    def part(q: Any, qd: Any, qdd: Any) -> Any:
+        return robot.trace(q, qd, qdd, TIME[:9], windows=[0.22]).velocity[-1, :, 0, 0]
+
+    assert torch.autograd.gradcheck(part, (q, qd, qdd), rtol=1e-5, atol=1e-7)
+
+
+def test_what_cannot_be_traced_is_refused(package_of: Packages) -> None:
+    robot = package_of("planar3").load()
+    motion = motion_of(3)
+    gap = np.concatenate([TIME[:40], TIME[40:] + 0.3])
+    broken = motion[1].copy()
+    broken[7, 1] = np.nan
+    for told, ask in {
+        r"time has 80 instants, but q, qd and qdd have shape \(81, 3\)": lambda: robot.trace(
+            *motion, TIME[:80]
+        ),
+        "time has a gap of 0.305 s after 0.395 s": lambda: robot.trace(*motion, gap),
+        r"qd is nan at sample 7 for joint 'joint2'": lambda: robot.trace(motion[0], broken, motion[2], TIME),
+        r"windows\[1\] is 0.7 s, which is not within the motion, from 0.2 to 0.6 s": lambda: robot.trace(
+            *motion, TIME, windows=[0.3, 0.7]
+        ),
+        "windows is 0.001 s; give a length of at least": lambda: robot.trace(*motion, TIME, windows=0.001),
+        r"restarts\[1\] is 0.301 s, next to the sample at 0.3 s, where another one is": lambda: robot.trace(
+            *motion, TIME, restarts=[0.3, 0.301]
+        ),
+        r"no source 'elbow' moves this robot; its sources are": lambda: robot.trace(*motion, TIME).of(
+            "elbow"
+        ),
+    }.items():
+        with pytest.raises(ValueError, match=told):
+            ask()
