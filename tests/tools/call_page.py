@@ -14,8 +14,8 @@ from linkwise_runtime.call_table import (
     Call,
     Quantity,
 )
-from linkwise_runtime.named_arrays import units_of
 from linkwise_runtime.motion_quantities import TracedMotion
+from linkwise_runtime.named_arrays import units_of
 from linkwise_runtime.quantities import Trajectory
 from linkwise_runtime.robot_axes import NamedAxis, axes_of, tied_axes
 
