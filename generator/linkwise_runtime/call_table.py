@@ -7,7 +7,7 @@ through which it is loaded, k the coordinate that moves, which here is called th
 from collections.abc import Mapping
 
 from .call import ORDER, PACKED, Call, Quantity
-from .motion_quantities import TracedMotion
+from .motion_quantities import Counterfactual, TracedMotion
 from .quantities import (
     Coefficients,
     ConstrainedMotion,
@@ -313,6 +313,31 @@ MOTIONS = (
             "windows": (),
             "restarts": (),
             "by_link": False,
+        },
+        own="passive",
+        ties="kept",
+        out=False,
+    ),
+    Call(
+        "counterfactual",
+        QDD,
+        (
+            Quantity("time", (), "s", "time"),
+            Quantity("q", ("joint",), "position:joint", "joint position without the source"),
+            Quantity("qd", ("joint",), "velocity:joint", "joint velocity without the source"),
+            Quantity("first_order_q", ("joint",), "position:joint", "the position to first order"),
+            Quantity("first_order_qd", ("joint",), "velocity:joint", "the velocity to first order"),
+            Quantity("drift", ("joint",), "position:joint", "error of a simulation with the source"),
+        ),
+        Counterfactual,
+        options={
+            "time": REQUIRED,
+            "without": REQUIRED,
+            "tau": None,
+            "loads": (),
+            "passive": True,
+            "constraints": None,
+            "step": None,
         },
         own="passive",
         ties="kept",

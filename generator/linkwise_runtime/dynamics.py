@@ -24,10 +24,11 @@ from .html_tables import robot_table
 from .interface import Array
 from .kinematics.robot_kinematics import Kinematics
 from .labelled import labelled
+from .motion.counterfactual import Without, counterfactual_motion
 from .motion.induced_accelerations import Driven, induced_accelerations, induced_reactions
 from .motion.simulated import Simulated, simulate_motion
 from .motion.traced import Traced, trace_motion
-from .motion_quantities import TracedMotion
+from .motion_quantities import Counterfactual, TracedMotion
 from .quantities import (
     Coefficients,
     Contact,
@@ -569,6 +570,36 @@ class Dynamics(RobotCalls):
         given = Traced(q, qd, qdd, time, tau, loads, passive, constraints, windows, restarts, by_link)
         traced: TracedMotion[Array] = trace_motion(self, given)
         return traced
+
+    def counterfactual(
+        self,
+        q: Array,
+        qd: Array,
+        qdd: Array,
+        time: Any,
+        without: str,
+        tau: Array | None = None,
+        loads: Any = (),
+        passive: bool = True,
+        constraints: Any = None,
+        step: float | None = None,
+    ) -> Counterfactual[Array]:
+        """Return the motion that there would have been without one of its sources, all else as it was.
+
+        The robot starts as the motion did and is simulated under what the motion needed, less the source:
+        where `trace` splits the motion that took place, this is another motion, with other inertias, other
+        velocity forces and, later, elsewhere. Beside it is its first order, which is linear in the source,
+        so that first orders of all sources sum up to another motion still.
+
+        without: a source by the name that `trace` has for it: "torque/elbow", "gravity", "load/hand", "start"
+        step: longest step of RK4, in s; from sample to sample unless given
+        other arguments: as in `trace`
+
+        Raises ValueError for a source that is not there, and as `trace` and `simulate` do.
+        """
+        motion = Traced(q, qd, qdd, time, tau, loads, passive, constraints)
+        found: Counterfactual[Array] = counterfactual_motion(self, Without(motion, without, step))
+        return found
 
     def induced_reactions(
         self,

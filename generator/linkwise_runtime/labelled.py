@@ -17,7 +17,9 @@ from .quantities import AppliedLoad
 from .robot_axes import NamedAxis, axes_of, tied_axes
 
 TIED = "constraints."
-OVER_TIME = ("simulate", "trace")
+OF_MOTION = ("trace", "counterfactual")
+"""Calls whose arguments are a motion over time."""
+OVER_TIME = ("simulate", *OF_MOTION)
 """Calls whose first answer is the time along the others."""
 ALONE = ("constraints.closed", "simulate")
 """Calls that accept the independent joints alone in place of all joints."""
@@ -50,7 +52,7 @@ def labelled(
     # What a record has beside its arrays, such as names, follows them.
     parts = list(zip(row.answers, map(_array, values[: len(row.answers)]), strict=True))
     instants = parts.pop(0)[1] if key in OVER_TIME else None
-    if key == "trace" and samples is None and along is None:
+    if key in OF_MOTION and samples is None and along is None:
         more = values[1].ndim - len(row.answers[1].axes) - 1
         along = ["time", *(f"sample_{at}" for at in range(more))]
     before = _before(parts[-1], instants, samples, along, key == "simulate")

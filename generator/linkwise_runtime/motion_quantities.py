@@ -82,3 +82,21 @@ class TracedMotion(NamedTuple, Generic[Array]):
                 f"{choice(str(source), self.sources, 'sources')}"
             )
         return found
+
+
+class Counterfactual(NamedTuple, Generic[Array]):
+    """A motion as it would have been without one of its sources, all else as it was."""
+
+    time: Array
+    """Instants (T,), in s."""
+    q: Array
+    """Positions without the source (T, ..., n), in rad or m, by simulation."""
+    qd: Array
+    """Velocities there, in rad/s or m/s."""
+    first_order_q: Array
+    """Positions without the source (T, ..., n) to first order: the motion, and what leaving out a small part
+    of the source changes, in proportion."""
+    first_order_qd: Array
+    """Velocities to first order."""
+    drift: Array
+    """Positions of a simulation with the source, less those of the motion, (T, ..., n): what to trust."""

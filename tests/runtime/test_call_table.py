@@ -68,6 +68,8 @@ KINDS = [
     *(pytest.param("native", tensors, marks=needs_compiler) for tensors in (False, True)),
 ]
 """Back ends, and whether they are given tensors."""
+OVER_TIME = ("simulate", "trace", "counterfactual")
+"""Calls that are given instants; all but the first are given a motion over these."""
 INSTANTS, PARTS = [0.0, 0.01, 0.02], 7
 """Instants of `simulate`; and the entries of an axis that any torques may have."""
 on_every_back_end = pytest.mark.parametrize(("backend", "tensors"), KINDS)
@@ -109,7 +111,7 @@ def given(load: Load, row: Call, batch: tuple[int, ...] = (), which: str = "tied
     """Return a row's arguments, in arrays: the motion, in which the loop closes, and what has to be given
     too."""
     draw, (n, m) = np.random.default_rng(2), SIZES.get(which, (4, 2))
-    batch = (len(INSTANTS), *batch) if row.key == "trace" else batch
+    batch = (len(INSTANTS), *batch) if row.key in OVER_TIME[1:] else batch
     sizes = {"q": n, "qd": n, "qdd": n, "tau": n, "yd": m, "ydd": m}
     motion = {name: draw.uniform(-1.0, 1.0, (*batch, size)) for name, size in sizes.items()}
     if m:
@@ -126,6 +128,7 @@ def given(load: Load, row: Call, batch: tuple[int, ...] = (), which: str = "tied
         "time": INSTANTS,
         "torque": torque if row.chosen.get("by_link") else torque[..., 0],
         "tau": motion["tau"],
+        "without": "gravity",
         "loads": [] if which in SIZES else [AppliedLoad("hand", **hand)],
     }
     left = () if row.options.get("frame") else ("frame", "point")
@@ -171,7 +174,7 @@ def shape_of(
         sizes["frame"] = len(robot.kinematics.frames)
     sizes |= {name: len(axis.names) for name, axis in axes.items() if name != "part"}
     sizes["moved"] = sizes["constraint" if row.key == "induced_reactions" else "joint"]
-    samples = (len(INSTANTS), *batch) if row.key in ("simulate", "trace") else batch
+    samples = (len(INSTANTS), *batch) if row.key in OVER_TIME else batch
     sums = robot.structure.passive_sums
     own = [*(k or f for k, f in zip(sums.stiffness, sums.pull, strict=True)), *sums.damping, *sums.friction]
     # By joint, by share, by what joints have of their own, by load; the residual and the start.

@@ -119,7 +119,9 @@ def calls(package: Any, robot: Any, times: Any) -> Iterator[tuple[str, tuple[Any
         yield "induced_accelerations", (q, qd, tau), {"loads": loads, "passive": True, **frame}
     yield "induced_reactions", (q, qd, tau), {"loads": loads, "passive": True}
     yield "simulate", (q, qd, times(np.linspace(0, 0.02, 3), "s"), tau), {}
-    yield "trace", (q, qd, qdd, times(np.linspace(0, 0.02, len(Q)), "s"), tau), {"loads": loads}
+    instants = times(np.linspace(0, 0.02, len(Q)), "s")
+    yield "trace", (q, qd, qdd, instants, tau), {"loads": loads}
+    yield "counterfactual", (q, qd, qdd, instants, "gravity", tau), {"loads": loads}
     for name, motion in (
         ("pose", (q,)),
         ("jacobian", (q,)),

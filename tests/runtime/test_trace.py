@@ -173,3 +173,41 @@ def test_what_cannot_be_traced_is_refused(package_of: Packages) -> None:
     }.items():
         with pytest.raises(ValueError, match=told):
             ask()
+
+
+def test_a_motion_without_a_torque_is_that_of_a_simulation_without_it(package_of: Packages) -> None:
+    package = package_of(CRANE)
+    robot = package.load()
+    q, qd, qdd = motion_of(robot.n)
+    load = package.AppliedLoad(robot.link_names[-1], np.outer(np.sin(9.0 * TIME), [3.0, -2.0, 9.0]))
+
+    def torque(t: float, *state: Any) -> Any:
+        fine = motion_of(robot.n, np.array([t]))
+        pull = robot.kinematics.load_torque(
+            fine[0][0], load.frame, np.sin(9.0 * t) * np.array([3.0, -2.0, 9.0])
+        )
+        return (robot.inverse_dynamics(*fine)[0] + pull) * (np.arange(robot.n) != 1)
+
+    def loads(t: float, *state: Any) -> Any:
+        return [package.AppliedLoad(load.frame, np.sin(9.0 * t) * np.array([3.0, -2.0, 9.0]))]
+
+    name = robot.joint_names[1]
+    found = robot.counterfactual(q, qd, qdd, TIME, f"torque/{name}", loads=[load])
+    expected = robot.simulate(q[0], qd[0], TIME, torque, loads, method="DOP853")
+    assert np.abs(found.drift).max() <= 1e-5
+    assert np.abs(found.q - expected.q).max() <= 1e-4 * np.abs(expected.q - q).max()
+
+
+@pytest.mark.parametrize("source", ["torque/turn", "gravity", "spring/turn", "friction/turn", "start"])
+def test_what_is_left_out_in_part_changes_the_motion_to_first_order(source: str, tmp_path: Path) -> None:
+    (tmp_path / "sprung.toml").write_text(SPRUNG)
+    write_package(generate(read_system(tmp_path / "sprung.toml"), ["numpy"]), tmp_path / "sprung")
+    robot = import_package(tmp_path / "sprung").load()
+    motion = motion_of(2, TIME[:21])
+    found = robot.counterfactual(*motion, TIME[:21], source)
+    whole = found.q - found.drift - motion[0]
+    first = found.first_order_q - motion[0]
+    assert np.abs(whole).max() > 1e-4
+    assert np.abs(first - whole).max() <= 0.2 * np.abs(whole).max(), "in a tenth of a second, nearly all"
+    with pytest.raises(ValueError, match="without is 'torque/elbow'; choose a source: near it are torque/"):
+        robot.counterfactual(*motion, TIME[:21], "torque/elbow")

@@ -14,7 +14,7 @@ from linkwise_runtime.call_table import (
     Call,
     Quantity,
 )
-from linkwise_runtime.motion_quantities import TracedMotion
+from linkwise_runtime.motion_quantities import Counterfactual, TracedMotion
 from linkwise_runtime.named_arrays import units_of
 from linkwise_runtime.quantities import Trajectory
 from linkwise_runtime.robot_axes import NamedAxis, axes_of, tied_axes
@@ -58,7 +58,7 @@ BESIDE_IN_C = {
 }
 """Functions of C that no row has."""
 
-OVER_TIME = (Trajectory, TracedMotion)
+OVER_TIME = (Trajectory, TracedMotion, Counterfactual)
 """Records whose answers have instants before their samples."""
 
 

@@ -37,9 +37,9 @@ class SampledMotion(NamedTuple):
         """Return motion and forces at a part of each step's length, T - 1 samples."""
         own = self.lengths.reshape(-1, *[1] * (self.q.ndim - 1))
         wide = own[..., None]
-        q, _ = _cubic(part, own, self.q, self.qd)
-        qd, qdd = _cubic(part, own, self.qd, self.qdd)
-        given, slopes = _cubic(part, wide, self.given, self.slopes)
+        q, _ = cubic(part, own, self.q, self.qd)
+        qd, qdd = cubic(part, own, self.qd, self.qdd)
+        given, slopes = cubic(part, wide, self.given, self.slopes)
         return SampledMotion(self.time[:-1] + part * self.lengths, q, qd, qdd, given, slopes)
 
 
@@ -57,7 +57,7 @@ def sample_slopes(time: Numbers, values: Numbers) -> Numbers:
     return xp.concat([first, middle, last], 0)
 
 
-def _cubic(s: float, h: Numbers, values: Numbers, slopes: Numbers) -> tuple[Numbers, Numbers]:
+def cubic(s: float, h: Numbers, values: Numbers, slopes: Numbers) -> tuple[Numbers, Numbers]:
     """Return the cubics with these values and slopes at their ends, at a part s of each, and their slopes."""
     begin, rise = values[:-1], values[1:] - values[:-1]
     u, v = h * slopes[:-1], h * slopes[1:]

@@ -114,7 +114,8 @@ class TraceEquations:
         mass, coriolis = c2.sum(-2), c1.sum(-2)
         if self.passive and backend.structure.passive:
             mass = mass + backend.constant(np.diag(backend.structure.passive_sums.armature), q)
-        forces = self._forces(backend, q, qd, g, motion.given)
+        loads = motion.given[..., 1:] if self.torques_given else motion.given
+        forces = self.forces(backend, q, qd, g, loads)
         needed = _times(mass, qdd) + _times(coriolis, qd) - forces.sum(-1)
         if place is not None:
             found, rate = place.found.map, place.map_rate(qd)
@@ -138,8 +139,11 @@ class TraceEquations:
         ties = self.constraints.ties
         return ties.place(backend, q) if is_sample else ties.closed_place(backend, q, q)
 
-    def _forces(self, backend: ArrayBackend, q: Numbers, qd: Numbers, g: Numbers, given: Numbers) -> Numbers:
-        """Return the forces (..., n, Y) of all sources but the actuators and the residual."""
+    def forces(self, backend: ArrayBackend, q: Numbers, qd: Numbers, g: Numbers, loads: Numbers) -> Numbers:
+        """Return the forces (..., n, Y) of all sources but actuators, residual and start, on all joints.
+
+        g: torques of shares that are not of motion, (..., n, N); loads: forces of the loads, (..., n, L)
+        """
         xp, structure = namespace(q), backend.structure
         shares = g[..., None]
         if structure.shares:
@@ -152,8 +156,7 @@ class TraceEquations:
             identity = np.eye(structure.n)
             for torque, joints in zip(own, self._passive.values(), strict=True):
                 kinds.append(-backend.constant(identity[:, joints], q) * torque[..., None])
-        kinds.append(given[..., 1:] if self.torques_given else given)
-        return xp.concat(kinds, -1)
+        return xp.concat([*kinds, loads], -1)
 
     def _with_actuators(
         self,

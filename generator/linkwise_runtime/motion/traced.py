@@ -32,13 +32,24 @@ class Traced(NamedTuple):
     loads: object
     passive: bool
     constraints: object
-    windows: object
-    restarts: object
-    by_link: bool
+    windows: object = ()
+    restarts: object = ()
+    by_link: bool = False
 
 
-def trace_motion(robot: DrivenRobot, asked: Traced) -> TracedMotion[Any]:
-    """Return the answer of `Dynamics.trace`."""
+class ReadTrace(NamedTuple):
+    """A motion that was read, and its equations."""
+
+    times: list[float]
+    samples: SampledMotion
+    equations: TraceEquations
+    loads: AppliedLoads
+    vectors: Sequence[Numbers]
+    """Vectors of the loads, (T, ..., 3)."""
+
+
+def read_trace(robot: DrivenRobot, asked: Traced) -> ReadTrace:
+    """Return the motion of a call, and its equations; raises as `Dynamics.trace` does."""
     constraints = constraints_of(robot, asked.constraints)
     loads = loads_of(robot.backend, asked.loads)
     named = {"q": asked.q, "qd": asked.qd, "qdd": asked.qdd}
@@ -48,16 +59,23 @@ def trace_motion(robot: DrivenRobot, asked: Traced) -> TracedMotion[Any]:
     check_numbers(motion, robot.joint_names)
     times = _instants(asked.time, motion["q"])
     _check_traceable(backend, motion["q"])
-    parts, windows = _parts(asked, times)
     equations = TraceEquations(
         backend, constraints, bool(asked.passive), "tau" in motion, loads.names(backend), asked.by_link
     )
-    samples = _sampled(backend, loads, times, motion, numbers[len(named) :])
-    blocks = list(Tracer(equations, parts).blocks(samples.some, len(times), tuple(motion["q"].shape[1:-1])))
-    xp = namespace(motion["q"])
+    vectors = numbers[len(named) :]
+    return ReadTrace(times, _sampled(backend, loads, times, motion, vectors), equations, loads, vectors)
+
+
+def trace_motion(robot: DrivenRobot, asked: Traced) -> TracedMotion[Any]:
+    """Return the answer of `Dynamics.trace`."""
+    read = read_trace(robot, asked)
+    parts, windows = _parts(asked, read.times)
+    batch = tuple(read.samples.q.shape[1:-1])
+    blocks = list(Tracer(read.equations, parts).blocks(read.samples.some, len(read.times), batch))
+    xp = namespace(read.samples.q)
     joined: Any = [xp.concat(list(values), 0) for values in zip(*blocks, strict=True)]
-    coordinates = tuple(robot.joint_names.index(name) for name in equations.coordinates)
-    return TracedMotion._make([*joined, equations.sources, windows, coordinates])
+    coordinates = tuple(robot.joint_names.index(name) for name in read.equations.coordinates)
+    return TracedMotion._make([*joined, read.equations.sources, windows, coordinates])
 
 
 def _sampled(
