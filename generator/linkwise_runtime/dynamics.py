@@ -591,7 +591,7 @@ class Dynamics(RobotCalls):
         velocity forces and, later, elsewhere. Beside it is its first order, which is linear in the source,
         so that first orders of all sources sum up to another motion still.
 
-        without: a source by the name that `trace` has for it: "torque/elbow", "gravity", "load/hand", "start"
+        without: a source by the name that `trace` has for it: "torque:elbow", "gravity", "load:hand", "start"
         step: longest step of RK4, in s; from sample to sample unless given
         other arguments: as in `trace`
 

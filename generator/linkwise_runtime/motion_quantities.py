@@ -11,10 +11,10 @@ class TracedMotion(NamedTuple, Generic[Array]):
 
     Source s is one of X, by its name, and w one of W windows of time in which it acted:
 
-        torque/JOINT             the actuator of a joint, by its torque
-        gravity                  weight; by link gravity/LINK. Links written by hand have their shares' names
-        spring/JOINT, damping/JOINT, friction/JOINT
-        load/NAME                a load from outside
+        torque:JOINT             the actuator of a joint, by its torque
+        gravity                  weight; by link gravity:LINK. Links written by hand have their shares' names
+        spring:JOINT, damping:JOINT, friction:JOINT
+        load:NAME                a load from outside
         residual                 what the motion needs and no source gives, where torques are given
         start                    the velocities at the start, which no force of this motion made
 
@@ -62,7 +62,7 @@ class TracedMotion(NamedTuple, Generic[Array]):
     def of(self: "TracedMotion[Any]", source: str, values: Any = None) -> Any:
         """Return the part of a source, or of all of one kind, summed over windows.
 
-        source: a name, such as "torque/elbow", or its first part, such as "torque", for all of them
+        source: a name, such as "torque:elbow", or its first part, such as "torque", for all of them
         values: one of the arrays here, with axes (..., X, W); `velocity` unless given
 
         Raises ValueError for a source that is not there.
@@ -75,7 +75,7 @@ class TracedMotion(NamedTuple, Generic[Array]):
 
         Raises ValueError for a source that is not there.
         """
-        found = [s for s, name in enumerate(self.sources) if name == source or name.startswith(f"{source}/")]
+        found = [s for s, name in enumerate(self.sources) if name == source or name.startswith(f"{source}:")]
         if not found:
             raise ValueError(
                 f"no source {short(source)} moves this robot; its sources are "

@@ -98,7 +98,7 @@ def test_each_part_of_a_tree_is_what_scipy_integrates_of_pinocchio(name: str, ba
 
     start = np.zeros((robot.n, robot.n + 2))
     start[:, -1] = qd[0]
-    assert traced.sources == (*(f"torque/{name}" for name in robot.joint_names), "gravity", "start")
+    assert traced.sources == (*(f"torque:{name}" for name in robot.joint_names), "gravity", "start")
     parts = integrated(slope, start)
     assert np.abs(traced.velocity[::250, ..., 0] - parts).max() <= OF_PARTS * max(1.0, np.abs(parts).max())
 
@@ -129,7 +129,7 @@ def test_each_part_of_a_four_bar_keeps_its_loop_as_sympys_multipliers_say(tmp_pa
 
     start = np.zeros((3, 3))
     start[:, -1] = qd[0]
-    assert traced.sources == (f"torque/{ties.independent[0]}", "gravity", "start")
+    assert traced.sources == (f"torque:{ties.independent[0]}", "gravity", "start")
     assert ties.independent == robot.joint_names[:1]
     assert relative_error(traced.velocity[::250, ..., 0], integrated(slope, start)) <= OF_PARTS
 

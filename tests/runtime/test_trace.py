@@ -64,9 +64,9 @@ def test_parts_sum_to_the_velocities_on_every_back_end(backend: str, package_of:
     expected = package.load("numpy").trace(*motion, TIME, loads=[load], windows=[0.3, 0.4], by_link=True)
     np.testing.assert_allclose(np.asarray(found.velocity), expected.velocity, rtol=1e-9, atol=1e-11)
     assert found.sources == (
-        *(f"torque/{name}" for name in robot.joint_names),
-        *(f"gravity/{name}" for name in robot.link_names),
-        f"load/{robot.link_names[-1]}",
+        *(f"torque:{name}" for name in robot.joint_names),
+        *(f"gravity:{name}" for name in robot.link_names),
+        f"load:{robot.link_names[-1]}",
         "start",
     )
 
@@ -128,14 +128,14 @@ def test_springs_and_losses_are_sources_where_joints_have_them(tmp_path: Path) -
     robot = import_package(tmp_path / "sprung").load()
     found = robot.trace(*motion_of(2), TIME)
     assert found.sources == (
-        *("torque/lift", "torque/turn", "gravity"),
-        *("spring/turn", "damping/lift", "damping/turn", "friction/turn", "start"),
+        *("torque:lift", "torque:turn", "gravity"),
+        *("spring:turn", "damping:lift", "damping:turn", "friction:turn", "start"),
     )
     assert np.abs(found.total - motion_of(2)[1]).max() <= 1e-9
     gained = found.energy - found.energy[:1] - found.work
     assert np.abs(gained).max() <= 1e-8 * np.abs(found.energy).max()
     bare = robot.trace(*motion_of(2), TIME, passive=False)
-    assert bare.sources == ("torque/lift", "torque/turn", "gravity", "start")
+    assert bare.sources == ("torque:lift", "torque:turn", "gravity", "start")
 
 
 def test_gradients_flow_through_a_trace(package_of: Packages) -> None:
@@ -192,13 +192,13 @@ def test_a_motion_without_a_torque_is_that_of_a_simulation_without_it(package_of
         return [package.AppliedLoad(load.frame, np.sin(9.0 * t) * np.array([3.0, -2.0, 9.0]))]
 
     name = robot.joint_names[1]
-    found = robot.counterfactual(q, qd, qdd, TIME, f"torque/{name}", loads=[load])
+    found = robot.counterfactual(q, qd, qdd, TIME, f"torque:{name}", loads=[load])
     expected = robot.simulate(q[0], qd[0], TIME, torque, loads, method="DOP853")
     assert np.abs(found.drift).max() <= 1e-5
     assert np.abs(found.q - expected.q).max() <= 1e-4 * np.abs(expected.q - q).max()
 
 
-@pytest.mark.parametrize("source", ["torque/turn", "gravity", "spring/turn", "friction/turn", "start"])
+@pytest.mark.parametrize("source", ["torque:turn", "gravity", "spring:turn", "friction:turn", "start"])
 def test_what_is_left_out_in_part_changes_the_motion_to_first_order(source: str, tmp_path: Path) -> None:
     (tmp_path / "sprung.toml").write_text(SPRUNG)
     write_package(generate(read_system(tmp_path / "sprung.toml"), ["numpy"]), tmp_path / "sprung")
@@ -209,5 +209,5 @@ def test_what_is_left_out_in_part_changes_the_motion_to_first_order(source: str,
     first = found.first_order_q - motion[0]
     assert np.abs(whole).max() > 1e-4
     assert np.abs(first - whole).max() <= 0.2 * np.abs(whole).max(), "in a tenth of a second, nearly all"
-    with pytest.raises(ValueError, match="without is 'torque/elbow'; choose a source: near it are torque/"):
-        robot.counterfactual(*motion, TIME[:21], "torque/elbow")
+    with pytest.raises(ValueError, match="without is 'torque:elbow'; choose a source: near it are torque:"):
+        robot.counterfactual(*motion, TIME[:21], "torque:elbow")

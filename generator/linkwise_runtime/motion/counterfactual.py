@@ -21,7 +21,7 @@ from ..quantities import AppliedLoad
 from .between_samples import cubic, sample_slopes
 from .induced_accelerations import DrivenRobot
 from .simulated import Simulated, simulate_motion
-from .trace_equations import RESIDUAL, START, TORQUE
+from .trace_equations import BETWEEN, RESIDUAL, START, TORQUE
 from .traced import ReadTrace, Traced, read_trace
 
 SMALL = 1e-3
@@ -98,7 +98,7 @@ class DrivenAgain:
             left = _times(unit, forces[..., equations.sources.index(RESIDUAL)])
         else:
             given, left = _times(unit, forces[..., : len(own)].sum(-1)), 0.0 * q
-        kind, _, joint = source.partition("/")
+        kind, _, joint = source.partition(BETWEEN)
         there = [float(kind == TORQUE and joint == name) for name in equations.backend.structure.joint_names]
         part = given * equations.backend.constant(there, q) + left * float(source == RESIDUAL)
         return cls(read, source, parts, namespace(q).stack([given + left, part], -1))
@@ -110,7 +110,7 @@ class DrivenAgain:
 
     def _of_state(self, t: float, q: Numbers, qd: Numbers) -> Numbers:
         """Return the force (4, ..., n) of a source that depends on where the robot is; else zeros."""
-        kind = self.source.partition("/")[0]
+        kind = self.source.partition(BETWEEN)[0]
         if kind in (TORQUE, RESIDUAL, START):
             return 0.0 * q
         equations = self.read.equations
@@ -119,7 +119,7 @@ class DrivenAgain:
         pulls = [-pull for pull in self.read.loads.torques(backend, q, vectors)]
         loads = namespace(q).stack(pulls, -1) if pulls else q[..., None][..., :0]
         columns = equations.forces(backend, q, qd, backend.answers.coefficients(q, qd)[2], loads)
-        first = next(k for k, name in enumerate(sources) if name.partition("/")[0] != TORQUE)
+        first = next(k for k, name in enumerate(sources) if name.partition(BETWEEN)[0] != TORQUE)
         return columns[..., sources.index(self.source) - first]
 
     def loads(self, t: float, q: Numbers, qd: Numbers) -> list[list[AppliedLoad]]:

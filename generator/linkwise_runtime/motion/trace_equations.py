@@ -10,6 +10,7 @@ Under constraints v_s = G w_s of the independent coordinates, with
     G^T M G w'_s + G^T (M dG/dt + C G) w_s = G^T F_s
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -24,7 +25,9 @@ from .between_samples import SampledMotion
 from .collocation import LinearEquations
 
 TORQUE, LOAD, RESIDUAL, START = "torque", "load", "residual", "start"
-"""First parts of the names of sources, before those of joints and loads."""
+"""Kinds of sources, which the names of sources begin with."""
+BETWEEN = ":"
+"""Sign between the kind of a source and the name of its joint, link or load."""
 
 
 class TraceAt(NamedTuple):
@@ -51,14 +54,19 @@ class TraceEquations:
     """Equations of motion of a robot for each source of forces."""
 
     backend: ArrayBackend
+    """Back end of the robot."""
     constraints: Constraints[Any] | None
     passive: bool
     torques_given: bool
     """True if the first of the given columns is what the actuators gave; else they give what motion needs."""
-    loads: tuple[str, ...]
-    """Names of the loads, whose forces are the columns after that."""
-    by_link: bool
+    given: tuple[str, ...]
+    """Names of the sources whose forces are the columns after that."""
+    by_link: bool = False
     """True if gravity, or each share with a name, is a source for each link."""
+    carried: tuple[ArrayBackend, ...] = ()
+    """Back ends of the same joints with nothing but payloads, which are carried beside the robot's links."""
+    inputs: Callable[[Numbers], Mapping[str, object]] | None = None
+    """Function that returns what the robot depends on at instants, beside time; None for nothing."""
 
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
@@ -73,17 +81,21 @@ class TraceEquations:
         structure = self.backend.structure
         joints = structure.joint_names if self.torques_given else self.coordinates
         shares = [
-            f"{share}/{link}" if self.by_link else share
+            f"{share}{BETWEEN}{link}" if self.by_link else share
             for share in structure.share_names
             for link in (structure.link_names if self.by_link else ("",))
         ]
-        own = [f"{kind}/{structure.joint_names[i]}" for kind, joints in self._passive.items() for i in joints]
+        own = [
+            f"{kind}{BETWEEN}{structure.joint_names[i]}"
+            for kind, joints in self._passive.items()
+            for i in joints
+        ]
         residual = [RESIDUAL] if self.torques_given else []
         return (
-            *(f"{TORQUE}/{joint}" for joint in joints),
+            *(f"{TORQUE}{BETWEEN}{joint}" for joint in joints),
             *shares,
             *own,
-            *(f"{LOAD}/{name}" for name in self.loads),
+            *self.given,
             *residual,
             START,
         )
@@ -110,12 +122,13 @@ class TraceEquations:
         if place is not None:
             q, qd = place.q, place.velocity(place.own(qd))
             qdd = place.velocity(place.own(qdd)) + place.bias(qd)
-        c2, c1, g = backend.answers.coefficients(q, qd)
-        mass, coriolis = c2.sum(-2), c1.sum(-2)
+        terms = [one.answers.coefficients(q, qd) for one in (backend, *self.carried)]
+        mass, coriolis = (sum(parts).sum(-2) for parts in list(zip(*terms, strict=True))[:2])
+        g = namespace(q).concat([g for _, _, g in terms], -1)
         if self.passive and backend.structure.passive:
             mass = mass + backend.constant(np.diag(backend.structure.passive_sums.armature), q)
-        loads = motion.given[..., 1:] if self.torques_given else motion.given
-        forces = self.forces(backend, q, qd, g, loads)
+        given = motion.given[..., 1:] if self.torques_given else motion.given
+        forces = self.forces(backend, q, qd, g, given)
         needed = _times(mass, qdd) + _times(coriolis, qd) - forces.sum(-1)
         if place is not None:
             found, rate = place.found.map, place.map_rate(qd)
@@ -126,12 +139,14 @@ class TraceEquations:
         return TraceAt(qd, LinearEquations(mass, coriolis, columns), place)
 
     def _at(self, motion: SampledMotion) -> ArrayBackend:
-        """Return the back end at these instants, where the robot depends on time."""
-        if not self.backend.structure.time:
+        """Return the back end at these instants, where the robot depends on time or inputs."""
+        time = self.backend.structure.time
+        if not time and self.inputs is None:
             return self.backend
         backend = self.backend.separate()
-        times = motion.time.reshape(-1, *[1] * (motion.q.ndim - 2))
-        backend.set_parameters({backend.structure.time: times})
+        wide = (-1, *[1] * (motion.q.ndim - 2))
+        values = {} if self.inputs is None else dict(self.inputs(motion.time))
+        backend.set_parameters(values | ({time: motion.time.reshape(*wide)} if time else {}))
         return backend
 
     def _place(self, backend: ArrayBackend, q: Numbers, is_sample: bool) -> ClosedPlace:
@@ -139,10 +154,10 @@ class TraceEquations:
         ties = self.constraints.ties
         return ties.place(backend, q) if is_sample else ties.closed_place(backend, q, q)
 
-    def forces(self, backend: ArrayBackend, q: Numbers, qd: Numbers, g: Numbers, loads: Numbers) -> Numbers:
+    def forces(self, backend: ArrayBackend, q: Numbers, qd: Numbers, g: Numbers, given: Numbers) -> Numbers:
         """Return the forces (..., n, Y) of all sources but actuators, residual and start, on all joints.
 
-        g: torques of shares that are not of motion, (..., n, N); loads: forces of the loads, (..., n, L)
+        g: torques of shares that are not of motion, (..., n, N); given: forces by columns, (..., n, Y)
         """
         xp, structure = namespace(q), backend.structure
         shares = g[..., None]
@@ -156,7 +171,7 @@ class TraceEquations:
             identity = np.eye(structure.n)
             for torque, joints in zip(own, self._passive.values(), strict=True):
                 kinds.append(-backend.constant(identity[:, joints], q) * torque[..., None])
-        return xp.concat([*kinds, loads], -1)
+        return xp.concat([*kinds, given], -1)
 
     def _with_actuators(
         self,

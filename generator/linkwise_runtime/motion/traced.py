@@ -14,7 +14,7 @@ from ..motion_quantities import TracedMotion
 from .between_samples import SampledMotion, sample_slopes
 from .induced_accelerations import DrivenRobot, constraints_of
 from .source_forces import AppliedLoads, loads_of
-from .trace_equations import TraceEquations
+from .trace_equations import BETWEEN, LOAD, TraceEquations
 from .tracer import TraceParts, Tracer
 
 GAP = 5.0
@@ -59,8 +59,9 @@ def read_trace(robot: DrivenRobot, asked: Traced) -> ReadTrace:
     check_numbers(motion, robot.joint_names)
     times = _instants(asked.time, motion["q"])
     _check_traceable(backend, motion["q"])
+    names = tuple(f"{LOAD}{BETWEEN}{name}" for name in loads.names(backend))
     equations = TraceEquations(
-        backend, constraints, bool(asked.passive), "tau" in motion, loads.names(backend), asked.by_link
+        backend, constraints, bool(asked.passive), "tau" in motion, names, asked.by_link
     )
     vectors = numbers[len(named) :]
     return ReadTrace(times, _sampled(backend, loads, times, motion, vectors), equations, loads, vectors)

@@ -70,14 +70,29 @@ class Tracer:
 
         batch: shape of the motions that are traced at once
         """
-        size = self._block_size(math.prod(batch))
-        for first, end in pairwise([*self.parts.restarts, count - 1]):
-            state: TraceState | None = None
-            for begin in range(first, end, size):
-                stop = min(begin + size, end)
-                block, state = self._block(samples(begin, stop + 1), begin, state)
-                # Its last sample is the first of the next block, which may begin anew there.
-                yield block if stop == count - 1 else block.without_last()
+        size, state = self._block_size(math.prod(batch)), None
+        for begin in range(0, count - 1, size):
+            stop = min(begin + size, count - 1)
+            block, state = self.advance(samples(begin, stop + 1), begin, state)
+            # Its last sample is the first of the next block, which may begin anew there.
+            yield block if stop == count - 1 else block.without_last()
+
+    def advance(
+        self, motion: SampledMotion, first: int, state: TraceState | None
+    ) -> tuple[TraceBlock, TraceState | None]:
+        """Return the trace of some samples, and the state at the last one.
+
+        first: number of the first sample; state: that there, None where the trace starts
+        """
+        last, parts = first + len(motion.time) - 1, []
+        inside = [at for at in self.parts.restarts if first < at < last]
+        for begin, end in pairwise([first, *inside, last]):
+            known = None if begin in self.parts.restarts else state
+            part, state = self._part(motion.some(begin - first, end - first + 1), begin, known)
+            parts.append(part if end == last else part.without_last())
+        xp = namespace(motion.q)
+        joined = (xp.concat(list(values), 0) for values in zip(*parts, strict=True))
+        return (parts[0] if len(parts) == 1 else TraceBlock._make(joined)), state
 
     def _block_size(self, motions: int) -> int:
         """Return the number of steps to compute at once."""
@@ -87,13 +102,10 @@ class Tracer:
         coefficients, solved, told = 2 * n * links * n, 3 * m * (4 * m + 2 * columns), n * columns * windows
         return max(1, AT_ONCE // ((3 * (coefficients + solved) + told) * max(1, motions)))
 
-    def _block(
+    def _part(
         self, motion: SampledMotion, first: int, begin: TraceState | None
     ) -> tuple[TraceBlock, TraceState]:
-        """Return the trace of some samples, and the state at the last one.
-
-        first: number of the first sample; begin: the state there, None where the trace starts
-        """
+        """Return what `advance` does, for samples within which nothing begins anew."""
         equations = self.equations
         xp, at = namespace(motion.q), equations.at(motion, True)
         acting = equations.backend.weights("windows", self.parts.acting(first, len(motion.time)), motion.q)
