@@ -232,7 +232,7 @@ class InducedShares:
         try:
             moved = self._moved(self._response(mass, q, qd), forces, rows, qdd)
         except ValueError as error:
-            raise LinkwiseError(f"--induced: {_timed(str(error), out[0])}") from error
+            raise LinkwiseError(f"--induced: {timed(str(error), out[0], '--induced')}") from error
         row, worst = self.first, Closure()
         for point in self.points:
             jacobian, rate = point.maps(self.robot, q, qd)
@@ -267,7 +267,7 @@ class InducedShares:
         return response_of(model.backend, ties, q, qd, mass)
 
 
-def _timed(text: str, time: Array) -> str:
+def timed(text: str, time: Array, flag: str) -> str:
     """Return the text of an error with the time in place of the sample's number, and with advice.
 
     A text without a sample's number is returned as it is.
@@ -276,4 +276,4 @@ def _timed(text: str, time: Array) -> str:
     if found is None:
         return text
     told = text.replace(found[0], f" at {time[int(found[1])]:.6g} s", 1)
-    return f"{told}; cut the log there, or leave --induced out"
+    return f"{told}; cut the log there, or leave {flag} out"

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from linkwise.analysis.asked_trace import AskedTrace, restart_times
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples, slip_warnings
 from linkwise.analysis.column_matching import with_columns
 from linkwise.analysis.contacts import Contacts
@@ -25,8 +26,9 @@ from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import draw
 from linkwise.analysis.stream import Sink, span_of, stream
 from linkwise.analysis.torques import Decomposer
+from linkwise.analysis.traced_rows import TracedRows
 from linkwise.arrays import Array
-from linkwise.errors import within
+from linkwise.errors import LinkwiseError, within
 from linkwise.extras import extra
 from linkwise.option import option
 from linkwise.progress import Progress
@@ -102,6 +104,25 @@ class Outputs:
         "be repeated",
         metavar="POINT",
     )
+    trace: tuple[str, ...] = option(
+        (),
+        "Tell which sources the velocity of a joint, and what velocities ask of it, came from; all for every"
+        " joint; may be repeated",
+        metavar="JOINT",
+    )
+    trace_windows: float | None = option(
+        None, "Cut the sources of --trace into windows of this length, s", metavar="S"
+    )
+    trace_restart: tuple[str, ...] = option(
+        (),
+        "Begin the trace anew at a time, s, or wherever a phase begins or ends; may be repeated",
+        metavar="S|phases",
+    )
+
+    def __post_init__(self) -> None:
+        for flag, given in (("--trace-windows", self.trace_windows), ("--trace-restart", self.trace_restart)):
+            if given and not self.trace:
+                raise LinkwiseError(f"{flag} goes with --trace; add it")
 
 
 @dataclass(frozen=True)
@@ -143,6 +164,7 @@ class Job:
             "loads": [borne.record() for borne in self.decomposer.loads],
             "contacts": [] if robot.contacts is None else list(robot.contacts.names),
             "induced": [point.name for point in self.decomposer.induced.points],
+            "trace": None if self.decomposer.traced is None else self.decomposer.traced.record(),
         }
 
     @property
@@ -180,6 +202,7 @@ class Job:
             closed=self.closed,
             times=self.decomposer.times,
             phases=self.phases,
+            traced=None if self.decomposer.traced is None else self.decomposer.traced.record(),
         )
 
     def _never_on(self, done: WholeMovement) -> Iterator[str]:
@@ -230,9 +253,18 @@ def prepared(
     samples = replace(samples, warnings=(*samples.warnings, *slips))
     borne = placed_loads(asked.loads, robot, samples.time, reading.ignore_extra, progress, buffer)
     times = contact_times(asked.contacts, opened, robot, reading, samples.time, progress, buffer)
-    decomposer = Decomposer.of(robot, processing.convention, outputs.power_terms, borne, points, times)
     every = (*borne, *(() if times is None else times.loads))
     phases = placed_phases(outputs.phases, opened, robot, every, reading, progress)
+    traced = None
+    if outputs.trace:
+        span = slice(*span_of(samples, processing))
+        time, q = samples.time[span], samples.q[span]
+        restarts = restart_times(outputs.trace_restart, phases, robot, times, time, q)
+        made = AskedTrace.of(outputs.trace, outputs.trace_windows, restarts, robot, time)
+        traced = TracedRows.of(made, robot, borne, samples)
+    decomposer = Decomposer.of(
+        robot, processing.convention, outputs.power_terms, borne, points, times, traced
+    )
     return Job(log.name, asked, samples, decomposer, closed, phases)
 
 

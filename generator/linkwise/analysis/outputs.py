@@ -51,7 +51,7 @@ def open_table(path: Path, columns: Sequence[Column], note: str) -> Iterator[Cal
 
 
 def _metadata(column: Column) -> dict[str, str]:
-    indices = {name: getattr(column, name) for name in ("joint", "link", "cause", "point", "row")}
+    indices = {name: getattr(column, name) for name in ("joint", "link", "cause", "point", "row", "origin")}
     return {
         "unit": column.unit,
         "meaning": QUANTITIES[column.quantity].meaning,
@@ -83,6 +83,7 @@ def record(result: AnalysisResult) -> dict[str, Any]:
         "loads": [borne.record() for borne in result.loads],
         "induced": list(result.induced),
         "phases": [phase.told for phase in result.phases],
+        **({} if result.traced is None else {"trace": dict(result.traced)}),
         "closure": asdict(result.closure),
         **({} if result.closed is None else {"constraints": _constraints(result, result.closed)}),
         **({} if robot.contacts is None else {"contacts": _contacts(result)}),

@@ -1,8 +1,8 @@
 """The result of an analysis: named arrays, and the record of how they were made."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from linkwise_runtime.chosen_names import nearest_first
@@ -93,6 +93,8 @@ class AnalysisResult(WholeMovement):
     """Times at which contacts are on, where there are any."""
     phases: tuple[PlacedPhase, ...] = ()
     """Phases that were asked for."""
+    traced: Mapping[str, Any] | None = None
+    """Joints, sources and windows of a trace, as the record has them; None without."""
 
     def __getitem__(self, name: str) -> Array:
         """Return a column (S,) by its name, as in the Parquet file: "tau/joint1/link2".

@@ -123,6 +123,18 @@ TABLE = {
         "induced_contacts point component contact",
         "acceleration by what the contact itself does, as what it holds turns and slips",
     ),
+    "qd_from": (
+        "traced_velocity joint origin",
+        "part of the joint's velocity that goes back to the source",
+    ),
+    "tau_from": (
+        "traced_velocity_torque joint cause origin",
+        "torque on the joint by the part of the cause's velocity that goes back to the source",
+    ),
+    "energy_from": (
+        "traced_energy origin",
+        "kinetic energy of the velocities that go back to the source, which it alone changes",
+    ),
     "acc_kinematic": (
         "induced_kinematic point component cause",
         "acceleration of the point by the cause's velocity, without any of a joint",
@@ -146,7 +158,7 @@ BY_SOURCE = {
 """Name with axes, and meaning, of arrays in which springs, damping and so on stand side by side."""
 UNITS = {"tau": TORQUE, "force": "torque:constraint", "power": "W", "acc": "acceleration:component"}
 UNITS |= {"time": "s", "q": "position:joint", "qd": "velocity:joint", "qdd": "acceleration:joint"}
-UNITS |= {"contact": "", "slip": "velocity:constraint"}
+UNITS |= {"contact": "", "slip": "velocity:constraint", "energy": "J"}
 """Unit by the first part of a name, as the runtime writes it: torque:joint depends on the joint."""
 OF_PACKAGES = {
     "tau_link": CALLS["partial_torque"].answers[0],

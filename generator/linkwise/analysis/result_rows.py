@@ -57,7 +57,8 @@ class Column:
     The cause is a coordinate; for a share with a name it is that share, for the torque of a load that load,
     for share and power of a contact that contact, and for a force or slip the row of the constraint, where
     `load` is the load that causes a force,
-    if one does. An induced acceleration has the number of its point and of a row of that point.
+    if one does. An induced acceleration has the number of its point and of a row of that point, and what is
+    traced that of its source.
     """
 
     quantity: str
@@ -69,6 +70,7 @@ class Column:
     point: int | None = None
     row: int | None = None
     load: int | None = None
+    origin: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +88,12 @@ class ResultRows:
         places: Iterable[Place],
         loads: Sequence[PlacedLoad] = (),
         points: Sequence[InducedPoint] = (),
+        origins: Sequence[str] = (),
     ) -> "ResultRows":
-        """Return rows at these places of the quantities of a robot with loads and points."""
+        """Return rows at these places of the quantities of a robot with loads and points.
+
+        origins: names of the sources of a trace, window of time by window
+        """
         rows = robot.constraint_rows
         bases = tuple("rad" if " moment" in row else "m" if " force" in row else "" for row in rows)
         contacts = () if robot.contacts is None else robot.contacts.names
@@ -100,6 +106,7 @@ class ResultRows:
             "contact": NamedAxis("contact", contacts),
             "point": NamedAxis("point", tuple(point.name for point in points)),
             "component": NamedAxis("component", tuple(components), tuple(components.values())),
+            "origin": NamedAxis("origin", tuple(origins)),
         }
         return cls(axes, tuple(points), tuple(places))
 

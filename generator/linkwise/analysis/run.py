@@ -44,6 +44,9 @@ def analyze(
     induced: Sequence[str] = (),
     contacts: Contacts | Sequence[Contact] = (),
     phases: Sequence[str] = (),
+    trace: Sequence[str] = (),
+    trace_windows: float | None = None,
+    trace_restart: Sequence[str] = (),
 ) -> Analysis:
     """Analyse a motion log with a generated robot, all samples in memory.
 
@@ -54,13 +57,22 @@ def analyze(
     induced: points whose acceleration is split by source: FRAME or FRAME,X,Y,Z, joints, centre-of-mass
     contacts: frames that the ground holds, whose reactions are found from the motion; `Contacts` says when
     phases: phases of the movement for the figure "causes", written as for --phase: "stance/swing=LOAD"
+    trace: joints whose velocities, and what velocities ask of them, are traced to their sources, or "all"
+    trace_windows: length in s of the windows of time into which these sources are cut
+    trace_restart: times in s at which the trace begins anew, written as numbers, or "phases"
 
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
     held = Contacts.of(contacts)
     loaded = with_payloads(robot if isinstance(robot, OpenedRobot) else load_robot(Path(robot)), payloads)
     loaded, borne = with_contacts(loaded, held), Loads.of(loads, loads_cutoff)
-    outputs = Outputs(induced=tuple(induced), phases=tuple(map(Phase.of, phases)))
+    outputs = Outputs(
+        induced=tuple(induced),
+        phases=tuple(map(Phase.of, phases)),
+        trace=tuple(trace),
+        trace_windows=trace_windows,
+        trace_restart=tuple(map(str, trace_restart)),
+    )
     asked = Request(reading or Reading(), processing or Processing(), outputs, borne, held)
     job = prepared(Path(log), loaded, asked, progress)
     with EverySample(len(job.columns), job.count) as kept:

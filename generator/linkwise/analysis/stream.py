@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
+from linkwise_runtime.motion.tracer import TraceState
 
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.filtering import derivatives
@@ -13,6 +14,7 @@ from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import Processing
 from linkwise.analysis.torques import Decomposer
+from linkwise.analysis.traced_rows import ExtendedBlock
 from linkwise.analysis.verify import Closure, against_recursion
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
@@ -97,19 +99,28 @@ def stream(
     Raises LinkwiseError for too few samples, results that overflow, and a robot whose torques do not add up.
     """
     (start, stop), rows = span_of(samples, processing), decomposer.rows
-    sums, inner = MovementSums(rows), _at_once(len(rows))
+    sums, inner, traced = MovementSums(rows), _at_once(len(rows)), decomposer.traced
     with ThreadPoolExecutor(1) as writer, np.errstate(over="ignore", invalid="ignore"):
         pending: Future[None] | None = None
+        state: TraceState | None = None
         for first, last in _blocks(start, stop, len(rows)):
             block = np.empty((len(rows), last - first))
             for at in range(first, last, inner):
                 end = min(at + inner, last)
-                q, qd, qdd = derivatives(samples.q, samples.rate, at, end, processing)
-                out = block[:, at - first : end - first]
-                time = samples.time[at:end]
-                here = decomposer.at(time, samples.inputs[at:end])
-                if not sums.add(out, here.fill(out, time, q, qd, qdd)):
-                    raise _overflow(samples, decomposer, out, at)
+                low, high = (at, end) if traced is None else (max(start, at - 1), min(stop, end + 2))
+                q, qd, qdd = derivatives(samples.q, samples.rate, low, high, processing)
+                own = block[:, at - first : end - first]
+                out = own if traced is None else np.empty((len(rows), high - low))
+                time = samples.time[low:high]
+                here = decomposer.at(time, samples.inputs[low:high])
+                closure = here.fill(out, time, q, qd, qdd)
+                if traced is not None:
+                    extended = ExtendedBlock(low - start, at - start, end - start, stop - 1 - start)
+                    error, state = here.trace(out, extended, state)
+                    closure |= error
+                    own[:] = out[:, extended.own]
+                if not sums.add(own, closure):
+                    raise _overflow(samples, decomposer, own, at)
             sums.closure |= against_recursion(decomposer.robot, decomposer.loads, rows, block)
             sums.closure.check()
             if pending is not None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.motion.tracer import TraceState
 
 from linkwise.analysis.closed_motion import reason_of
 from linkwise.analysis.contacts.ground import ContactTerms, Standing
@@ -18,6 +19,7 @@ from linkwise.analysis.result_quantities import PASSIVE, QUANTITIES, TERMS, TORQ
 from linkwise.analysis.result_rows import QuantityRows, ResultRows, torque_places
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.term_rows import TermArrays, term_rows
+from linkwise.analysis.traced_rows import ExtendedBlock, TracedRows
 from linkwise.analysis.verify import Closure, residual, worst_of
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
@@ -54,6 +56,8 @@ class Decomposer:
     times: ContactTimes | None
     terms: ContactTerms | None
     """Terms of the robot on its contacts; None without contacts."""
+    traced: TracedRows | None = None
+    """Rows of a trace; None where none is asked for."""
 
     @classmethod
     def of(
@@ -64,6 +68,7 @@ class Decomposer:
         loads: Sequence[PlacedLoad] = (),
         points: Sequence[InducedPoint] = (),
         times: ContactTimes | None = None,
+        traced: TracedRows | None = None,
     ) -> "Decomposer":
         """Plan where each packed value of the robot goes."""
         of_robot, terms = term_rows(robot.model.layout), None
@@ -73,13 +78,16 @@ class Decomposer:
         measured = [] if times is None else [at for at, loads in enumerate(times.measured) if loads]
         places = torque_places(robot, of_robot, loads, power_terms, measured)
         induced = InducedShares.of(robot, points, ResultRows.of(robot, places, loads))
-        rows = ResultRows.of(robot, [*places, *induced.places], loads, points)
+        places += induced.places
+        places += [] if traced is None else traced.places([at for at in places if at[0] == "tau_qd"])
+        rows = ResultRows.of(robot, places, loads, points, () if traced is None else traced.origins)
         sources = TermArrays(*([row[-1] for row in some] for some in of_robot))
         parts = _sums(rows, "tau_link", *TERMS)
         wholes = _sums(rows, "tau", "tau_link", *PASSIVE, "tau_load")
         forces = ReactionForces(robot, tuple(loads), times)
         return cls(
-            robot, tuple(loads), convention, rows, sources, parts, wholes, induced, forces, times, terms
+            *(robot, tuple(loads), convention, rows, sources, parts, wholes, induced, forces, times, terms),
+            traced=traced,
         )
 
     def at(self, time: Array, inputs: Array) -> "Decomposer":
@@ -125,6 +133,15 @@ class Decomposer:
             rows.put(out, "tau_qd", _left(standing, velocity))
         self._fill_power(out, qd)
         return closure
+
+    def trace(
+        self, out: Array, block: ExtendedBlock, state: TraceState | None
+    ) -> tuple[Closure, TraceState | None]:
+        """Fill the rows of a trace, once all others are filled, as `TracedRows.fill` does."""
+        if self.traced is None:
+            return Closure(), None
+        standing = self._standing(out[0], out[self.rows["q"].rows].T)
+        return self.traced.fill(self.rows, out, block, standing, state)
 
     def _consistent(self, time: Array, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
         """Return the motion in which ties close; raise LinkwiseError, with the time, where they cannot."""

@@ -45,7 +45,8 @@ class Closure:
     largest error of τ_ij and τ_ie against an independent Newton–Euler recursion, and `energy` that of
     Σ_i P_ij, in W, against dE_j/dt of link j's energy there; None where the energies are hand-written.
     `induced` is the residual of induced accelerations, the sum of all shares less J q̈ + J̇ q̇; None where
-    none were asked for.
+    none were asked for. `trace` is that of traced velocities, the sum of all parts less q̇, which integration
+    between samples leaves; None where none were asked for.
     """
 
     terms_absolute: float = 0.0
@@ -58,6 +59,8 @@ class Closure:
     energy_relative: float | None = None
     induced_absolute: float | None = None
     induced_relative: float | None = None
+    trace_absolute: float | None = None
+    trace_relative: float | None = None
 
     def __or__(self, other: "Closure") -> "Closure":
         """Return the larger of both, error by error."""

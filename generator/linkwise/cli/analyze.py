@@ -63,6 +63,8 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
     )
     residual = closure.induced_relative
     shares = "" if residual is None else f"; shares sum to accelerations within {residual:.1e}"
+    traced = closure.trace_relative
+    shares += "" if traced is None else f"; traced velocities sum to those of the log within {traced:.1e}"
     return [
         f"{analysis.total:,} samples at {analysis.rate:.6g} Hz, back end {analysis.robot.backend};"
         f" {recursion}; closure: terms sum to partial torques within {closure.terms_relative:.1e},"

@@ -10,7 +10,7 @@ Under constraints v_s = G w_s of the independent coordinates, with
     G^T M G w'_s + G^T (M dG/dt + C G) w_s = G^T F_s
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -65,8 +65,8 @@ class TraceEquations:
     """True if gravity, or each share with a name, is a source for each link."""
     carried: tuple[ArrayBackend, ...] = ()
     """Back ends of the same joints with nothing but payloads, which are carried beside the robot's links."""
-    inputs: Callable[[Numbers], Mapping[str, object]] | None = None
-    """Function that returns what the robot depends on at instants, beside time; None for nothing."""
+    backend_at: Callable[[Numbers], ArrayBackend] | None = None
+    """Function that returns the back end at instants (T,), where the robot depends on more than time."""
 
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
@@ -140,13 +140,13 @@ class TraceEquations:
 
     def _at(self, motion: SampledMotion) -> ArrayBackend:
         """Return the back end at these instants, where the robot depends on time or inputs."""
-        time = self.backend.structure.time
-        if not time and self.inputs is None:
+        if self.backend_at is not None:
+            return self.backend_at(motion.time)
+        if not self.backend.structure.time:
             return self.backend
         backend = self.backend.separate()
-        wide = (-1, *[1] * (motion.q.ndim - 2))
-        values = {} if self.inputs is None else dict(self.inputs(motion.time))
-        backend.set_parameters(values | ({time: motion.time.reshape(*wide)} if time else {}))
+        times = motion.time.reshape(-1, *[1] * (motion.q.ndim - 2))
+        backend.set_parameters({self.backend.structure.time: times})
         return backend
 
     def _place(self, backend: ArrayBackend, q: Numbers, is_sample: bool) -> ClosedPlace:

@@ -70,13 +70,11 @@ def read_trace(robot: DrivenRobot, asked: Traced) -> ReadTrace:
 def trace_motion(robot: DrivenRobot, asked: Traced) -> TracedMotion[Any]:
     """Return the answer of `Dynamics.trace`."""
     read = read_trace(robot, asked)
-    parts, windows = _parts(asked, read.times)
-    batch = tuple(read.samples.q.shape[1:-1])
-    blocks = list(Tracer(read.equations, parts).blocks(read.samples.some, len(read.times), batch))
-    xp = namespace(read.samples.q)
-    joined: Any = [xp.concat(list(values), 0) for values in zip(*blocks, strict=True)]
+    parts = trace_parts(asked.windows, asked.restarts, read.times)
+    windows = window_ends(parts, read.times)
+    arrays: Any = Tracer(read.equations, parts).advance(read.samples, 0, None)[0]
     coordinates = tuple(robot.joint_names.index(name) for name in read.equations.coordinates)
-    return TracedMotion._make([*joined, read.equations.sources, windows, coordinates])
+    return TracedMotion._make([*arrays, read.equations.sources, windows, coordinates])
 
 
 def _sampled(
@@ -134,27 +132,40 @@ def _check_traceable(backend: ArrayBackend, q: Numbers) -> None:
         )
 
 
-def _parts(asked: Traced, times: Sequence[float]) -> tuple[TraceParts, tuple[tuple[float, float], ...]]:
-    """Return where the trace begins anew and where windows are cut, and begin and end of each window."""
-    cuts = _places("windows", _window_begins(asked.windows, times), times)
-    restarts = _places("restarts", asked.restarts, times)
-    ends = [*cuts[1:], len(times) - 1]
-    windows = tuple((times[begin], times[end]) for begin, end in zip(cuts, ends, strict=True))
-    return TraceParts(restarts, cuts), windows
+def trace_parts(
+    windows: object,
+    restarts: object,
+    times: Sequence[float],
+    names: tuple[str, str] = ("windows", "restarts"),
+) -> TraceParts:
+    """Return where a trace of samples at these times begins anew, and where windows are cut.
+
+    windows: length of each in s, or instants; restarts: instants; names: what messages call the two
+    Raises ValueError for instants outside the motion, or too close to others.
+    """
+    cuts = _places(names[0], _window_begins(names[0], windows, times), times)
+    return TraceParts(_places(names[1], restarts, times), cuts)
 
 
-def _window_begins(windows: object, times: Sequence[float]) -> object:
+def window_ends(parts: TraceParts, times: Sequence[float]) -> tuple[tuple[float, float], ...]:
+    """Return begin and end of each window, in s."""
+    ends = [*parts.cuts[1:], len(times) - 1]
+    return tuple((times[begin], times[end]) for begin, end in zip(parts.cuts, ends, strict=True))
+
+
+def _window_begins(name: str, windows: object, times: Sequence[float]) -> object:
     """Return the instants at which windows begin, where their length is given."""
     if isinstance(windows, bool) or not isinstance(windows, Real):
         return windows
     length = float(windows)
     if not length >= min(np.diff(times)):
         raise ValueError(
-            f"windows is {short(windows)} s; give a length of at least a step between samples, "
+            f"{name} is {short(windows)} s; give a length of at least a step between samples, "
             f"{min(np.diff(times)):.4g} s, or the instants at which sources are cut"
         )
-    count = int(np.ceil((times[-1] - times[0]) / length * (1.0 - 1e-12)))
-    return [times[0] + k * length for k in range(1, count)]
+    # One that begins next to the last sample has no step.
+    last = times[-1] - 0.5 * (times[-1] - times[-2])
+    return np.arange(times[0] + length, last, length)
 
 
 def _places(name: str, given: object, times: Sequence[float]) -> list[int]:

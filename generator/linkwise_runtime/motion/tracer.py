@@ -1,7 +1,7 @@
 """Steps of a trace, block by block: from one sample to the next, and what is told at each."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -16,8 +16,6 @@ from .trace_equations import TraceAt, TraceEquations
 
 AT_ONCE = 1 << 22
 """Numbers of the steps that are computed at once."""
-Samples = Callable[[int, int], SampledMotion]
-"""Function that returns the samples of a motion from a number up to, but not including, another."""
 
 
 class TraceParts(NamedTuple):
@@ -60,42 +58,31 @@ class TraceBlock(NamedTuple):
 
 @dataclass(frozen=True)
 class Tracer:
-    """Traces a motion in blocks."""
+    """Traces a motion, block by block."""
 
     equations: TraceEquations
     parts: TraceParts
 
-    def blocks(self, samples: Samples, count: int, batch: tuple[int, ...]) -> Iterator[TraceBlock]:
-        """Yield the trace of `count` samples in blocks that follow each other.
-
-        batch: shape of the motions that are traced at once
-        """
-        size, state = self._block_size(math.prod(batch)), None
-        for begin in range(0, count - 1, size):
-            stop = min(begin + size, count - 1)
-            block, state = self.advance(samples(begin, stop + 1), begin, state)
-            # Its last sample is the first of the next block, which may begin anew there.
-            yield block if stop == count - 1 else block.without_last()
-
     def advance(
         self, motion: SampledMotion, first: int, state: TraceState | None
     ) -> tuple[TraceBlock, TraceState | None]:
-        """Return the trace of some samples, and the state at the last one.
+        """Return the trace of some samples, and the state at the last one, from which it can go on.
 
         first: number of the first sample; state: that there, None where the trace starts
         """
-        last, parts = first + len(motion.time) - 1, []
-        inside = [at for at in self.parts.restarts if first < at < last]
-        for begin, end in pairwise([first, *inside, last]):
-            known = None if begin in self.parts.restarts else state
+        last, size = first + len(motion.time) - 1, self._steps_at_once(math.prod(motion.q.shape[1:-1]))
+        restarts = set(self.parts.restarts)
+        ends = sorted({last, *(at for at in restarts if first < at < last), *range(first + size, last, size)})
+        parts = []
+        for begin, end in pairwise([first, *ends]):
+            known = None if begin in restarts else state
             part, state = self._part(motion.some(begin - first, end - first + 1), begin, known)
+            # Its last sample is the first of the next part, which may begin anew there.
             parts.append(part if end == last else part.without_last())
         xp = namespace(motion.q)
-        joined = (xp.concat(list(values), 0) for values in zip(*parts, strict=True))
-        return (parts[0] if len(parts) == 1 else TraceBlock._make(joined)), state
+        return TraceBlock._make(xp.concat(list(values), 0) for values in zip(*parts, strict=True)), state
 
-    def _block_size(self, motions: int) -> int:
-        """Return the number of steps to compute at once."""
+    def _steps_at_once(self, motions: int) -> int:
         structure = self.equations.backend.structure
         n, links, windows = structure.n, structure.N, len(self.parts.cuts)
         m, columns = len(self.equations.coordinates), len(self.equations.sources)

@@ -15,6 +15,7 @@ the joints b: a residual.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -182,6 +183,13 @@ class Standing:
         """Take rows (S, C, n) by all joints' motion, and by that of joints which do not follow others."""
         self.every, self.moved, self._unactuated = every, moved, unactuated
         self._solved = weighted_inverse(np.swapaxes(moved[..., unactuated], 1, 2), weights)
+
+    def some(self, samples: slice) -> "Standing":
+        """Return this for some of the samples."""
+        made = copy(self)
+        vars(made).pop("transfer", None)
+        made.every, made.moved, made._solved = self.every[samples], self.moved[samples], self._solved[samples]
+        return made
 
     def reactions(self, torque: Array) -> Array:
         """Return the contact forces lambda (S, C, X) due to torques (S, n, X)."""

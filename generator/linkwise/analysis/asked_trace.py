@@ -1,0 +1,93 @@
+"""Traces that are asked for: joints, windows of time, and where a trace begins anew."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from linkwise_runtime.motion.traced import trace_parts, window_ends
+from linkwise_runtime.motion.tracer import TraceParts
+
+from linkwise.analysis.contacts.times import ContactTimes
+from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.phases import PlacedPhase
+from linkwise.arrays import Array
+from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
+
+EVERY, PHASES = "all", "phases"
+"""Words for all joints, and for begins and ends of phases."""
+AT_ONCE = 4096
+"""Samples that are looked at for phases at once."""
+
+
+@dataclass(frozen=True)
+class AskedTrace:
+    """A trace that is asked for: joints, and how it is cut in time."""
+
+    joints: tuple[int, ...]
+    parts: TraceParts
+    windows: tuple[tuple[float, float], ...]
+
+    @classmethod
+    def of(
+        cls,
+        names: Sequence[str],
+        windows: float | None,
+        restarts: Sequence[float],
+        robot: OpenedRobot,
+        time: Array,
+    ) -> "AskedTrace":
+        """Return the trace of a movement at these times, in s.
+
+        Raises LinkwiseError for a joint that is not there, and for times outside the movement.
+        """
+        joints = [k for name in names for k in _joints(name, robot)]
+        try:
+            flags = "--trace-windows", "--trace-restart"
+            parts = trace_parts(() if windows is None else windows, sorted(restarts), time.tolist(), flags)
+        except ValueError as error:
+            raise LinkwiseError(str(error)) from None
+        return cls(tuple(dict.fromkeys(joints)), parts, window_ends(parts, time.tolist()))
+
+
+def restart_times(
+    given: Sequence[str],
+    phases: Sequence[PlacedPhase],
+    robot: OpenedRobot,
+    times: ContactTimes | None,
+    time: Array,
+    q: Array,
+) -> list[float]:
+    """Return the times at which a trace begins anew, from texts of them or the word phases.
+
+    q: positions (S, n) at the times (S,). Raises LinkwiseError for another text, and without any phase.
+    """
+    found: set[float] = set()
+    for text in given:
+        if text != PHASES:
+            try:
+                found.add(float(text))
+            except ValueError:
+                raise LinkwiseError(f"--trace-restart {text}: give a time in s, or {PHASES}") from None
+            continue
+        if not phases:
+            raise LinkwiseError(f"--trace-restart {PHASES}: there are none; give some with --phase")
+        for at in range(0, len(time), AT_ONCE):
+            some = slice(at, at + AT_ONCE + 1)
+            shares = np.zeros((0, len(time[some])))
+            if times is not None:
+                shares = times.shares(robot.model, time[some], q[some]).T
+            for phase in phases:
+                changes = np.flatnonzero(np.diff(phase.on(robot, time[some], q[some], shares)))
+                found |= set(time[some][changes + 1].tolist())
+    ends = time[0], time[-1]
+    return sorted(at for at in found if at not in ends)
+
+
+def _joints(name: str, robot: OpenedRobot) -> Sequence[int]:
+    """Return the joints of a name, or all of them."""
+    if name in robot.joints:
+        return [robot.joints.index(name)]
+    if name == EVERY:
+        return range(len(robot.joints))
+    raise LinkwiseError(f"--trace {name}: no such joint; there are {listed(robot.joints)}, or {EVERY}")
