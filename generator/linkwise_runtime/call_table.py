@@ -7,6 +7,7 @@ through which it is loaded, k the coordinate that moves, which here is called th
 from collections.abc import Mapping
 
 from .call import ORDER, PACKED, Call, Quantity
+from .joint_reactions import Reactions
 from .motion_quantities import Counterfactual, TracedMotion
 from .quantities import (
     Coefficients,
@@ -242,6 +243,15 @@ def _induced(unit: str, what: str) -> tuple[Quantity, ...]:
     return tuple(Quantity(n, ("moved", *a.split()), unit, f"{what} {meaning}") for n, a, meaning in SOURCES)
 
 
+WRENCH = "torque:wrench"
+BORNE = (
+    ("acceleration", "tree_joint link mover wrench", "through the link, by the acceleration of the mover"),
+    ("velocity", "tree_joint link mover wrench", "through the link, by the velocity of the mover"),
+    ("gravity", "tree_joint link wrench", "by the weight of the link"),
+    ("loads", "tree_joint load wrench", "by the load"),
+    ("passive", "tree_joint kind joint wrench", "by what ties do not carry of the joint's own torque"),
+)
+
 DRIVEN = {"tau": None, "qdd": None, "loads": (), "passive": True}
 """Options that say what drives a motion, for the calls on its causes, and their defaults."""
 MOTIONS = (
@@ -263,6 +273,25 @@ MOTIONS = (
         options=DRIVEN | {"constraints": None},
         own="passive",
         ties="kept",
+        out=False,
+    ),
+    Call(
+        "reactions",
+        QDD,
+        tuple(Quantity(name, tuple(axes.split()), WRENCH, f"wrench {by}") for name, axes, by in BORNE),
+        Reactions,
+        options={
+            "axes": "joint",
+            "point": None,
+            "joints": None,
+            "loads": (),
+            "passive": True,
+            "constraints": None,
+        },
+        own="passive",
+        ties="kept",
+        rigid=True,
+        lacking=("autograd",),
         out=False,
     ),
     Call(

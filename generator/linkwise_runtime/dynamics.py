@@ -22,8 +22,10 @@ from .control.controllers import Cancellation, PartialImpedance, cancellation, p
 from .file_joints import Order
 from .html_tables import robot_table
 from .interface import Array
+from .joint_reactions import Reactions
 from .kinematics.robot_kinematics import Kinematics
 from .labelled import labelled
+from .motion.borne_wrenches import Borne, reactions
 from .motion.counterfactual import Without, counterfactual_motion
 from .motion.induced_accelerations import Driven, induced_accelerations, induced_reactions
 from .motion.simulated import Simulated, simulate_motion
@@ -89,6 +91,12 @@ class Dynamics(RobotCalls):
     def share_names(self) -> tuple[str, ...]:
         """Names of the shares that `named_shares` returns."""
         return self.structure.share_names
+
+    @property
+    def tree_joint_names(self) -> tuple[str, ...]:
+        """Names of the tree's joints, in the order of `reactions`; none for links given by energies."""
+        tree = self.backend.tree
+        return () if tree is None else tuple(joint.name for joint in tree.joints)
 
     def at(self, **values: Any) -> Self:
         """Return the robot at a time, or with inputs, given by their names: robot.at(t=0.2, F=force).
@@ -617,6 +625,47 @@ class Dynamics(RobotCalls):
         """
         asked = Driven(q, qd, tau, qdd, loads, passive, constraints)
         shares: InducedAccelerations[Array] = induced_reactions(self, asked)
+        return shares
+
+    def reactions(
+        self,
+        q: Array,
+        qd: Array,
+        qdd: Array,
+        axes: str | int = "joint",
+        point: Array | None = None,
+        joints: Any = None,
+        loads: Any = (),
+        passive: bool = True,
+        constraints: Any = None,
+    ) -> Reactions[Array]:
+        """Return the whole wrench that each joint carries, by cause: shares (..., F, ..., 6) that sum to it.
+
+        It is what the side of the ground exerts on the other side through the joint, moments about x, y and z
+        in N m, then forces in N. F counts joints of the tree, `tree_joint_names`: joints that follow others
+        are among them, and of a joint that turns or slides along several axes each axis is one.
+
+        axes: axes of the wrenches: "joint", those of the frame that each joint moves, in which z is the
+        joint's axis; "world"; or a frame by its name, as `robot.kinematics` accepts them
+        point: point about which moments are taken, in these axes and from their origin, in m, (3,) or (...,
+        3); unless given, the joint's own origin
+        joints: joints by name or by number in `tree_joint_names`, one or a list; all unless given. Answers
+        grow with joints, links and coordinates: of long robots ask for those that matter
+        loads: as in `induced_accelerations`
+        passive: whether coordinates that follow others by ties have their springs, damping, friction and
+        armature, which changes the forces of ties
+        constraints: as in `induced_accelerations`; of qd and qdd the independent joints count, and as for
+        `Constraints` the others have no actuators
+
+        In the joint's axes, moment_z of a hinge, or force_z of a slide, is tau_ij by the same cause. How a
+        joint bears its axis' part, by actuator, spring, damping, friction or coupling, is not told: they act
+        within it. What turns behind gears, the armature, is no link, and no part of the wrench in a tree.
+
+        Raises ValueError for links given by energies, also for those of the back end autograd, and as
+        `Constraints` and `induced_accelerations` do.
+        """
+        asked = Borne(q, qd, qdd, axes, point, joints, loads, passive, constraints)
+        shares: Reactions[Array] = reactions(self, asked)
         return shares
 
     def natural_impedance(

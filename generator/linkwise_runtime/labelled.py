@@ -40,7 +40,7 @@ def labelled(
         raise TypeError("labelled makes arrays of its own; leave out away")
     key = rows[0].name
     asked = arguments.get("constraints")
-    is_kept = key in OVER_TIME and asked is not False and robot.backend.ties_joints
+    is_kept = key in (*OVER_TIME, "reactions") and asked is not False and robot.backend.ties_joints
     if asked or is_kept or key.startswith(TIED) or key == "induced_reactions":
         ties = ties or asked or robot.constraints
     arguments, samples = arrays_in_order(
@@ -131,8 +131,21 @@ def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict
         centre = frame == "centre of mass" and frame not in robot.kinematics.frames
         of = "constraint" if key == "induced_reactions" else "joint" if frame is None else "component"
         axes["moved"] = axes["axis" if centre else of]
+    if key == "reactions":
+        axes["mover"] = axes["independent_cause" if ties else "cause"]
+        axes["tree_joint"] = NamedAxis("tree_joint", _chosen_joints(robot, arguments.get("joints")))
+    if key.startswith("induced") or key == "reactions":
         axes["load"] = NamedAxis("load", _names_of(arguments.get("loads", ()), robot))
     return axes
+
+
+def _chosen_joints(robot: Any, given: Any) -> tuple[str, ...]:
+    """Return the names of the tree's joints that are given by name or number, of all for None."""
+    names: tuple[str, ...] = robot.tree_joint_names
+    if given is None:
+        return names
+    several = given if isinstance(given, list | tuple) else [given]
+    return tuple(one if isinstance(one, str) else names[one] for one in several)
 
 
 def _names_of(loads: Any, robot: Any) -> tuple[str, ...]:

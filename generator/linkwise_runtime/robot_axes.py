@@ -24,6 +24,8 @@ TURNS, MOVES = ("angular_x", "angular_y", "angular_z"), ("x", "y", "z")
 """Rows of a frame: rotations about the world's axes, then translations of its point along them."""
 HOMOGENEOUS = ("m", "m", "m", "1")
 """Units of the homogeneous coordinates that a pose maps from and to."""
+WRENCH = ("moment_x", "moment_y", "moment_z", "force_x", "force_y", "force_z")
+"""Components of a wrench."""
 LOSSES = ("spring", "damping", "friction")
 """Passive sources of acceleration in the joints, in the order of induced accelerations."""
 
@@ -56,6 +58,8 @@ def axes_of(
         "world": NamedAxis("world", (*MOVES, "1"), HOMOGENEOUS),
         "own": NamedAxis("own", (*MOVES, "origin"), HOMOGENEOUS),
         "source": NamedAxis("source", LOSSES),
+        "kind": NamedAxis("kind", (*LOSSES, "armature")),
+        "wrench": NamedAxis("component", WRENCH, ("rad",) * 3 + ("m",) * 3),
         "share": NamedAxis("share", tuple(shares)),
     }
 

@@ -174,6 +174,7 @@ def shape_of(
         sizes["frame"] = len(robot.kinematics.frames)
     sizes |= {name: len(axis.names) for name, axis in axes.items() if name != "part"}
     sizes["moved"] = sizes["constraint" if row.key == "induced_reactions" else "joint"]
+    sizes |= {"mover": sizes["independent" if ties else "cause"], "tree_joint": len(robot.tree_joint_names)}
     samples = (len(INSTANTS), *batch) if row.key in OVER_TIME else batch
     sums = robot.structure.passive_sums
     own = [*(k or f for k, f in zip(sums.stiffness, sums.pull, strict=True)), *sums.damping, *sums.friction]

@@ -33,6 +33,10 @@ WORDS = {
     "independent_cause": "independent cause",
     "other_cause": "other cause",
     "moved": "what moves",
+    "mover": "cause",
+    "tree_joint": "joint of the tree",
+    "wrench": "6",
+    "kind": "4",
     "world": "4 of the world",
     "own": "4 of the frame",
     "component": "6",
@@ -74,12 +78,8 @@ def axes() -> dict[str, NamedAxis]:
     """Axes of a robot that has joints, and rows of constraints, of both kinds."""
     kinds = ("rad", "m")
     found = axes_of(kinds, kinds, ["link"], ["share"]) | tied_axes(kinds, kinds, kinds, kinds)
-    return found | {
-        "frame": NamedAxis("frame", ()),
-        "load": NamedAxis("load", ()),
-        "origin": NamedAxis("origin", ()),
-        "window": NamedAxis("window", ()),
-    }
+    unnamed = {axis: NamedAxis(axis, ()) for axis in ("frame", "load", "tree_joint", "origin", "window")}
+    return found | unnamed | {"mover": found["cause"]}
 
 
 def unit(quantity: Quantity) -> str:

@@ -21,6 +21,7 @@ from ..answers.packed import PackedBackend, TorqueOfOne
 from ..arguments import NOTHING, Beside, as_array, shape_of
 from ..interface import ClosedForms, Numbers
 from ..kinematics.frame_answers import FrameAnswers
+from ..kinematics.wrench_answers import WrenchAnswers
 from ..rule.calls import RigidRule
 from ..rule.joint_tree import Bodies, JointTree
 from ..rule.tree_arrays import TreeArrays, checked_bodies, given_numbers
@@ -122,6 +123,11 @@ class ArrayBackend(PackedBackend):
             )
         return FrameAnswers(self, self.tree, self.tree_numbers)
 
+    @cached_property
+    def wrenches(self) -> WrenchAnswers:
+        """Answers of the wrenches that joints bear, for motion that has been read; raises as `frames`."""
+        return WrenchAnswers(self.frames)
+
     def read(
         self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING
     ) -> tuple["ArrayBackend", Sequence[Numbers]]:
@@ -152,7 +158,7 @@ class ArrayBackend(PackedBackend):
     def separate(self) -> "ArrayBackend":
         """Return a copy whose parameters may be set by `set_parameters`, while this one keeps its own."""
         made = copy.copy(self)
-        for kept in ("answers", "frames", "on_torch"):
+        for kept in ("answers", "frames", "wrenches", "on_torch"):
             vars(made).pop(kept, None)
         made.parameters = dict(self.parameters)
         return made

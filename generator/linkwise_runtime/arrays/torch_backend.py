@@ -84,7 +84,7 @@ class TorchBackend(ArrayBackend):
         _ = structure.n, structure.N, structure.layout, structure.sizes, structure.passive_sums
         _ = structure.share_names, self.answers.shapes
         if self.tree:
-            _ = self.frames
+            _ = self.frames, self.wrenches
         if self.rule and self.kernel != "straight":
             for like in self.examples:
                 self.rule.tables(self, like)

@@ -81,7 +81,7 @@ def pairs(xp: Namespace, tables: TieTables, numbers: TreeArrays, q: Numbers) -> 
 
 def paired(xp: Namespace, tables: TieTables, at: Ends, moves: Numbers) -> Pairs:
     """Return the pairs of frames whose J is `moves`, (6, P, n, samples)."""
-    shift = at.places[:, : tables.pairs] - _seconds(xp, tables, at.places)
+    shift = at.places[:, : tables.pairs] - second_ends(xp, tables, at.places)
     return Pairs(at, shift, moves, _weights(xp, tables, at, shift))
 
 
@@ -111,10 +111,10 @@ def violation(
         axes, places = at.ends.poses.axes, at.ends.places
         shift, weights = at.shift, at.weights
         if held is not None:
-            shift = places[:, : tables.pairs] - _seconds(xp, tables, places, held.places)
+            shift = places[:, : tables.pairs] - second_ends(xp, tables, places, held.places)
         along = (weights[3:] * gather(shift, tables.row_pairs)).sum(0)
         if tables.all_axes is not None:
-            second = _seconds(xp, tables, axes, held and held.poses.axes)
+            second = second_ends(xp, tables, axes, held and held.poses.axes)
             turn = _turn(xp, tables.all_axes, axes[:, :, : tables.pairs], second)
             along = along + (weights[:3] * gather(turn, tables.row_pairs)).sum(0)
         parts.append(along * tables.placed - tables.apart)
@@ -149,7 +149,7 @@ def tie_jacobian_rate(
     return _joined(xp, parts)
 
 
-def _seconds(xp: Namespace, tables: TieTables, a: Numbers, held: Numbers | None = None) -> Numbers:
+def second_ends(xp: Namespace, tables: TieTables, a: Numbers, held: Numbers | None = None) -> Numbers:
     """Return the part of `a` for the second frames of pairs, (..., P, samples).
 
     For a contact it is that of its own frame, as it was held.
@@ -199,7 +199,7 @@ def _weight_rates(xp: Namespace, tables: TieTables, at: Pairs, changes: Changes)
         # the part of d's rate that is normal to d, divided by |d|
         size = _size(xp, tables, at.shift)
         speeds = changes.speeds
-        u, slip = at.shift / size, speeds[:, : tables.pairs] - _seconds(xp, tables, speeds)
+        u, slip = at.shift / size, speeds[:, : tables.pairs] - second_ends(xp, tables, speeds)
         along = tables.along * gather((slip - u * (u * slip).sum(0)) / size, tables.row_pairs)
     return xp.concat([turning, along], 0)
 
@@ -216,7 +216,7 @@ def _size(xp: Namespace, tables: TieTables, shift: Numbers) -> Numbers:
 
 def _arms(xp: Namespace, tables: TieTables, places: Numbers) -> Numbers:
     """Return X (5, P, joints, samples), with its x and y once more, as `extend_xy` has it."""
-    first, second = places[:, : tables.pairs], _seconds(xp, tables, places)
+    first, second = places[:, : tables.pairs], second_ends(xp, tables, places)
     return extend_xy(xp, tables.first * first[:, :, None] - tables.second * second[:, :, None])
 
 

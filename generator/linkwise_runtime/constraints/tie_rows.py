@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 
 from ..answers.packed import OneSample
 from ..interface import Numbers, side_by_side
-from ..kinematics.frame_answers import FrameAnswers, FrameRequest, in_pieces
+from ..kinematics.frame_answers import NONE, FrameAnswers, FrameRequest, in_pieces
 from ..kinematics.frame_arrays import FramePoses
-from ..rule.kinematics import Poses
+from ..kinematics.joint_wrenches import JointsAsked, JointTables, joint_tables, on_frames, placed_joints
+from ..kinematics.wrench_answers import POINT, carried_frames
+from ..rule.kinematics import Poses, gather
 from .chosen_constraints import TreeConstraints
 from .held_frames import TieTables
 from .tie_arrays import (
@@ -21,6 +23,7 @@ from .tie_arrays import (
     pair_changes,
     paired,
     pairs,
+    second_ends,
     tie_jacobian,
     tie_jacobian_rate,
     violation,
@@ -39,6 +42,22 @@ class TieEnd(NamedTuple):
     """(3, 3)"""
 
 
+class BorneTies(NamedTuple):
+    """Constants of joints, and of the ties and contacts whose forces they bear."""
+
+    joints: JointTables
+    ties: TieTables
+    first: Numbers
+    """(joints, rows, 1): ones where a joint carries the first frame of a row's pair."""
+    second: Numbers
+    """(joints, rows, 1): ones where a joint carries the second frame of a row's pair."""
+
+    @property
+    def moved(self) -> int:
+        """Number of joints and frames, by which the memory of a call grows."""
+        return self.joints.moved + self.ties.moved
+
+
 class TieRows:
     """Rows of constraints on one back end: phi, A and dA/dt; arguments are as `Constraints` says."""
 
@@ -48,6 +67,7 @@ class TieRows:
         self._frames, self._constants, self.count = frames, chosen.tables, len(chosen.rows)
         self.couplings = chosen.couplings
         self._tables: dict[object, TieTables] = {}
+        self._borne = BorneRows(frames, chosen)
         self._has_contacts = chosen.tables.ties < chosen.tables.pairs
         first = [TieEnd(one.first, np.array(one.point), one.axes) for one in chosen.held]
         seconds = [one.second for one in chosen.held if one.second is not None]
@@ -77,11 +97,58 @@ class TieRows:
         """Return dA/dt (..., C, n)."""
         return self.at(q).rates(qd)
 
+    def on_joints(self, asked: JointsAsked, q: Numbers, point: Numbers | None) -> Numbers:
+        """Return the wrenches of joints by unit forces of the rows of ties and contacts, (..., joints, C, 6).
+
+        point: (..., 3), as for `WrenchAnswers.by_cause`
+        """
+        return self._borne.on_joints(asked, q, point)
+
     def _asked(self, motion: Sequence[Numbers]) -> OnTies:
         return self._frames.asked(self._tables, "rows", self._listed, motion)
 
     def _listed(self, part: object) -> TieTables:
         return self._constants
+
+
+class BorneRows:
+    """Rows of ties and contacts as joints bear them; couplings act within their joints."""
+
+    def __init__(self, frames: FrameAnswers, chosen: TreeConstraints) -> None:
+        self._frames, self._constants, self._held = frames, chosen.tables, chosen.held
+        self._tables: dict[object, BorneTies] = {}
+
+    def on_joints(self, asked: JointsAsked, q: Numbers, point: Numbers | None) -> Numbers:
+        """Return the answer of `TieRows.on_joints`."""
+        shape = (len(asked.joints), len(self._constants.row_pairs), 6)
+        if not self._held:
+            return self._frames.backend.zeros(q, 0).reshape(*q.shape[:-1], *shape)  # type: ignore[no-any-return]
+
+        def answer(at: FrameRequest[BorneTies]) -> Numbers:
+            xp, (joints, ties, first, second) = at.xp, at.tables
+            found = pairs(xp, ties, at.numbers, at.motion[0])
+            assert found is not None  # there are pairs
+            placed = placed_joints(xp, joints, at.numbers, at.motion[0], at.vectors.get(POINT))
+            places, rows = found.ends.places, ties.row_pairs
+            others = gather(second_ends(xp, ties, places), rows)
+            own = on_frames(xp, placed, first, gather(places[:, : ties.pairs], rows), found.weights)
+            return own - on_frames(xp, placed, second, others, found.weights)
+
+        given = NONE if point is None else {POINT: point}
+        request = self._frames.asked(self._tables, asked, self._listed, [q], given)
+        flat = in_pieces(self._frames.backend, [q], request, answer, int(np.prod(shape)))
+        return flat.reshape(*q.shape[:-1], *shape)  # type: ignore[no-any-return]
+
+    def _listed(self, asked: object) -> BorneTies:
+        assert isinstance(asked, JointsAsked)
+        tree, rows = self._frames.tree, self._constants.row_pairs
+        first = carried_frames(tree, asked.joints, [one.first for one in self._held])
+        # What is held to the ground has no other frame that a joint carries.
+        others = [0 if one.second is None else one.second for one in self._held]
+        apart = np.array([[float(one.second is not None)] for one in self._held])
+        second = carried_frames(tree, asked.joints, others) * apart
+        tables = joint_tables(tree, self._frames.backend.structure.n, asked)
+        return BorneTies(tables, self._constants, first[:, rows], second[:, rows])
 
 
 class RowsAt:

@@ -1,1 +1,1 @@
-"""Poses and motion of a robot's named frames, on the arrays of the rule."""
+"""Poses and motion of a robot's named frames, and the wrenches that joints bear, by the rule's arrays."""

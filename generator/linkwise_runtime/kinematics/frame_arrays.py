@@ -13,7 +13,7 @@ A force F and a moment M on a point require of joint f the torque -J_f^T (M, F) 
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,14 @@ from ..rule.kinematics import (
     twists,
 )
 from ..rule.tree_arrays import TreeArrays
+
+
+class CoordinateTables(Protocol):
+    """Tables that say which joints each coordinate moves."""
+
+    @property
+    def columns(self) -> tuple[Numbers, ...]:
+        """See `FrameTables`."""
 
 
 class FrameTables(NamedTuple):
@@ -101,12 +109,16 @@ def _tables(
         np.array([ground if carrier is None else at[carrier] for carrier in carriers]),
         np.array(frames),
         rotations.transpose(1, 2, 0)[..., None],
-        tuple(_columns([joint.coordinate for joint in joints], n)),
+        tuple(coordinate_columns([joint.coordinate for joint in joints], n)),
         moved_frames,
     )
 
 
-def _columns(coordinates: Sequence[int], n: int) -> Sequence[NDArray[np.intp]]:
+def coordinate_columns(coordinates: Sequence[int], n: int) -> Sequence[NDArray[np.intp]]:
+    """Return the joints of each coordinate: the first of each, then the second of each, ...
+
+    Where a coordinate has no more, it is the number of the ground, which stands behind all joints.
+    """
     own = [[f for f, k in enumerate(coordinates) if k == wanted] for wanted in range(n)]
     most, ground = max(map(len, own)), len(coordinates)
     return [
@@ -265,7 +277,7 @@ def rotate_vectors(axes: Numbers, vector: Numbers) -> Numbers:
     return axes[:, 0] * vector[0] + axes[:, 1] * vector[1] + axes[:, 2] * vector[2]
 
 
-def by_coordinate(tables: FrameTables, columns: Numbers) -> Numbers:
+def by_coordinate(tables: CoordinateTables, columns: Numbers) -> Numbers:
     """Return columns (..., joints, samples) summed over the joints of each coordinate, (..., n, samples)."""
     first, *others = tables.columns
     total = gather(columns, first)

@@ -18,6 +18,7 @@ from ..chosen_names import known_kind, numbered
 from ..interface import Numbers, namespace
 from ..kinematics.frame_answers import frame_index, vectors_beside
 from ..kinematics.robot_kinematics import check_load
+from ..kinematics.wrench_answers import OnFrame
 from ..quantities import AppliedLoad
 
 
@@ -69,14 +70,6 @@ def with_actuators(forces: SourceForces, tau: Numbers, identity: Numbers) -> Sou
     """Return the forces with columns for the torques (..., n) of actuators before them."""
     columns = namespace(tau).concat([identity * tau[..., None, :], forces.columns], -1)
     return SourceForces(forces.mass, columns, ((tau.shape[-1],), *forces.tails))
-
-
-class OnFrame(NamedTuple):
-    """Force and moment on a frame."""
-
-    frame: int
-    vectors: Mapping[str, str]
-    """Names under which its vectors are read, by what they are: force, moment, point or at."""
 
 
 @dataclass(frozen=True)

@@ -102,10 +102,7 @@ class RuleTables(NamedTuple):
 def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
     """Return all constants as NumPy's arrays, in float64."""
     xp = cast("Namespace", np)
-    own, eye = own_numbers(tree), np.eye(3)[:, :, None, None]
-    # (a, -a, 0)
-    skew = np.array([6, 5, 1, 2, 6, 3, 4, 0, 6])
-    links = LinkTables(_span([link.joint for link in tree.links]), eye, skew)
+    own, links = own_numbers(tree), moving_links(tree)
     spatial = spatial_tables(tree, links.joints, _span([joint.coordinate for joint in tree.joints]))
     coefficients = [layout.acceleration, layout.velocity, layout.position_gradient]
     pairs = pair_layout(layout, coefficients, len(tree.joints))
@@ -120,7 +117,7 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
         kinematic_tables(tree),
         links,
         own,
-        link_numbers(xp, eye, *own.bodies),
+        link_numbers(xp, links.eye, *own.bodies),
         spatial,
         spatial_numbers(xp, spatial, own),
         formula_sources(tree),
@@ -131,6 +128,13 @@ def listed_tables(tree: JointTree, layout: RuleLayout) -> RuleTables:
         (*each, *pairs.entries[2:], *singles),
         regressor_tables(tree),
     )
+
+
+def moving_links(tree: JointTree) -> LinkTables:
+    """Return the constants of the links, in float64."""
+    # (a, -a, 0)
+    skew = np.array([6, 5, 1, 2, 6, 3, 4, 0, 6])
+    return LinkTables(_span([link.joint for link in tree.links]), np.eye(3)[:, :, None, None], skew)
 
 
 def converted(table: Table, library: Library, like: Numbers) -> Table:
