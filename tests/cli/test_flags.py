@@ -48,6 +48,7 @@ ANALYSIS: dict[str, Any] = {
     "contact_threshold": 42.0,
     "unactuated": ("base_x",),
     "induced": ("joints",),
+    "reaction": ("knee,world",),
 }
 ROBOT = {
     "lock": ("elbow=0.5",),
@@ -74,7 +75,12 @@ READ = Reading("deg", "t", (("a", "elbow"), ("b", "wrist")), True, 125.0, 0.25, 
 WRITTEN = AnalysisChoices(
     READ,
     Processing("savitzky-golay", 9, 3, SMOOTHED, "trim", "gradient"),
-    Outputs(phases=(Phase("stance", "", "push", None),), power_terms=True, induced=("joints",)),
+    Outputs(
+        phases=(Phase("stance", "", "push", None),),
+        power_terms=True,
+        induced=("joints",),
+        reactions=("knee,world",),
+    ),
     payload=("hand=2",),
     load=("hand=1,2,3",),
     loads=("plate.csv",),

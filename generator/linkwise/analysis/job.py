@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from linkwise.analysis.asked_trace import AskedTrace, restart_times
+from linkwise.analysis.borne_joints import borne_joints
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples, slip_warnings
 from linkwise.analysis.column_matching import with_columns
 from linkwise.analysis.contacts import Contacts
@@ -45,7 +46,8 @@ class Analysis(AnalysisResult):
         """Return a matplotlib figure.
 
         name: "paper" or "causes", with ":JOINT" for another joint than the first; "shares"; "power";
-        "induced", or "induced:POINT" for another point than the first; "contacts"
+        "induced", or "induced:POINT" for another point than the first; "reaction" or "reaction:JOINT"
+        likewise; "contacts"
 
         "paper" has five panels, laid out like the paper's Fig. 5-9. Raises LinkwiseError for another name.
         """
@@ -82,8 +84,8 @@ class Outputs:
     table: Format = option("parquet", "Format of the table", "--format", is_key=False)
     figures: tuple[str, ...] = option(
         (),
-        "paper or causes, alone or with :JOINT, shares, power, induced, induced:POINT or contacts;"
-        " may be repeated",
+        "paper or causes, alone or with :JOINT, shares, power, induced, induced:POINT, reaction,"
+        " reaction:JOINT or contacts; may be repeated",
         "--figure",
         is_key=False,
     )
@@ -103,6 +105,13 @@ class Outputs:
         "Tell an acceleration by its sources: FRAME or FRAME,X,Y,Z in m, joints, or centre-of-mass; may "
         "be repeated",
         metavar="POINT",
+    )
+    reactions: tuple[str, ...] = option(
+        (),
+        "Tell the whole wrench that a joint carries by its causes, in the joint's axes, or those of AXES: "
+        "world or a body; may be repeated",
+        "--reaction",
+        metavar="JOINT[,AXES]",
     )
     trace: tuple[str, ...] = option(
         (),
@@ -165,6 +174,7 @@ class Job:
             "contacts": [] if robot.contacts is None else list(robot.contacts.names),
             "induced": [point.name for point in self.decomposer.induced.points],
             "trace": None if self.decomposer.traced is None else self.decomposer.traced.record(),
+            "reactions": [joint.name for joint in self.decomposer.reactions.borne],
         }
 
     @property
@@ -197,6 +207,7 @@ class Job:
             values=values,
             loads=self.decomposer.loads,
             induced=tuple(point.name for point in self.decomposer.rows.points),
+            borne=self.decomposer.reactions.borne,
             ignored=self.samples.ignored,
             warnings=warnings,
             closed=self.closed,
@@ -241,7 +252,7 @@ def prepared(
     buffer: a directory that keeps the samples in a disk buffer, not in memory
     """
     reading, processing, outputs = asked.reading, asked.processing, asked.outputs
-    points = induced_points(outputs.induced, robot)
+    points, bearings = induced_points(outputs.induced, robot), borne_joints(outputs.reactions, robot)
     opened = open_log(log, reading, robot.joints, robot.file_joints, robot.qpos)
     switches = (*switch_columns(asked.contacts, opened), *phase_columns(outputs.phases, opened))
     samples, closed = _samples(opened, robot, reading, switches, progress, buffer)
@@ -262,9 +273,8 @@ def prepared(
         restarts = restart_times(outputs.trace_restart, phases, robot, times, time, q)
         made = AskedTrace.of(outputs.trace, outputs.trace_windows, restarts, robot, time)
         traced = TracedRows.of(made, robot, borne, samples)
-    decomposer = Decomposer.of(
-        robot, processing.convention, outputs.power_terms, borne, points, times, traced
-    )
+    wanted = processing.convention, outputs.power_terms, borne, points, times, bearings, traced
+    decomposer = Decomposer.of(robot, *wanted)
     return Job(log.name, asked, samples, decomposer, closed, phases)
 
 

@@ -209,6 +209,12 @@ class OpenedRobot:
         return tuple(sorted(found))
 
     @property
+    def tree_joints(self) -> tuple[str, ...]:
+        """Names of the tree's joints, in the order of the package's; none for links that are energies."""
+        tree = self.package.manifest.tree
+        return () if tree is None else tuple(joint.name for joint in tree.joints)
+
+    @property
     def constraint_rows(self) -> tuple[str, ...]:
         """Names of the rows of ties, couplings and contacts, in the order of a result's forces."""
         tied = () if self.constrained is None else self.constrained.constraints.rows

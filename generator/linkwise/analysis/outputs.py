@@ -82,6 +82,7 @@ def record(result: AnalysisResult) -> dict[str, Any]:
         "samples": result.total,
         "loads": [borne.record() for borne in result.loads],
         "induced": list(result.induced),
+        "reactions": list(result.reactions),
         "phases": [phase.told for phase in result.phases],
         **({} if result.traced is None else {"trace": dict(result.traced)}),
         "closure": asdict(result.closure),

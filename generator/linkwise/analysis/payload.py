@@ -6,6 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
+from linkwise_runtime.joint_reactions import Reactions
 from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame, TreeJoint, TreeLink
 
 from linkwise.analysis.constrained_model import ConstrainedModel, tied_in_tree
@@ -192,6 +193,27 @@ class PayloadModel:
             ]
         acceleration, velocity, gravity = joined
         return TermArrays(acceleration, velocity, gravity, torque=None)
+
+    def reactions(self, q: Array, qd: Array, qdd: Array, **asked: Any) -> Reactions[Any]:
+        """Return the wrenches that joints carry of links and payloads, as the package's call does."""
+        own = self.own.reactions(q, qd, qdd, **asked)
+        asked = {**asked, "loads": (), "passive": False}
+        parts = [part.model.reactions(q, qd, qdd, **asked) for part in self.parts]
+        fields = ("acceleration", "velocity", "gravity")
+        joined = {
+            name: np.concatenate(
+                [
+                    np.asarray(getattr(own, name)),
+                    *(
+                        np.asarray(getattr(found, name))[:, :, [part.link]]
+                        for part, found in zip(self.parts, parts, strict=True)
+                    ),
+                ],
+                axis=2,
+            )
+            for name in fields
+        }
+        return own._replace(**joined)
 
     def forces(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Return the constraint forces due to links and payloads, (S, C, N), where there are constraints."""

@@ -7,6 +7,7 @@ from typing import Any, Self
 import numpy as np
 from linkwise_runtime.chosen_names import nearest_first
 
+from linkwise.analysis.borne_joints import BorneJoint
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.disk_rows import let_go
@@ -84,6 +85,8 @@ class AnalysisResult(WholeMovement):
     loads: tuple[PlacedLoad, ...]
     induced: tuple[str, ...]
     """Points whose acceleration is split by source, in the columns that begin with acc."""
+    borne: tuple[BorneJoint, ...]
+    """Joints whose whole wrench is told by its causes, in the columns that begin with reaction."""
     ignored: tuple[str, ...]
     """Columns of the log that belong to no joint."""
     warnings: tuple[str, ...]
@@ -186,6 +189,11 @@ class AnalysisResult(WholeMovement):
     def load_torque(self) -> Array:
         """τ_ie (S, n, loads), the torque of joint i that carries load e, in N·m or N."""
         return self.dense("tau_load")
+
+    @property
+    def reactions(self) -> tuple[str, ...]:
+        """Names of the joints whose whole wrench is told, as they were asked for."""
+        return tuple(joint.name for joint in self.borne)
 
     @property
     def load_labels(self) -> tuple[str, ...]:

@@ -139,6 +139,31 @@ TABLE = {
         "induced_kinematic point component cause",
         "acceleration of the point by the cause's velocity, without any of a joint",
     ),
+    "reaction": (
+        "reaction bearing wrench",
+        "wrench that the joint carries: all links together, loads, and what ties and contacts pass on",
+    ),
+    "reaction_link": (
+        "reaction_by_link bearing wrench link",
+        "wrench that the joint carries of the link: of its motion and its weight",
+    ),
+    "reaction_qdd": (
+        "reaction_acceleration bearing wrench cause",
+        "wrench that the joint carries by the cause's acceleration, through all links",
+    ),
+    "reaction_qd": (
+        "reaction_velocity bearing wrench cause",
+        "wrench that the joint carries by the cause's velocity, through all links",
+    ),
+    "reaction_gravity": (
+        "reaction_gravity bearing wrench link",
+        "wrench that the joint carries by the link's weight",
+    ),
+    "reaction_spring": ("", "wrench that the joint carries as ties bear joints' own springs"),
+    "reaction_damping": ("", "wrench that the joint carries as ties bear joints' own damping"),
+    "reaction_friction": ("", "wrench that the joint carries as ties bear joints' own Coulomb friction"),
+    "reaction_armature": ("", "wrench that the joint carries as ties bear joints' own armatures"),
+    "reaction_load": ("reaction_loads bearing wrench load", "wrench that the joint carries of the load"),
 }
 """Quantities, in the order of a Dataset: the array there with its axes, and the meaning.
 
@@ -149,6 +174,10 @@ BY_SOURCE = {
         "constraint_force_by_source constraint",
         "what the constraint bears of what joints have of their own",
     ),
+    "reaction": (
+        "reaction_by_source bearing wrench",
+        "wrench that the joint carries as ties bear what joints have of their own",
+    ),
     "power": ("passive_power joint", "power that the joint sends into what it has of its own"),
     "acc": (
         "induced_passive point component cause",
@@ -158,7 +187,7 @@ BY_SOURCE = {
 """Name with axes, and meaning, of arrays in which springs, damping and so on stand side by side."""
 UNITS = {"tau": TORQUE, "force": "torque:constraint", "power": "W", "acc": "acceleration:component"}
 UNITS |= {"time": "s", "q": "position:joint", "qd": "velocity:joint", "qdd": "acceleration:joint"}
-UNITS |= {"contact": "", "slip": "velocity:constraint", "energy": "J"}
+UNITS |= {"contact": "", "slip": "velocity:constraint", "energy": "J", "reaction": "torque:wrench"}
 """Unit by the first part of a name, as the runtime writes it: torque:joint depends on the joint."""
 OF_PACKAGES = {
     "tau_link": CALLS["partial_torque"].answers[0],
@@ -184,7 +213,8 @@ class ResultQuantity:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Axes after that of time: joint, link, cause, load, constraint, contact, point, component."""
+        """Axes after that of time: joint, link, cause, load, constraint, contact, point, component,
+        bearing, wrench."""
         return self.array.axes
 
     @property
@@ -208,6 +238,8 @@ QUANTITIES: Mapping[str, ResultQuantity] = {
     name: ResultQuantity(name, meaning, _array(name)) for name, (_, meaning) in TABLE.items()
 }
 """All quantities by name, in the order of a Dataset."""
+REACTION_OF = {torque: torque.replace("tau", "reaction", 1) for torque in PASSIVE}
+"""Parts of a reaction by what ties do not carry of joints' passive torques, by torque."""
 INDUCED = tuple(name for name in QUANTITIES if name.partition("_")[0] == "acc")
 """An acceleration, and its shares by source."""
 OVER_MOVEMENT = {

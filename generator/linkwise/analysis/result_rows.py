@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from linkwise_runtime.robot_axes import NamedAxis, axes_of
+from linkwise_runtime.robot_axes import WRENCH, NamedAxis, axes_of
 
 from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.loads.placed import PlacedLoad
@@ -32,6 +32,7 @@ Place = tuple[str, tuple[int, ...]]
 """A quantity, and the index along each of its axes."""
 OVER_TIME = {"velocity": "/s", "acceleration": "/s²"}
 FIELD_OF = {"load": "cause", "share": "cause", "contact": "cause", "constraint": "cause", "component": "row"}
+FIELD_OF |= {"bearing": "point", "wrench": "row"}
 """Fields of `Column` that have the indices along axes of other names."""
 
 
@@ -57,8 +58,9 @@ class Column:
     The cause is a coordinate; for a share with a name it is that share, for the torque of a load that load,
     for share and power of a contact that contact, and for a force or slip the row of the constraint, where
     `load` is the load that causes a force,
-    if one does. An induced acceleration has the number of its point and of a row of that point, and what is
-    traced that of its source.
+    if one does. An induced acceleration has the number of its point and of a row of that point, a reaction
+    that of its joint among those asked for, and of a component of the wrench, and what is traced that of its
+    source.
     """
 
     quantity: str
@@ -88,9 +90,10 @@ class ResultRows:
         places: Iterable[Place],
         loads: Sequence[PlacedLoad] = (),
         points: Sequence[InducedPoint] = (),
+        bearings: Sequence[str] = (),
         origins: Sequence[str] = (),
     ) -> "ResultRows":
-        """Return rows at these places of the quantities of a robot with loads and points.
+        """Return rows at these places of the quantities of a robot with loads, points and bearing joints.
 
         origins: names of the sources of a trace, window of time by window
         """
@@ -107,6 +110,8 @@ class ResultRows:
             "point": NamedAxis("point", tuple(point.name for point in points)),
             "component": NamedAxis("component", tuple(components), tuple(components.values())),
             "origin": NamedAxis("origin", tuple(origins)),
+            "bearing": NamedAxis("bearing", tuple(bearings)),
+            "wrench": NamedAxis("wrench", WRENCH, ("rad",) * 3 + ("m",) * 3),
         }
         return cls(axes, tuple(points), tuple(places))
 

@@ -44,6 +44,7 @@ def analyze(
     induced: Sequence[str] = (),
     contacts: Contacts | Sequence[Contact] = (),
     phases: Sequence[str] = (),
+    reactions: Sequence[str] = (),
     trace: Sequence[str] = (),
     trace_windows: float | None = None,
     trace_restart: Sequence[str] = (),
@@ -56,6 +57,7 @@ def analyze(
     loads_cutoff: cutoff in Hz of the low-pass on loads from files
     induced: points whose acceleration is split by source: FRAME or FRAME,X,Y,Z, joints, centre-of-mass
     contacts: frames that the ground holds, whose reactions are found from the motion; `Contacts` says when
+    reactions: joints of the tree whose whole wrench is told by its causes: JOINT, or JOINT,AXES
     phases: phases of the movement for the figure "causes", written as for --phase: "stance/swing=LOAD"
     trace: joints whose velocities, and what velocities ask of them, are traced to their sources, or "all"
     trace_windows: length in s of the windows of time into which these sources are cut
@@ -68,6 +70,7 @@ def analyze(
     loaded, borne = with_contacts(loaded, held), Loads.of(loads, loads_cutoff)
     outputs = Outputs(
         induced=tuple(induced),
+        reactions=tuple(reactions),
         phases=tuple(map(Phase.of, phases)),
         trace=tuple(trace),
         trace_windows=trace_windows,
@@ -90,7 +93,7 @@ def analyze_to(
     """
     robot, outputs = with_contacts(robot, asked.contacts), asked.outputs
     for name in outputs.figures:
-        check_figure(name, robot, outputs.induced)
+        check_figure(name, robot, outputs.induced, outputs.reactions)
     refuse_inside_package(out)
     for file in (log, *asked.loads.paths, *asked.contacts.measured.paths):
         if is_inside(file, out):

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.motion.tracer import TraceState
 
+from linkwise.analysis.borne_joints import BorneJoint, ReactionShares
 from linkwise.analysis.closed_motion import reason_of
 from linkwise.analysis.contacts.ground import ContactTerms, Standing
 from linkwise.analysis.contacts.times import ContactTimes
@@ -53,6 +54,7 @@ class Decomposer:
     """Parts of each τ_i: τ_ij, passive torques of the joint, τ_ie."""
     induced: InducedShares
     forces: ReactionForces
+    reactions: ReactionShares
     times: ContactTimes | None
     terms: ContactTerms | None
     """Terms of the robot on its contacts; None without contacts."""
@@ -68,6 +70,7 @@ class Decomposer:
         loads: Sequence[PlacedLoad] = (),
         points: Sequence[InducedPoint] = (),
         times: ContactTimes | None = None,
+        borne: Sequence[BorneJoint] = (),
         traced: TracedRows | None = None,
     ) -> "Decomposer":
         """Plan where each packed value of the robot goes."""
@@ -78,16 +81,29 @@ class Decomposer:
         measured = [] if times is None else [at for at, loads in enumerate(times.measured) if loads]
         places = torque_places(robot, of_robot, loads, power_terms, measured)
         induced = InducedShares.of(robot, points, ResultRows.of(robot, places, loads))
-        places += induced.places
-        places += [] if traced is None else traced.places([at for at in places if at[0] == "tau_qd"])
-        rows = ResultRows.of(robot, places, loads, points, () if traced is None else traced.origins)
+        reactions = ReactionShares(robot, tuple(borne), tuple(loads), convention)
+        every, bearings = [*places, *induced.places, *reactions.places], [joint.name for joint in borne]
+        every += [] if traced is None else traced.places([at for at in places if at[0] == "tau_qd"])
+        origins = () if traced is None else traced.origins
+        rows = ResultRows.of(robot, every, loads, points, bearings, origins)
         sources = TermArrays(*([row[-1] for row in some] for some in of_robot))
         parts = _sums(rows, "tau_link", *TERMS)
         wholes = _sums(rows, "tau", "tau_link", *PASSIVE, "tau_load")
         forces = ReactionForces(robot, tuple(loads), times)
         return cls(
-            *(robot, tuple(loads), convention, rows, sources, parts, wholes, induced, forces, times, terms),
-            traced=traced,
+            robot,
+            tuple(loads),
+            convention,
+            rows,
+            sources,
+            parts,
+            wholes,
+            induced,
+            forces,
+            reactions,
+            times,
+            terms,
+            traced,
         )
 
     def at(self, time: Array, inputs: Array) -> "Decomposer":
@@ -128,6 +144,7 @@ class Decomposer:
             _spread(out, rows["tau_gravity"], packed.gravity, sources.gravity)
         self.forces.fill(out, rows, standing, time, (q, qd, qdd), partial)
         closure = self._closure(out, partial) | self.induced.fill(out, unborne, standing, q, qd, qdd)
+        self.reactions.fill(out, rows, standing, time, (q, qd, qdd))
         if self.convention == "gradient":
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
             rows.put(out, "tau_qd", _left(standing, velocity))

@@ -23,7 +23,21 @@ app = typer.Typer(add_completion=False)
 
 
 @app.command()
-@takes("log", "robot", "out", "units", "time", "topic", "qpos", ..., "induced", "backend", "page", "as_json")
+@takes(
+    "log",
+    "robot",
+    "out",
+    "units",
+    "time",
+    "topic",
+    "qpos",
+    ...,
+    "induced",
+    "reaction",
+    "backend",
+    "page",
+    "as_json",
+)
 def analyze(
     log: Log,
     robot: RobotOption,

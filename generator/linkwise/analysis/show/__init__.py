@@ -12,6 +12,7 @@ from linkwise.analysis.show.contacts_figure import contacts
 from linkwise.analysis.show.induced_figure import induced
 from linkwise.analysis.show.paper_figure import paper
 from linkwise.analysis.show.power_figure import power
+from linkwise.analysis.show.reaction_figure import reaction
 from linkwise.analysis.show.shares_figure import shares
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
@@ -26,6 +27,7 @@ FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {
     "causes": causes,
     "power": power,
     "induced": induced,
+    "reaction": reaction,
     "contacts": contacts,
 }
 
@@ -33,15 +35,17 @@ FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {
 def draw(result: AnalysisResult, name: str) -> "Figure":
     """Draw one of FIGURES by its name.
 
-    The names "paper:JOINT", "causes:JOINT" and "induced:POINT" choose another joint or point than the first.
+    The names "paper:JOINT", "causes:JOINT", "induced:POINT" and "reaction:JOINT" choose another joint or
+    point than the first.
 
     Raises LinkwiseError for another name.
     """
-    check_figure(name, result.robot, result.induced)
+    check_figure(name, result.robot, result.induced, result.reactions)
     kind, _, chosen = name.partition(":")
-    names = result.induced if kind == "induced" else result.robot.joints
+    asked = {"induced": result.induced, "reaction": result.reactions}
+    names = asked.get(kind, result.robot.joints)
     with styled():
-        first = 0 if kind == "induced" else result.robot.moving_itself[0]
+        first = 0 if kind in asked else result.robot.moving_itself[0]
         return FIGURES[kind](result, names.index(chosen) if chosen else first)
 
 
@@ -51,13 +55,17 @@ def figure_png(result: AnalysisResult, name: str) -> bytes:
         return saved(draw(result, name), "png", dpi=160)
 
 
-def check_figure(name: str, robot: OpenedRobot, points: Sequence[str]) -> None:
-    """Raise LinkwiseError unless `draw` knows the figure; `points` are those of induced accelerations."""
+def check_figure(name: str, robot: OpenedRobot, points: Sequence[str], borne: Sequence[str]) -> None:
+    """Raise LinkwiseError unless `draw` knows the figure.
+
+    points: those of induced accelerations; borne: joints whose reactions are told
+    """
     kind, _, joint = name.partition(":")
-    if kind == "induced":
-        if not points or (joint and joint not in points):
-            raise LinkwiseError(f"--figure {name}: add --induced {joint or 'POINT'}, whose shares it draws")
-        return
+    for own, asked, what in (("induced", points, "POINT"), ("reaction", borne, "JOINT")):
+        if kind == own:
+            if not asked or (joint and joint not in asked):
+                raise LinkwiseError(f"--figure {name}: add --{own} {joint or what}, whose shares it draws")
+            return
     if kind == "contacts" and robot.contacts is None and not joint:
         raise LinkwiseError(f"--figure {name}: add --contact, whose forces it draws")
     if kind not in FIGURES or (
@@ -65,5 +73,6 @@ def check_figure(name: str, robot: OpenedRobot, points: Sequence[str]) -> None:
     ):
         raise LinkwiseError(
             f"--figure {name}: give one of {', '.join(FIGURES)}, causes:JOINT or paper:JOINT with a joint of"
-            f" {listed(nearest_first(joint, robot.driven_joints))}, or induced:POINT"
+            f" {listed(nearest_first(joint, robot.driven_joints))}, induced:POINT or"
+            " reaction:JOINT"
         )
