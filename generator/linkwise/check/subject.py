@@ -20,6 +20,7 @@ from linkwise.check.compiled_c import CompiledPackage
 from linkwise.check.constraint_checks import HeldContacts
 from linkwise.check.frame_checks import FrameReference, frame_reference
 from linkwise.check.parametric_tree import tree_with
+from linkwise.check.reaction_checks import reaction_reference
 from linkwise.check.regressor_checks import regressor_reference
 from linkwise.check.simulated_terms import simulated_terms
 from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion
@@ -153,6 +154,13 @@ class Subject:
         if self.tree is None:
             return None
         return regressor_reference(self.manifest, self.tree, self.reference.states)
+
+    @cached_property
+    def reactions(self) -> Reference | None:
+        """Reference for what joints carry; None for energies."""
+        if self.tree is None:
+            return None
+        return reaction_reference(self.manifest, self.tree, self.reference.states)
 
     @cached_property
     def frames(self) -> FrameReference | None:

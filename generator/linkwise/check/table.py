@@ -14,6 +14,7 @@ from linkwise.check.impedance_checks import impedance_calls
 from linkwise.check.induced_checks import induced_calls
 from linkwise.check.model_calls import Named, against_reference, recorded_parts
 from linkwise.check.parametric_tree import check_bodies, check_numbers
+from linkwise.check.reaction_checks import reaction_calls
 from linkwise.check.regressor_checks import regressor_calls
 from linkwise.check.simulation_checks import simulation_calls
 from linkwise.check.subject import NEAR_NONE, Subject, check_energies, there
@@ -111,6 +112,10 @@ def _of_bodies(a: BackendAnswers) -> bool:
     return _by_any(a) and a.subject.tree is not None and a.model.backend.rule is not None
 
 
+def _of_wrenches(a: BackendAnswers) -> bool:
+    return _of_frames(a) and a.model.backend.regresses
+
+
 def _parametric(s: Subject) -> bool:
     return s.tree is not None and bool(s.parameters)
 
@@ -157,6 +162,10 @@ def _induced(name: str, a: BackendAnswers) -> Iterable[Result]:
     return induced_calls(name, a.model, s.passive, s.reference, s.frames, load_of)
 
 
+def _reactions(name: str, a: BackendAnswers) -> Iterable[Result]:
+    return reaction_calls(name, a.model, there(a.subject.tree), there(a.subject.reactions))
+
+
 def _controllers(name: str, a: BackendAnswers) -> Iterable[Result]:
     s = a.subject
     return impedance_calls(name, a.model, s.tree, s.passive, s.reference, s.package.module.Natural)
@@ -188,6 +197,7 @@ CHECKS: tuple[Check[Any], ...] = (
         "regressors", _of_bodies, lambda name, a: regressor_calls(name, a.model, there(a.subject.regressors))
     ),
     _called("frames", _of_frames, lambda name, a: frame_calls(name, a.model, there(a.subject.frames))),
+    _called("reactions", _of_wrenches, _reactions),
     _called("constraints", _in_loops, lambda name, a: loop_calls(name, a.model, there(a.subject.loops))),
     _called("contacts", _moving_on, _contacts),
     _called(

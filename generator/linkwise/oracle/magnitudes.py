@@ -59,18 +59,27 @@ class Magnitudes:
             turns = np.array([self.joints[f].kind == "revolute" for f in path])
             coordinates = [self.joints[f].coordinate for f in path]
             for x, body in enumerate(carried[j]):
-                reach = frame.reach + _length(body.com)
-                turning = frame.alpha + frame.omega**2
-                force = abs(body.mass) * (frame.a + frame.omega * frame.v + turning * reach)
-                # v × p is 0, but differentiating ½ m v² sums it all the same.
-                moment = reach * force + abs(body.mass) * (frame.v + frame.omega * reach) ** 2
-                moment = moment + float(np.linalg.norm(body.inertia)) * turning
+                force, moment = _needed(frame, body)
                 about = moment[:, None] + reaches[:, path] * force[:, None]
                 work = slopes[:, path] * np.where(turns, about, force[:, None]) * rounding_growth(len(path))
                 work = work * frame.lost[:, None]
                 for k, column in zip(coordinates, work.T, strict=True):
                     tau[:, k, j, x] += column
         return tau
+
+    def wrenches(self, joints: Sequence[int], q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
+        """Return bounds of what joints of the tree carry of each link, (samples, joints, N, 6)."""
+        frames = self._frames(q, qd, qdd, self.gravity if gravity else 0.0)
+        found = np.zeros((len(q), len(joints), len(self.links), 6))
+        for j, link in enumerate(self.links):
+            frame, path = frames[link.joint], path_of(self.joints, link.joint)
+            force, moment = _needed(frame, link)
+            growth = rounding_growth(len(path)) * frame.lost
+            for at, joint in enumerate(joints):
+                if joint in path:
+                    found[:, at, j, :3] = ((moment + frames[joint].reach * force) * growth)[:, None]
+                    found[:, at, j, 3:] = (force * growth)[:, None]
+        return found
 
     def lagrangian(self, q: Array, qd: Array) -> Array:
         """Return bounds of kinetic + |potential| energy of each link, shape (samples, N)."""
@@ -140,6 +149,16 @@ def _carried(joint: TreeJoint, up: _Sizes, turn: Array, rate: Array, change: Arr
         up.a + change * s + rate * (up.omega * s + up.v * z),
         up.lost if sliding else np.maximum(up.lost, turn / np.pi),
     )
+
+
+def _needed(frame: _Sizes, body: TreeLink) -> tuple[Array, Array]:
+    """Return bounds of the force and of the moment about the base that a body needs, (samples,) each."""
+    reach = frame.reach + _length(body.com)
+    turning = frame.alpha + frame.omega**2
+    force = abs(body.mass) * (frame.a + frame.omega * frame.v + turning * reach)
+    # v × p is 0, but differentiating ½ m v² sums it all the same.
+    moment = reach * force + abs(body.mass) * (frame.v + frame.omega * reach) ** 2
+    return force, moment + float(np.linalg.norm(body.inertia)) * turning
 
 
 def _length(vector: tuple[float, float, float]) -> float:
