@@ -49,6 +49,9 @@ ANALYSIS: dict[str, Any] = {
     "unactuated": ("base_x",),
     "induced": ("joints",),
     "reaction": ("knee,world",),
+    "trace": ("knee",),
+    "trace_windows": 0.2,
+    "trace_restart": ("phases",),
 }
 ROBOT = {
     "lock": ("elbow=0.5",),
@@ -80,6 +83,9 @@ WRITTEN = AnalysisChoices(
         power_terms=True,
         induced=("joints",),
         reactions=("knee,world",),
+        trace=("knee",),
+        trace_windows=0.2,
+        trace_restart=("phases",),
     ),
     payload=("hand=2",),
     load=("hand=1,2,3",),
