@@ -15,8 +15,8 @@ class Quantity(NamedTuple):
     name: str
     axes: tuple[str, ...]
     """Names of the axes, by which `robot_axes` has a NamedAxis, such as joint; `moved` is the axis of
-    whatever an induced acceleration accelerates, `mover` that of the coordinates that cause reactions: all,
-    or where ties are kept the independent ones."""
+    whatever an induced acceleration accelerates, `holder` that of links and armatures, which hold energy,
+    `mover` that of the coordinates that cause reactions: all, or where ties are kept the independent ones."""
     unit: str
     """Factors of the unit, with divisors after a slash: symbols, or quantity:axis for what is measured along
     an axis."""

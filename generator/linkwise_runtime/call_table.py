@@ -239,8 +239,8 @@ SOURCES = (
 )
 
 
-def _induced(unit: str, what: str) -> tuple[Quantity, ...]:
-    return tuple(Quantity(n, ("moved", *a.split()), unit, f"{what} {meaning}") for n, a, meaning in SOURCES)
+def _induced(unit: str, what: str, first: str = "moved") -> tuple[Quantity, ...]:
+    return tuple(Quantity(n, (first, *a.split()), unit, f"{what} {meaning}") for n, a, meaning in SOURCES)
 
 
 WRENCH = "torque:wrench"
@@ -292,6 +292,27 @@ MOTIONS = (
         ties="kept",
         rigid=True,
         lacking=("autograd",),
+        out=False,
+    ),
+    Call(
+        "induced_power",
+        QD,
+        _induced("W", "power into the link or armature", "holder"),
+        InducedAccelerations,
+        options=DRIVEN | {"constraints": None},
+        own="passive",
+        ties="kept",
+        out=False,
+    ),
+    Call(
+        "induced_flow",
+        QD,
+        _induced("W", "power through the joint", "joint"),
+        InducedAccelerations,
+        options=DRIVEN | {"constraints": None, "side": "successor"},
+        own="passive",
+        ties="kept",
+        rigid=True,
         out=False,
     ),
     Call(

@@ -28,6 +28,7 @@ from .labelled import labelled
 from .motion.borne_wrenches import Borne, reactions
 from .motion.counterfactual import Without, counterfactual_motion
 from .motion.induced_accelerations import Driven, induced_accelerations, induced_reactions
+from .motion.induced_power import induced_flow, induced_power
 from .motion.simulated import Simulated, simulate_motion
 from .motion.traced import Traced, trace_motion
 from .motion_quantities import Counterfactual, TracedMotion
@@ -666,6 +667,64 @@ class Dynamics(RobotCalls):
         """
         asked = Borne(q, qd, qdd, axes, point, joints, loads, passive, constraints)
         shares: Reactions[Array] = reactions(self, asked)
+        return shares
+
+    def induced_power(
+        self,
+        q: Array,
+        qd: Array,
+        tau: Array | None = None,
+        qdd: Array | None = None,
+        loads: Any = (),
+        passive: bool = True,
+        constraints: Any = None,
+    ) -> InducedAccelerations[Array]:
+        """Return the power in W that each source gives each link: shares (..., R, ...) of dE_j/dt.
+
+        Arguments are those of `induced_accelerations`. The R rows are the links, whose energy E_j is kinetic
+        and potential, then, if `passive`, the joints that have armature, which holds energy too.
+
+        Rows sum to the rate of energy: `total`. Columns sum to the power of the source: of actuator i tau_i
+        qd_i, of a spring, damping or friction minus what it takes, of a load what it gives. Velocity forces,
+        weights and constraints hand power on, from link to link or from potential to kinetic energy, and
+        their columns sum to 0; but weights of links that were written by hand, which are all their shares
+        with names, to what dissipation, forces and imposed motions give. `kinematic` is 0.
+
+        Raises as `induced_accelerations` does.
+        """
+        asked = Driven(q, qd, tau, qdd, loads, passive, constraints)
+        shares: InducedAccelerations[Array] = induced_power(self, asked)
+        return shares
+
+    def induced_flow(
+        self,
+        q: Array,
+        qd: Array,
+        tau: Array | None = None,
+        qdd: Array | None = None,
+        loads: Any = (),
+        passive: bool = True,
+        constraints: Any = None,
+        side: str = "successor",
+    ) -> InducedAccelerations[Array]:
+        """Return the power in W that flows through each joint to what hangs on it, by source: (..., n, ...).
+
+        Arguments are those of `induced_accelerations`. It is the power of the joint's whole wrench, of which
+        the actuator's torque is part.
+        side: the body on whose twist this is
+            successor    what the joint gives the body behind it
+            predecessor  what the body before it gives the joint: less by what actuator, spring, damping and
+                         friction of the joint give, more by what its armature takes
+
+        Where several joints are in one place, as of a ball joint, the bodies are the first one's predecessor
+        and the last one's successor. In loops a flow contains what ties carry to what hangs on the joint, and
+        so it does where one of several joints of a coordinate is behind another joint.
+
+        Raises as `induced_accelerations` does, and ValueError for links given by energies, which do not say
+        what hangs on which joint.
+        """
+        asked = Driven(q, qd, tau, qdd, loads, passive, constraints)
+        shares: InducedAccelerations[Array] = induced_flow(self, asked, side)
         return shares
 
     def natural_impedance(

@@ -131,6 +131,7 @@ def _axes(robot: Any, ties: Any, key: str, arguments: Mapping[str, Any]) -> dict
         centre = frame == "centre of mass" and frame not in robot.kinematics.frames
         of = "constraint" if key == "induced_reactions" else "joint" if frame is None else "component"
         axes["moved"] = axes["axis" if centre else of]
+        axes["holder"] = _holders(robot, bool(arguments.get("passive", True)))
     if key == "reactions":
         axes["mover"] = axes["independent_cause" if ties else "cause"]
         axes["tree_joint"] = NamedAxis("tree_joint", _chosen_joints(robot, arguments.get("joints")))
@@ -146,6 +147,13 @@ def _chosen_joints(robot: Any, given: Any) -> tuple[str, ...]:
         return names
     several = given if isinstance(given, list | tuple) else [given]
     return tuple(one if isinstance(one, str) else names[one] for one in several)
+
+
+def _holders(robot: Any, passive: bool) -> NamedAxis:
+    """Return the axis of what holds energy: links, and armatures where they count."""
+    turning = robot.structure.armature_joints if passive else ()
+    armatures = (f"armature of {robot.joint_names[k]}" for k in turning)
+    return NamedAxis("holder", (*robot.link_names, *armatures))
 
 
 def _names_of(loads: Any, robot: Any) -> tuple[str, ...]:

@@ -262,6 +262,11 @@ class Structure:
         """Passive properties of the joints, summed up for each coordinate."""
         return passive_sums(self.passive, self.n)
 
+    @cached_property
+    def armature_joints(self) -> tuple[int, ...]:
+        """Joints that have armature, ascending."""
+        return tuple(k for k, inertia in enumerate(self.passive_sums.armature) if inertia)
+
     def only(self, link: int) -> "Structure":
         """Return the robot as if it had this link alone, without parameters and passive torques."""
         return replace(

@@ -173,6 +173,7 @@ def shape_of(
     if row.rigid:
         sizes["frame"] = len(robot.kinematics.frames)
     sizes |= {name: len(axis.names) for name, axis in axes.items() if name != "part"}
+    sizes["holder"] = robot.N + len(robot.structure.armature_joints)
     sizes["moved"] = sizes["constraint" if row.key == "induced_reactions" else "joint"]
     sizes |= {"mover": sizes["independent" if ties else "cause"], "tree_joint": len(robot.tree_joint_names)}
     samples = (len(INSTANTS), *batch) if row.key in OVER_TIME else batch

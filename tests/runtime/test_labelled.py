@@ -117,7 +117,8 @@ def calls(package: Any, robot: Any, times: Any) -> Iterator[tuple[str, tuple[Any
     yield "natural_impedance", (q, qd, qdd), {}
     for frame in ({}, own, {"frame": "centre of mass"}):
         yield "induced_accelerations", (q, qd, tau), {"loads": loads, "passive": True, **frame}
-    yield "induced_reactions", (q, qd, tau), {"loads": loads, "passive": True}
+    for name in ("induced_reactions", "induced_power", "induced_flow"):
+        yield name, (q, qd, tau), {"loads": loads, "passive": True}
     yield "reactions", (q, qd, qdd), {"loads": loads, "axes": "world"}
     yield "reactions", (q, qd, qdd), {"loads": loads, "joints": [1, "ram"], "constraints": False}
     yield "simulate", (q, qd, times(np.linspace(0, 0.02, 3), "s"), tau), {}

@@ -37,6 +37,7 @@ WORDS = {
     "tree_joint": "joint of the tree",
     "wrench": "6",
     "kind": "4",
+    "holder": "links and armatures",
     "world": "4 of the world",
     "own": "4 of the frame",
     "component": "6",
@@ -78,7 +79,8 @@ def axes() -> dict[str, NamedAxis]:
     """Axes of a robot that has joints, and rows of constraints, of both kinds."""
     kinds = ("rad", "m")
     found = axes_of(kinds, kinds, ["link"], ["share"]) | tied_axes(kinds, kinds, kinds, kinds)
-    unnamed = {axis: NamedAxis(axis, ()) for axis in ("frame", "load", "tree_joint", "origin", "window")}
+    several = ("frame", "load", "holder", "tree_joint", "origin", "window")
+    unnamed = {axis: NamedAxis(axis, ()) for axis in several}
     return found | unnamed | {"mover": found["cause"]}
 
 

@@ -25,7 +25,7 @@ from ..interface import Numbers
 from ..kinematics.frame_answers import LINKS, frame_index, vectors_beside
 from ..quantities import InducedAccelerations
 from ..structure import Structure
-from .source_forces import SourceForces, loads_of, source_forces, with_actuators
+from .source_forces import AppliedLoads, SourceForces, loads_of, source_forces, with_actuators
 
 
 class DrivenRobot(TiedRobot, Protocol):
@@ -160,6 +160,9 @@ class DrivenSources(NamedTuple):
     """Point of the frame that is asked for, in as many samples; empty where none is given."""
     forces: SourceForces
     response: Response
+    loads: AppliedLoads
+    pulls: list[list[Numbers]]
+    """Torques (..., n) that joints need for each force and moment of each load."""
 
 
 def induced_accelerations(
@@ -168,7 +171,7 @@ def induced_accelerations(
     """Return the answer of `Dynamics.induced_accelerations`."""
     if frame is None and point is not None:
         raise ValueError("point is given without the frame that it is a point of; give frame too")
-    at = _sources(robot, asked, point)
+    at = driven_sources(robot, asked, point)
     by_velocity = at.response.of_velocities()
     moved = at.forces.split(at.response.accelerations(at.forces.columns))
     shares: InducedAccelerations[Any] = InducedAccelerations(*[*moved, by_velocity, 0.0 * by_velocity])
@@ -179,13 +182,13 @@ def induced_accelerations(
 
 def induced_reactions(robot: DrivenRobot, asked: Driven) -> InducedAccelerations[Any]:
     """Return the answer of `Dynamics.induced_reactions`."""
-    at = _sources(robot, asked, None)
+    at = driven_sources(robot, asked, None)
     by_velocity = at.response.reactions(None, at.response.of_velocities())
     moved = at.response.reactions(at.forces.columns, at.response.accelerations(at.forces.columns))
     return InducedAccelerations(*[*at.forces.split(moved), by_velocity, 0.0 * by_velocity])
 
 
-def _sources(robot: DrivenRobot, asked: Driven, point: object) -> DrivenSources:
+def driven_sources(robot: DrivenRobot, asked: Driven, point: object = None) -> DrivenSources:
     """Return motion, forces and response; raises as `Dynamics.induced_accelerations` does."""
     tau, qdd = asked.tau, asked.qdd
     if (tau is None) == (qdd is None):
@@ -197,11 +200,11 @@ def _sources(robot: DrivenRobot, asked: Driven, point: object) -> DrivenSources:
     loads, points = loads_of(robot.backend, asked.loads), vectors_beside({"point": point})
     backend, (q, qd, last, *vectors) = robot.door.read(named, beside={**loads.beside, **points})
     constraints = constraints_of(robot, asked.constraints)
-    pulls = loads.torques(backend, q, vectors[: len(loads.beside)])
+    pulls = loads.torques_by_frame(backend, q, vectors[: len(loads.beside)])
     place = None if constraints is None else constraints.ties.place(backend, q)
     if place is not None:
         qd = place.velocity(place.own(qd))
-    others = source_forces(backend, q, qd, pulls, asked.passive)
+    others = source_forces(backend, q, qd, [sum(parts, 0.0 * q) for parts in pulls], asked.passive)
     response: Response = FreeResponse(robot.structure, others.mass)
     if constraints is not None and place is not None:
         response = TiedResponse(backend, others.mass, constraints, place, place.bias_by_cause(qd))
@@ -212,7 +215,8 @@ def _sources(robot: DrivenRobot, asked: Driven, point: object) -> DrivenSources:
         last = response.actuator_torques(needed[..., None])[..., 0]
     identity = backend.constant(np.eye(robot.n), q)
     placed = dict(zip(points, vectors[len(loads.beside) :], strict=True))
-    return DrivenSources(backend, q, qd, placed, with_actuators(others, last, identity), response)
+    forces = with_actuators(others, last, identity)
+    return DrivenSources(backend, q, qd, placed, forces, response, loads, pulls)
 
 
 def _jacobians(at: DrivenSources, frame: object) -> tuple[Numbers, Numbers]:

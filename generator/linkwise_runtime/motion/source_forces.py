@@ -30,6 +30,8 @@ class SourceForces(NamedTuple):
     columns: Numbers
     tails: tuple[tuple[int, ...], ...]
     """Shapes of the sources of each kind, which follow each other in the columns."""
+    by_link: Numbers
+    """Mass matrix of each link, c2 (..., n, N, n)."""
 
     def split(self, columns: Numbers) -> list[Numbers]:
         """Return the columns of each kind of source, (..., r, *tail), of columns (..., r, X)."""
@@ -62,14 +64,14 @@ def source_forces(
     kinds += [-identity * share[..., None, :] for share in shares]
     kinds += [-torque[..., None] for torque in pulls]
     return SourceForces(
-        mass, namespace(mass).concat(kinds, -1), ((links, n), (links,), (3, n), (len(pulls),))
+        mass, namespace(mass).concat(kinds, -1), ((links, n), (links,), (3, n), (len(pulls),)), c2
     )
 
 
 def with_actuators(forces: SourceForces, tau: Numbers, identity: Numbers) -> SourceForces:
     """Return the forces with columns for the torques (..., n) of actuators before them."""
     columns = namespace(tau).concat([identity * tau[..., None, :], forces.columns], -1)
-    return SourceForces(forces.mass, columns, ((tau.shape[-1],), *forces.tails))
+    return forces._replace(columns=columns, tails=((tau.shape[-1],), *forces.tails))
 
 
 @dataclass(frozen=True)
@@ -90,13 +92,19 @@ class AppliedLoads:
 
         vectors: values read for `beside`
         """
+        return [sum(parts, 0.0 * q) for parts in self.torques_by_frame(backend, q, vectors)]
+
+    def torques_by_frame(
+        self, backend: ArrayBackend, q: Numbers, vectors: Sequence[Numbers]
+    ) -> list[list[Numbers]]:
+        """Return these torques by each force and moment of each load, in the order of `each`."""
         named = dict(zip(self.beside, vectors, strict=True))
 
         def torque(frame: int, names: Mapping[str, str]) -> Numbers:
             own = {what: named[name] for what, name in names.items()}
             return backend.frames.answer("load_torque", [q], frame, own)
 
-        return [sum((torque(*one) for one in load), 0.0 * q) for load in self.each]
+        return [[torque(*one) for one in load] for load in self.each]
 
 
 def loads_of(backend: ArrayBackend, given: object) -> AppliedLoads:
