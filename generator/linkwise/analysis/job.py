@@ -26,7 +26,7 @@ from linkwise.analysis.samples import Samples, pole_warnings, read_samples
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import draw
 from linkwise.analysis.stream import Sink, span_of, stream
-from linkwise.analysis.torques import Decomposer
+from linkwise.analysis.torques import Decomposer, ToldBeside
 from linkwise.analysis.traced_rows import TracedRows
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
@@ -46,8 +46,8 @@ class Analysis(AnalysisResult):
         """Return a matplotlib figure.
 
         name: "paper" or "causes", with ":JOINT" for another joint than the first; "shares"; "power";
-        "induced", or "induced:POINT" for another point than the first; "reaction" or "reaction:JOINT"
-        likewise; "contacts"
+        "energy", or "energy:PHASE" for work over a phase; "induced", or "induced:POINT" for another point
+        than the first; "reaction" or "reaction:JOINT" likewise; "contacts"
 
         "paper" has five panels, laid out like the paper's Fig. 5-9. Raises LinkwiseError for another name.
         """
@@ -84,8 +84,8 @@ class Outputs:
     table: Format = option("parquet", "Format of the table", "--format", is_key=False)
     figures: tuple[str, ...] = option(
         (),
-        "paper or causes, alone or with :JOINT, shares, power, induced, induced:POINT, reaction,"
-        " reaction:JOINT or contacts; may be repeated",
+        "paper or causes, alone or with :JOINT, shares, power, energy, energy:PHASE, induced, induced:POINT,"
+        " reaction, reaction:JOINT or contacts; may be repeated",
         "--figure",
         is_key=False,
     )
@@ -105,6 +105,9 @@ class Outputs:
         "Tell an acceleration by its sources: FRAME or FRAME,X,Y,Z in m, joints, or centre-of-mass; may "
         "be repeated",
         metavar="POINT",
+    )
+    induced_power: bool = option(
+        False, "Tell by its sources the power that each link gets, and that which flows through each joint"
     )
     reactions: tuple[str, ...] = option(
         (),
@@ -160,7 +163,8 @@ class Job:
     def run(self, sink: Sink, progress: Progress) -> WholeMovement:
         """Analyse every sample, handing the blocks to `sink`."""
         with within(self.source):
-            return stream(self.samples, self.decomposer, self.asked.processing, sink, progress)
+            asked = self.asked.processing
+            return stream(self.samples, self.decomposer, asked, sink, progress, self.phases)
 
     def note(self) -> dict[str, Any]:
         """Return the description that a table carries: log, robot and all choices."""
@@ -273,8 +277,8 @@ def prepared(
         restarts = restart_times(outputs.trace_restart, phases, robot, times, time, q)
         made = AskedTrace.of(outputs.trace, outputs.trace_windows, restarts, robot, time)
         traced = TracedRows.of(made, robot, borne, samples)
-    wanted = processing.convention, outputs.power_terms, borne, points, times, bearings, traced
-    decomposer = Decomposer.of(robot, *wanted)
+    told = ToldBeside(outputs.power_terms, points, bearings, outputs.induced_power, traced)
+    decomposer = Decomposer.of(robot, processing.convention, borne, times, told)
     return Job(log.name, asked, samples, decomposer, closed, phases)
 
 

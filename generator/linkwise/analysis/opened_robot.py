@@ -237,6 +237,11 @@ class OpenedRobot:
         count = 0 if self.contacts is None else len(self.contacts.rows)
         return slice(len(self.constraint_rows) - count, len(self.constraint_rows))
 
+    @property
+    def holders(self) -> tuple[str, ...]:
+        """Names of what holds energy: links, then armatures of joints."""
+        return (*self.links, *(f"armature of {self.joints[i]}" for i in self.with_own("armature")))
+
     def with_own(self, field: str) -> tuple[int, ...]:
         """Return the numbers of the joints that have a passive element, by the name of its number."""
         return tuple(sorted({own.coordinate for own in self.passive if getattr(own, field)}))

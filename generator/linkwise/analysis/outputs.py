@@ -1,7 +1,7 @@
 """A result as others read it: Parquet or CSV, the record, xarray's Dataset, the table of a notebook."""
 
 import csv
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -51,11 +51,12 @@ def open_table(path: Path, columns: Sequence[Column], note: str) -> Iterator[Cal
 
 
 def _metadata(column: Column) -> dict[str, str]:
-    indices = {name: getattr(column, name) for name in ("joint", "link", "cause", "point", "row", "origin")}
+    indices = ("joint", "link", "cause", "point", "row", "holder", "origin")
+    found = {name: getattr(column, name) for name in indices}
     return {
         "unit": column.unit,
         "meaning": QUANTITIES[column.quantity].meaning,
-        **{name: str(at) for name, at in indices.items() if at is not None},
+        **{name: str(at) for name, at in found.items() if at is not None},
     }
 
 
@@ -129,17 +130,29 @@ WORK_KEYS = {
 def _work(result: AnalysisResult) -> dict[str, Any]:
     """Return the work in J of each joint in all, into each link that it moves, and against each load.
 
-    Work of contacts is added where there are any.
+    Work of contacts is added where there are any, and that by source where it was asked for. Phases that were
+    asked for have the same each.
     """
-    found: dict[str, Any] = {"unit": "J"}
-    for name, key in WORK_KEYS.items():
-        if name == "contact_work" and result.robot.contacts is None:
+    whole = {POWER_OF[name]: getattr(result, name) for name in WORK_KEYS} | dict(result.work_by_source)
+    found = {"unit": "J", **_work_of(result, whole)}
+    if result.phases:
+        in_phases = zip(result.phases, result.work_in_phases, strict=True)
+        found["in_phases"] = [{"phase": phase.told, **_work_of(result, works)} for phase, works in in_phases]
+    return found
+
+
+def _work_of(result: AnalysisResult, works: Mapping[str, Work]) -> dict[str, Any]:
+    """Return works, which are by the quantities that are their power."""
+    found: dict[str, Any] = {}
+    keys = {POWER_OF[name]: key for name, key in WORK_KEYS.items()}
+    for power, work in works.items():
+        if power == "power_contact" and result.robot.contacts is None:
             continue
-        work, power = getattr(result, name), QUANTITIES[POWER_OF[name]]
-        places = result.rows[power.name].at.tolist()
-        if name == "joint_work":  # joints that follow others too, whose work is none
+        places = result.rows[power].at.tolist()
+        if power == "power":  # joints that follow others too, whose work is none
             places = [[i] for i in range(len(result.robot.joints))]
-        found[key] = [_entry(result, work, power, tuple(at)) for at in places]
+        entries = [_entry(result, work, QUANTITIES[power], tuple(at)) for at in places]
+        found[keys.get(power, power)] = entries
     return found
 
 

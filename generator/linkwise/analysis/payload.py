@@ -7,6 +7,7 @@ from typing import Any, cast
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.joint_reactions import Reactions
+from linkwise_runtime.quantities import Energy
 from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame, TreeJoint, TreeLink
 
 from linkwise.analysis.constrained_model import ConstrainedModel, tied_in_tree
@@ -175,6 +176,12 @@ class PayloadModel:
                 some.append(getattr(value, name)[..., getattr(part.columns, name)])
             joined.append(np.concatenate(some, axis=-1))
         return TermArrays(*joined)
+
+    def energy(self, q: Array, qd: Array) -> Energy[Array]:
+        """Return the kinetic and potential energies of links and payloads in J, (S, N) each."""
+        found = [list(self.own.energy(q, qd))]
+        found += [[e[:, [part.link]] for e in part.model.energy(q, qd)] for part in self.parts]
+        return Energy(*(np.concatenate(some, axis=1) for some in zip(*found, strict=True)))
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Return τ_i of links and payloads, (S, n)."""

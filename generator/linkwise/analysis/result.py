@@ -60,6 +60,11 @@ class WholeMovement:
     """Work that each joint gave against each load and took back, (n, loads) in J."""
     contact_work: Work
     """Work that each contact fed into each link as its frame slipped, and took back, (N, contacts) in J."""
+    work_by_source: Mapping[str, Work]
+    """Work that holders of energy gained by source and lost, and that flowed through joints and back, in J,
+    by the quantity that is its power, along its axes; none unless power by source was asked for."""
+    work_in_phases: tuple[Mapping[str, Work], ...]
+    """Work in each of the `phases`, in J, by the quantity that is its power, `work_by_source` among it."""
     closure: Closure
     total: int
     """Number of samples."""

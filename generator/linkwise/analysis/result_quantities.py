@@ -36,6 +36,11 @@ GROUND = ("contact", "slip", "force_measured", "tau_as_loads", "power_contact")
 LOSSES = ("acc_spring", "acc_damping", "acc_friction")
 """Shares of passive torques in an acceleration, in the order of `passive_torque`."""
 
+GAIN = "power that the link gets, or the armature,"
+FLOW = "power through the joint"
+BY_VELOCITY = "by velocity forces on all links, by the cause's velocity"
+ARMATURE = "as an armature is inertia; it is an entry of the array with the other three"
+
 TABLE = {
     "time": ("time", "time"),
     "q": ("q joint", "joint coordinate"),
@@ -93,6 +98,50 @@ TABLE = {
     "power_damping": ("", "power that the joint's own damping takes"),
     "power_friction": ("", "power that the joint's own Coulomb friction takes"),
     "power_armature": ("", "power that the joint sends into its own armature"),
+    "energy_kinetic": ("kinetic_energy link", "kinetic energy of the link"),
+    "energy_potential": ("potential_energy link", "potential energy of the link"),
+    "gain": (
+        "energy_gain holder",
+        "rate of the energy of the link, kinetic and potential, or of the joint's armature",
+    ),
+    "gain_tau": ("gain_actuators holder cause", f"{GAIN} by what the cause's joint gives alone"),
+    "gain_qd": ("gain_velocity holder cause", f"{GAIN} {BY_VELOCITY}"),
+    "gain_gravity": ("gain_gravity holder link", f"{GAIN} by the weight of the other link alone"),
+    "gain_share": (
+        "gain_shares holder link share",
+        f"{GAIN} by the share of this name on the other link alone",
+    ),
+    "gain_spring": ("", f"{GAIN} by the spring of the cause's joint alone"),
+    "gain_damping": ("", f"{GAIN} by the damping of the cause's joint alone"),
+    "gain_friction": ("", f"{GAIN} by the Coulomb friction of the cause's joint alone"),
+    "gain_armature": ("", f"none, {ARMATURE}"),
+    "gain_load": ("gain_loads holder load", f"{GAIN} by the load alone"),
+    "gain_constraint": (
+        "gain_constraints holder cause",
+        f"{GAIN} by constraints that turn with the cause's velocity",
+    ),
+    "gain_contact": (
+        "gain_contacts holder contact",
+        f"{GAIN} by what the contact itself does, as what it holds turns and slips",
+    ),
+    "flow_before": ("flow_before joint", "power that the body before the joint gives to it"),
+    "flow": ("flow joint", "power that the joint gives to the body behind it: all sources together"),
+    "flow_tau": ("flow_actuators joint cause", f"{FLOW} by what the cause's joint gives alone"),
+    "flow_qd": ("flow_velocity joint cause", f"{FLOW} {BY_VELOCITY}"),
+    "flow_gravity": ("flow_gravity joint link", f"{FLOW} by the weight of the link alone"),
+    "flow_spring": ("", f"{FLOW} by the spring of the cause's joint alone"),
+    "flow_damping": ("", f"{FLOW} by the damping of the cause's joint alone"),
+    "flow_friction": ("", f"{FLOW} by the Coulomb friction of the cause's joint alone"),
+    "flow_armature": ("", f"none, {ARMATURE}"),
+    "flow_load": ("flow_loads joint load", f"{FLOW} by the load alone"),
+    "flow_constraint": (
+        "flow_constraints joint cause",
+        f"{FLOW} by constraints that turn with the cause's velocity",
+    ),
+    "flow_contact": (
+        "flow_contacts joint contact",
+        f"{FLOW} by what the contact itself does, as what it holds turns and slips",
+    ),
     "acc": ("induced point component", "acceleration of the point, or joint: all sources together"),
     "acc_tau": (
         "induced_actuators point component cause",
@@ -113,7 +162,7 @@ TABLE = {
     "acc_spring": ("", "acceleration by the spring of the cause's joint alone"),
     "acc_damping": ("", "acceleration by the damping of the cause's joint alone"),
     "acc_friction": ("", "acceleration by the Coulomb friction of the cause's joint alone"),
-    "acc_armature": ("", "none, as an armature is inertia; it is an entry of the array with the other three"),
+    "acc_armature": ("", f"none, {ARMATURE}"),
     "acc_load": ("induced_loads point component load", "acceleration by the load alone"),
     "acc_constraint": (
         "induced_constraints point component cause",
@@ -179,6 +228,14 @@ BY_SOURCE = {
         "wrench that the joint carries as ties bear what joints have of their own",
     ),
     "power": ("passive_power joint", "power that the joint sends into what it has of its own"),
+    "gain": (
+        "gain_passive holder cause",
+        f"{GAIN} by spring, damping and friction of the cause's joint alone",
+    ),
+    "flow": (
+        "flow_passive joint cause",
+        f"{FLOW} by spring, damping and friction of the cause's joint alone",
+    ),
     "acc": (
         "induced_passive point component cause",
         "acceleration by spring, damping and friction of the cause's joint alone",
@@ -187,7 +244,8 @@ BY_SOURCE = {
 """Name with axes, and meaning, of arrays in which springs, damping and so on stand side by side."""
 UNITS = {"tau": TORQUE, "force": "torque:constraint", "power": "W", "acc": "acceleration:component"}
 UNITS |= {"time": "s", "q": "position:joint", "qd": "velocity:joint", "qdd": "acceleration:joint"}
-UNITS |= {"contact": "", "slip": "velocity:constraint", "energy": "J", "reaction": "torque:wrench"}
+UNITS |= {"energy": "J", "gain": "W", "flow": "W", "reaction": "torque:wrench"}
+UNITS |= {"contact": "", "slip": "velocity:constraint"}
 """Unit by the first part of a name, as the runtime writes it: torque:joint depends on the joint."""
 OF_PACKAGES = {
     "tau_link": CALLS["partial_torque"].answers[0],
@@ -213,8 +271,7 @@ class ResultQuantity:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Axes after that of time: joint, link, cause, load, constraint, contact, point, component,
-        bearing, wrench."""
+        """Axes after that of time: joint, link, holder, cause, load, constraint, contact, point, ..."""
         return self.array.axes
 
     @property
@@ -242,6 +299,10 @@ REACTION_OF = {torque: torque.replace("tau", "reaction", 1) for torque in PASSIV
 """Parts of a reaction by what ties do not carry of joints' passive torques, by torque."""
 INDUCED = tuple(name for name in QUANTITIES if name.partition("_")[0] == "acc")
 """An acceleration, and its shares by source."""
+BY_POWER = tuple(name for name in QUANTITIES if name.partition("_")[0] in ("energy", "gain", "flow"))
+"""Energies of links, the power that they get by source, and that which flows through joints."""
+WORK_BY_SOURCE = tuple(name for name in BY_POWER if not name.startswith("energy"))
+"""Powers by source, whose work is kept too."""
 OVER_MOVEMENT = {
     "work": ("power_link", "what the joint gave to the link, and took back"),
     "joint_work": ("power", "what the joint gave to all links together, and took back"),

@@ -59,8 +59,8 @@ class Column:
     for share and power of a contact that contact, and for a force or slip the row of the constraint, where
     `load` is the load that causes a force,
     if one does. An induced acceleration has the number of its point and of a row of that point, a reaction
-    that of its joint among those asked for, and of a component of the wrench, and what is traced that of its
-    source.
+    that of its joint among those asked for, and of a component of the wrench; the gain of energy has the
+    holder of that energy, a link or, behind these, a joint's armature, and what is traced its source.
     """
 
     quantity: str
@@ -73,6 +73,7 @@ class Column:
     row: int | None = None
     load: int | None = None
     origin: int | None = None
+    holder: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +108,7 @@ class ResultRows:
             "load": NamedAxis("load", tuple(borne.name for borne in loads)),
             "constraint": NamedAxis("constraint", rows, bases),
             "contact": NamedAxis("contact", contacts),
+            "holder": NamedAxis("holder", robot.holders),
             "point": NamedAxis("point", tuple(point.name for point in points)),
             "component": NamedAxis("component", tuple(components), tuple(components.values())),
             "origin": NamedAxis("origin", tuple(origins)),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from linkwise_runtime.quantities import Contact
 
+from linkwise.analysis.asked_trace import EVERY
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.standing import with_contacts
 from linkwise.analysis.disk_rows import EverySample
@@ -18,7 +19,7 @@ from linkwise.analysis.outputs import open_table
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.phases import Phase
 from linkwise.analysis.settings import Payload, Processing, Reading
-from linkwise.analysis.show import check_figure, figure_png
+from linkwise.analysis.show import check_figure, figure_names, figure_png
 from linkwise.analysis.show.page import report
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
@@ -44,6 +45,7 @@ def analyze(
     induced: Sequence[str] = (),
     contacts: Contacts | Sequence[Contact] = (),
     phases: Sequence[str] = (),
+    induced_power: bool = False,
     reactions: Sequence[str] = (),
     trace: Sequence[str] = (),
     trace_windows: float | None = None,
@@ -59,6 +61,7 @@ def analyze(
     contacts: frames that the ground holds, whose reactions are found from the motion; `Contacts` says when
     reactions: joints of the tree whose whole wrench is told by its causes: JOINT, or JOINT,AXES
     phases: phases of the movement for the figure "causes", written as for --phase: "stance/swing=LOAD"
+    induced_power: whether to tell by its sources the power that each link gets, and that through each joint
     trace: joints whose velocities, and what velocities ask of them, are traced to their sources, or "all"
     trace_windows: length in s of the windows of time into which these sources are cut
     trace_restart: times in s at which the trace begins anew, written as numbers, or "phases"
@@ -70,6 +73,7 @@ def analyze(
     loaded, borne = with_contacts(loaded, held), Loads.of(loads, loads_cutoff)
     outputs = Outputs(
         induced=tuple(induced),
+        induced_power=induced_power,
         reactions=tuple(reactions),
         phases=tuple(map(Phase.of, phases)),
         trace=tuple(trace),
@@ -92,8 +96,11 @@ def analyze_to(
     does, and where `out` holds something else than a former result or cannot be written.
     """
     robot, outputs = with_contacts(robot, asked.contacts), asked.outputs
+    phases = [phase.name for phase in outputs.phases]
+    traced = robot.joints if EVERY in outputs.trace else outputs.trace
+    told = figure_names(outputs.induced, outputs.reactions, outputs.induced_power, phases, traced)
     for name in outputs.figures:
-        check_figure(name, robot, outputs.induced, outputs.reactions)
+        check_figure(name, robot, told)
     refuse_inside_package(out)
     for file in (log, *asked.loads.paths, *asked.contacts.measured.paths):
         if is_inside(file, out):

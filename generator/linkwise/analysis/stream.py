@@ -1,6 +1,6 @@
 """A whole log, block by block: each is differentiated, decomposed, checked, summed up and handed on."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
@@ -8,8 +8,10 @@ from linkwise_runtime.motion.tracer import TraceState
 
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.filtering import derivatives
+from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result import Totals, WholeMovement, Work
-from linkwise.analysis.result_quantities import POWER_OF
+from linkwise.analysis.result_quantities import POWER_OF, WORK_BY_SOURCE
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import Processing
@@ -49,14 +51,16 @@ class MovementSums:
     """Totals, work and errors of a movement, added up block by block.
 
     Samples are evenly spaced, and work is summed by the trapezoidal rule: with Δt between them
-    ∫ P dt = Δt (Σ_s P_s - (P_first + P_last)/2), so that blocks join without knowing of each other.
+    ∫ P dt = Δt (Σ_s P_s - (P_first + P_last)/2), so that blocks join without knowing of each other. A phase
+    has the terms of this sum whose samples are in it, so that a phase and the rest are the whole.
     """
 
-    def __init__(self, rows: ResultRows) -> None:
+    def __init__(self, rows: ResultRows, robot: OpenedRobot, phases: Sequence[PlacedPhase] = ()) -> None:
         self.closure, self._rows, self._samples = Closure(), rows, 0
+        self._robot, self._phases = robot, phases
         self._total, self._peak = np.zeros((2, len(rows)))
-        self._power = rows.numbers(*POWER_OF.values())
-        self._energy = np.zeros((2, len(self._power)))
+        self._power = rows.numbers(*POWER_OF.values(), *WORK_BY_SOURCE)
+        self._energy = np.zeros((1 + len(phases), 2, len(self._power)))
         self._first: Array | None = None
         self._last = self._energy
 
@@ -72,34 +76,55 @@ class MovementSums:
         np.maximum(self._peak, magnitude.max(axis=1), out=self._peak)
         power = block[self._power]
         parts = np.stack([np.maximum(power, 0.0), np.maximum(-power, 0.0)])
-        self._energy += parts.sum(axis=-1)
+        on = np.stack([np.ones(block.shape[1]), *self._on(block)])
+        self._energy += np.einsum("wps,fs->fwp", parts, on)
         if self._first is None:
-            self._first = parts[..., 0].copy()
-        self._last = parts[..., -1].copy()
+            self._first = on[:, 0, None, None] * parts[..., 0]
+        self._last = on[:, -1, None, None] * parts[..., -1]
         return True
+
+    def _on(self, block: Array) -> Iterator[Array]:
+        """Yield for each phase 1 at samples in it, else 0, (S,)."""
+        q = self._rows.dense("q", block) if self._phases else block
+        contacts = block[self._rows["contact"].rows]
+        for phase in self._phases:
+            yield phase.on(self._robot, block[0], q, contacts).astype(float)
 
     def movement(self, step: float) -> WholeMovement:
         """Return what the whole movement comes to; samples are `step` s apart."""
         first = self._last if self._first is None else self._first
-        energy = np.zeros((2, len(self._rows), 1))
-        energy[:, self._power, 0] = step * (self._energy - 0.5 * (first + self._last))
-        works = {
-            name: Work(*(self._rows.dense(power, way)[0] for way in energy))
-            for name, power in POWER_OF.items()
-        }
-        totals = Totals(self._total / self._samples, self._peak)
-        return WholeMovement(totals=totals, closure=self.closure, total=self._samples, **works)
+        energy = np.zeros((1 + len(self._phases), 2, len(self._rows), 1))
+        energy[:, :, self._power, 0] = step * (self._energy - 0.5 * (first + self._last))
+        kept = [*POWER_OF.values(), *(name for name in WORK_BY_SOURCE if name in self._rows)]
+        whole, *phases = (
+            {power: Work(*(self._rows.dense(power, way)[0] for way in part)) for power in kept}
+            for part in energy
+        )
+        return WholeMovement(
+            totals=Totals(self._total / self._samples, self._peak),
+            closure=self.closure,
+            total=self._samples,
+            work_by_source={power: work for power, work in whole.items() if power in WORK_BY_SOURCE},
+            work_in_phases=tuple(phases),
+            **{name: whole[power] for name, power in POWER_OF.items()},
+        )
 
 
 def stream(
-    samples: Samples, decomposer: Decomposer, processing: Processing, sink: Sink, progress: Progress
+    samples: Samples,
+    decomposer: Decomposer,
+    processing: Processing,
+    sink: Sink,
+    progress: Progress,
+    phases: Sequence[PlacedPhase] = (),
 ) -> WholeMovement:
     """Send every block to `sink`, which works in a thread beside the computation.
 
     Raises LinkwiseError for too few samples, results that overflow, and a robot whose torques do not add up.
     """
     (start, stop), rows = span_of(samples, processing), decomposer.rows
-    sums, inner, traced = MovementSums(rows), _at_once(len(rows)), decomposer.traced
+    sums, inner = MovementSums(rows, decomposer.robot, phases), _at_once(len(rows))
+    traced = decomposer.traced
     with ThreadPoolExecutor(1) as writer, np.errstate(over="ignore", invalid="ignore"):
         pending: Future[None] | None = None
         state: TraceState | None = None

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from linkwise_runtime.motion.tracer import TraceState
@@ -12,6 +12,7 @@ from linkwise.analysis.closed_motion import reason_of
 from linkwise.analysis.contacts.ground import ContactTerms, Standing
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.induced_points import InducedPoint
+from linkwise.analysis.induced_power import PowerShares
 from linkwise.analysis.induced_shares import InducedShares
 from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
@@ -28,6 +29,24 @@ from linkwise.escape import listed
 
 Sum = tuple[int, int, list[int]]
 """Joint and row of a torque, and the rows of what it is the sum of."""
+
+
+class ToldBeside(NamedTuple):
+    """What a result tells beside torques."""
+
+    power_terms: bool = False
+    """True to tell power by cause and order too."""
+    points: Sequence[InducedPoint] = ()
+    """Points whose acceleration is told by source."""
+    borne: Sequence[BorneJoint] = ()
+    """Joints whose whole wrench is told by cause."""
+    induced_power: bool = False
+    """True to tell by source the power of links, and that which flows through joints."""
+    traced: TracedRows | None = None
+    """Velocities that are traced to their sources."""
+
+
+NOTHING_BESIDE = ToldBeside()
 
 
 @dataclass(frozen=True)
@@ -53,6 +72,7 @@ class Decomposer:
     wholes: tuple[Sum, ...]
     """Parts of each τ_i: τ_ij, passive torques of the joint, τ_ie."""
     induced: InducedShares
+    power: PowerShares
     forces: ReactionForces
     reactions: ReactionShares
     times: ContactTimes | None
@@ -66,12 +86,9 @@ class Decomposer:
         cls,
         robot: OpenedRobot,
         convention: Convention,
-        power_terms: bool = False,
         loads: Sequence[PlacedLoad] = (),
-        points: Sequence[InducedPoint] = (),
         times: ContactTimes | None = None,
-        borne: Sequence[BorneJoint] = (),
-        traced: TracedRows | None = None,
+        told: ToldBeside = NOTHING_BESIDE,
     ) -> "Decomposer":
         """Plan where each packed value of the robot goes."""
         of_robot, terms = term_rows(robot.model.layout), None
@@ -79,31 +96,25 @@ class Decomposer:
             terms = ContactTerms.of(of_robot, robot.contacts)
             of_robot = terms.rows
         measured = [] if times is None else [at for at, loads in enumerate(times.measured) if loads]
-        places = torque_places(robot, of_robot, loads, power_terms, measured)
+        places, points = torque_places(robot, of_robot, loads, told.power_terms, measured), told.points
         induced = InducedShares.of(robot, points, ResultRows.of(robot, places, loads))
-        reactions = ReactionShares(robot, tuple(borne), tuple(loads), convention)
-        every, bearings = [*places, *induced.places, *reactions.places], [joint.name for joint in borne]
-        every += [] if traced is None else traced.places([at for at in places if at[0] == "tau_qd"])
-        origins = () if traced is None else traced.origins
+        reactions = ReactionShares(robot, tuple(told.borne), tuple(loads), convention)
+        traced = told.traced
+        places += induced.places
+        sums = ResultRows.of(robot, places, loads, points)
+        power = PowerShares.of(robot, loads, sums, told.induced_power)
+        velocities = [at for at in places if at[0] == "tau_qd"]
+        every = [*places, *power.places, *reactions.places]
+        every += [] if traced is None else traced.places(velocities)
+        bearings, origins = [joint.name for joint in told.borne], () if traced is None else traced.origins
         rows = ResultRows.of(robot, every, loads, points, bearings, origins)
         sources = TermArrays(*([row[-1] for row in some] for some in of_robot))
         parts = _sums(rows, "tau_link", *TERMS)
         wholes = _sums(rows, "tau", "tau_link", *PASSIVE, "tau_load")
         forces = ReactionForces(robot, tuple(loads), times)
         return cls(
-            robot,
-            tuple(loads),
-            convention,
-            rows,
-            sources,
-            parts,
-            wholes,
-            induced,
-            forces,
-            reactions,
-            times,
-            terms,
-            traced,
+            *(robot, tuple(loads), convention, rows, sources, parts, wholes),
+            *(induced, power, forces, reactions, times, terms, traced),
         )
 
     def at(self, time: Array, inputs: Array) -> "Decomposer":
@@ -113,7 +124,9 @@ class Decomposer:
             return self
         sources = replace(self.induced.sources, robot=robot)
         induced = replace(self.induced, robot=robot, sources=sources)
-        return replace(self, robot=robot, induced=induced, forces=replace(self.forces, robot=robot))
+        power = replace(self.power, robot=robot, sources=replace(self.power.sources, robot=robot))
+        forces = replace(self.forces, robot=robot)
+        return replace(self, robot=robot, induced=induced, power=power, forces=forces)
 
     def fill(self, out: Array, time: Array, q: Array, qd: Array, qdd: Array) -> Closure:
         """Fill `out` (rows, S) from time (S,) and q, qd, qdd (S, n); return how well it closes.
@@ -145,6 +158,7 @@ class Decomposer:
         self.forces.fill(out, rows, standing, time, (q, qd, qdd), partial)
         closure = self._closure(out, partial) | self.induced.fill(out, unborne, standing, q, qd, qdd)
         self.reactions.fill(out, rows, standing, time, (q, qd, qdd))
+        closure |= self.power.fill(out, unborne, standing, time, (q, qd, qdd))
         if self.convention == "gradient":
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
             rows.put(out, "tau_qd", _left(standing, velocity))

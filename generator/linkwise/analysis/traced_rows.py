@@ -19,7 +19,7 @@ from linkwise_runtime.motion.tracer import Tracer, TraceState
 
 from linkwise.analysis.asked_trace import AskedTrace
 from linkwise.analysis.contacts.ground import Standing
-from linkwise.analysis.induced_shares import opened, timed
+from linkwise.analysis.induced_sources import opened, timed
 from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.payload import PayloadModel

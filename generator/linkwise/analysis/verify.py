@@ -45,8 +45,9 @@ class Closure:
     largest error of τ_ij and τ_ie against an independent Newton–Euler recursion, and `energy` that of
     Σ_i P_ij, in W, against dE_j/dt of link j's energy there; None where the energies are hand-written.
     `induced` is the residual of induced accelerations, the sum of all shares less J q̈ + J̇ q̇; None where
-    none were asked for. `trace` is that of traced velocities, the sum of all parts less q̇, which integration
-    between samples leaves; None where none were asked for.
+    none were asked for. `power` is that of power by source, in W: of the gains of links' energies, and of
+    flows through joints. `trace` is that of traced velocities, the sum of all parts less q̇, which integration
+    between samples leaves.
     """
 
     terms_absolute: float = 0.0
@@ -59,6 +60,8 @@ class Closure:
     energy_relative: float | None = None
     induced_absolute: float | None = None
     induced_relative: float | None = None
+    power_absolute: float | None = None
+    power_relative: float | None = None
     trace_absolute: float | None = None
     trace_relative: float | None = None
 
@@ -88,6 +91,11 @@ class Closure:
             raise LinkwiseError(
                 "the induced accelerations do not sum to the acceleration (relative error"
                 f" {self.induced_relative:.2g}): the mass matrix is next to singular"
+            )
+        if self.power_relative is not None and not self.power_relative <= AGAINST_RECURSION:
+            raise LinkwiseError(
+                "the power of the sources does not sum to the gain of the links' energies (relative error"
+                f" {self.power_relative:.2g}): the mass matrix is next to singular"
             )
 
 
@@ -141,7 +149,11 @@ def against_recursion(
         # Power that is only rounding is measured by the torques and speeds that it is made of.
         watts += _largest_sum(partial, alike) * float(np.abs(qd[:, alike]).max(initial=0.0))
     fed = rows.dense("power_link", block).sum(axis=1) + rows.dense("power_contact", block).sum(axis=2)
-    lost = float(np.abs(fed - _gain(robot.recursion, q, qd, qdd)).max(initial=0.0))
+    gain = _gain(robot.recursion, q, qd, qdd)
+    lost = float(np.abs(fed - gain).max(initial=0.0))
+    if "gain" in rows:
+        own = rows.dense("gain", block)[:, : len(robot.links)]
+        lost = max(lost, float(np.abs(own - gain).max(initial=0.0)))
     absolute, relative = (max(errors) for errors in zip(*apart, strict=True))
     return Closure(
         recursion_absolute=absolute,

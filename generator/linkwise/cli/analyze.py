@@ -24,19 +24,10 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 @takes(
-    "log",
-    "robot",
-    "out",
-    "units",
-    "time",
-    "topic",
-    "qpos",
+    *("log", "robot", "out", "units", "time", "topic", "qpos"),
     ...,
-    "induced",
-    "reaction",
-    "backend",
-    "page",
-    "as_json",
+    *("induced", "induced_power", "reaction", "trace", "trace_windows", "trace_restart"),
+    *("backend", "page", "as_json"),
 )
 def analyze(
     log: Log,
@@ -77,6 +68,8 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
     )
     residual = closure.induced_relative
     shares = "" if residual is None else f"; shares sum to accelerations within {residual:.1e}"
+    if closure.power_relative is not None:
+        shares += f"; power by source sums to what links gain within {closure.power_relative:.1e}"
     traced = closure.trace_relative
     shares += "" if traced is None else f"; traced velocities sum to those of the log within {traced:.1e}"
     return [

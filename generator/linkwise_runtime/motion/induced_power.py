@@ -20,9 +20,9 @@ all that is behind joint i,
 
     sum_(j in B_i) dE_jx/dt  -  what x gives B_i other than through joint i
 
-where the latter is that of actuators, springs and losses at joints in B_i, and of loads on links in B_i. On the
-twist of the predecessor it is less by what x gives joint i itself, tau_i qd_i, and more by what its armature
-takes.
+where the latter is that of actuators, springs and losses at joints in B_i, and of loads on links in B_i. On
+the twist of the predecessor it is less by what x gives joint i itself, tau_i qd_i, and more by what its
+armature takes.
 """
 
 from collections.abc import Sequence

@@ -1,6 +1,6 @@
 """Views of an analysis: figures by name, drawn with matplotlib, and the page."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from linkwise_runtime.chosen_names import nearest_first
@@ -9,6 +9,7 @@ from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.causes_figure import causes
 from linkwise.analysis.show.contacts_figure import contacts
+from linkwise.analysis.show.energy_figure import energy
 from linkwise.analysis.show.induced_figure import induced
 from linkwise.analysis.show.paper_figure import paper
 from linkwise.analysis.show.power_figure import power
@@ -27,6 +28,7 @@ FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {
     "causes": causes,
     "power": power,
     "induced": induced,
+    "energy": energy,
     "reaction": reaction,
     "contacts": contacts,
 }
@@ -36,16 +38,17 @@ def draw(result: AnalysisResult, name: str) -> "Figure":
     """Draw one of FIGURES by its name.
 
     The names "paper:JOINT", "causes:JOINT", "induced:POINT" and "reaction:JOINT" choose another joint or
-    point than the first.
+    point than the first, "energy:PHASE" a phase in place of the whole movement.
 
     Raises LinkwiseError for another name.
     """
-    check_figure(name, result.robot, result.induced, result.reactions)
+    told = names_of(result)
+    check_figure(name, result.robot, told)
     kind, _, chosen = name.partition(":")
-    asked = {"induced": result.induced, "reaction": result.reactions}
-    names = asked.get(kind, result.robot.joints)
+    asked = told.get(kind)
+    names = result.robot.joints if asked is None else asked
+    first = result.robot.moving_itself[0] if asked is None else 0
     with styled():
-        first = 0 if kind in asked else result.robot.moving_itself[0]
         return FIGURES[kind](result, names.index(chosen) if chosen else first)
 
 
@@ -55,17 +58,50 @@ def figure_png(result: AnalysisResult, name: str) -> bytes:
         return saved(draw(result, name), "png", dpi=160)
 
 
-def check_figure(name: str, robot: OpenedRobot, points: Sequence[str], borne: Sequence[str]) -> None:
-    """Raise LinkwiseError unless `draw` knows the figure.
+FigureNames = Mapping[str, Sequence[str]]
+"""Names that may follow the kind of a figure, such as points that were asked for; none where nothing was."""
+ASKED_BY = {
+    "induced": "--induced {}, whose shares it draws",
+    "reaction": "--reaction {}, whose shares it draws",
+    "energy": "--induced-power, whose flows it draws",
+    "trace": "--trace {}, whose sources it draws",
+}
+"""Flags, after `add`, by which the names of a figure are asked for."""
 
-    points: those of induced accelerations; borne: joints whose reactions are told
+
+def figure_names(
+    induced: Sequence[str],
+    reactions: Sequence[str],
+    flows: bool,
+    phases: Sequence[str],
+    traced: Sequence[str],
+) -> FigureNames:
+    """Return the names of figures, from the points, joints and phases that were asked for.
+
+    flows: whether power by source is told; traced: joints of a trace
     """
+    energies = ("", *phases) if flows else ()
+    return {"induced": induced, "reaction": reactions, "energy": energies, "trace": traced}
+
+
+def names_of(result: AnalysisResult) -> FigureNames:
+    """Return the names of the figures of a result."""
+    phases = [phase.name for phase in result.phases]
+    traced = () if result.traced is None else result.traced["joints"]
+    return figure_names(result.induced, result.reactions, "gain" in result.rows, phases, traced)
+
+
+def check_figure(name: str, robot: OpenedRobot, told: FigureNames) -> None:
+    """Raise LinkwiseError unless `draw` knows the figure."""
     kind, _, joint = name.partition(":")
-    for own, asked, what in (("induced", points, "POINT"), ("reaction", borne, "JOINT")):
-        if kind == own:
-            if not asked or (joint and joint not in asked):
-                raise LinkwiseError(f"--figure {name}: add --{own} {joint or what}, whose shares it draws")
-            return
+    if kind in told:
+        names = told[kind]
+        if names and kind == "energy" and joint not in names:
+            raise LinkwiseError(f"--figure {name}: add --phase {joint}=..., over which it sums up work")
+        if not names or (joint and joint not in names):
+            word = joint or ("POINT" if kind == "induced" else "JOINT")
+            raise LinkwiseError(f"--figure {name}: add {ASKED_BY[kind].format(word)}")
+        return
     if kind == "contacts" and robot.contacts is None and not joint:
         raise LinkwiseError(f"--figure {name}: add --contact, whose forces it draws")
     if kind not in FIGURES or (

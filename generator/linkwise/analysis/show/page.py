@@ -10,7 +10,7 @@ from linkwise.analysis.joint_causes import are_motions_whole
 from linkwise.analysis.loads.placed import model_pose
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_quantities import FORCES, GROUND, INDUCED, MOTION, TORQUE_OF
+from linkwise.analysis.result_quantities import BY_POWER, FORCES, GROUND, INDUCED, MOTION, TORQUE_OF
 from linkwise.analysis.result_rows import Column, ResultRows
 from linkwise.analysis.show.induced_figure import TITLES, components, numbers_of_curves, source_curves
 from linkwise.analysis.show.page_curves import (
@@ -51,9 +51,9 @@ def view(result: AnalysisResult) -> dict[str, str]:
     }
 
 
-OFF_PAGE = (*TORQUE_OF, *FORCES, *GROUND, *INDUCED)
-"""Quantities that a page does not hold: power, the product of two that it holds, and those of contacts; of
-induced accelerations it holds sums."""
+OFF_PAGE = (*TORQUE_OF, *FORCES, *GROUND, *INDUCED, *BY_POWER)
+"""Quantities that a page does not hold: power, the product of two that it holds, power by source, and those
+of contacts; of induced accelerations it holds sums."""
 
 
 def numbers_on_page(rows: ResultRows) -> int:
