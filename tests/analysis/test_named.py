@@ -23,7 +23,7 @@ COORDINATES = ("pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_a
 
 @pytest.fixture(scope="module")
 def leg(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """A leg that stands on its foot and bears a load, and what accelerates it."""
+    """A leg that stands on its foot and bears a load, what accelerates it, and how power flows."""
     folder = tmp_path_factory.mktemp("leg")
     write_package(generate(read_system(LEG), ["numpy"]), folder / "leg")
     log = write_csv(folder / "walk.csv", smooth(60, 6) * [1, *[0.2] * 6], COORDINATES)
@@ -33,6 +33,7 @@ def leg(tmp_path_factory: pytest.TempPathFactory) -> Any:
         loads=[Load("push", "shank", force=(300, 0, 20))],
         contacts=[Contact("foot", name="sole")],
         induced=["joints", "foot", "centre-of-mass"],
+        induced_power=True,
     )
 
 

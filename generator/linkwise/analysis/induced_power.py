@@ -9,7 +9,8 @@ links on which they act. Σ_x is dE_j/dt of kinetic and potential energy; what a
 power. What contacts feed in as they slip counts with the sources that press on them.
 
 The flow through joint i is the gain of all that is behind it, less what sources give there without the joint,
-as `induced_flow` of the package says. Ties and contacts behind a joint are part of its flow.
+as `induced_flow` of the package says, and less what contacts feed in there as they slip. Ties behind a joint
+are part of its flow.
 """
 
 import re
@@ -23,7 +24,7 @@ from linkwise_runtime.structure import IMPOSED_MOTION
 
 from linkwise.analysis.contacts.ground import Standing
 from linkwise.analysis.induced_sources import AT_ONCE, InducedSources, Source, opened, timed
-from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.loads.placed import PlacedLoad, moving_joints
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.term_rows import NAMES, TermArrays, mirrored
@@ -118,10 +119,14 @@ class PowerShares:
                 own[at[0], g] = True
             elif quantity == "acc_load":
                 given[list(self.loads[at[0]].acts_on.joints), g] = True
+        contacts = np.zeros((n, 0 if self.robot.contacts is None else len(self.robot.ground.names)))
+        for c in range(contacts.shape[1]):
+            joint = self.robot.joint_of(self.robot.ground.contacts[c].frame)
+            contacts[list(moving_joints(self.robot.tree, joint)), c] = 1.0
         armatures = np.zeros_like(holders)
         armatures[turning, range(links, links + len(turning))] = True
         holders[:, links:] = inside[:, turning]
-        return Behind(holders, holders | armatures, given, given | own)
+        return Behind(holders, holders | armatures, given, given | own, contacts)
 
     def fill(
         self, out: Array, packed: TermArrays, standing: Standing | None, time: Array, motion: Motion
@@ -146,8 +151,11 @@ class PowerShares:
         q, qd, qdd = motion
         terms = self.sources.open_terms(packed, q, qd, qdd)
         forces = self.sources.forces(out, terms, q, qd, qdd)
+        for x, (quantity, at) in enumerate(self.sources.every):
+            if quantity == "acc_load":  # as it presses on its body, also where contacts bear it
+                forces[:, :, x] = -self.loads[at[0]].torque(opened(self.robot), time, q)
         try:
-            moved = self.sources.accelerations(terms, forces, rows, q, qd, qdd)
+            moved, reactions = self.sources.answers(terms, forces, rows, q, qd, qdd)
         except ValueError as error:
             raise LinkwiseError(f"{FLAG}: {timed(str(error), out[0], FLAG)}") from error
         power = np.einsum("sn,snx->sx", qd, forces)
@@ -159,10 +167,11 @@ class PowerShares:
         sums = [_error(gains, whole)]
         if self._has_flow:
             behind = self._behind
-            given = self._given(power @ self._merged[: power.shape[1]], time, q, qd)
-            through = behind.holders @ gains - behind.given * given
+            given = power @ self._merged[: power.shape[1]]
+            fed = behind.contacts @ self._fed(rows, reactions, qd) @ self._merged
+            through = behind.holders @ gains - behind.given * given[:, None] - fed
             flow, before = (
-                whole @ held.T.astype(float) - given[:, 0] @ other.T
+                whole @ held.T.astype(float) - given @ other.T - fed.sum(axis=2)
                 for held, other in ((behind.holders, behind.given), (behind.before, behind.given_before))
             )
             blocks.append(_flat(before[..., None], flow[..., None], through))
@@ -207,13 +216,14 @@ class PowerShares:
             whole += self._power_beside(q, qd)
         return whole
 
-    def _given(self, power: Array, time: Array, q: Array, qd: Array) -> Array:
-        """Return the power of each column of sources, (S, 1, G), loads as they press on their bodies."""
-        found = power.copy()
-        for g, (quantity, at) in enumerate(self.columns):
-            if quantity == "acc_load":
-                found[:, g] = -(self.loads[at[0]].torque(opened(self.robot), time, q) * qd).sum(axis=1)
-        return found[:, None]
+    def _fed(self, rows: Array | None, reactions: Array, qd: Array) -> Array:
+        """Return the power that contacts feed in as they slip, (S, contacts, X), by what they answer."""
+        ground = self.robot.contacts
+        if rows is None or ground is None:
+            return np.zeros((len(qd), 0, len(self.every)))
+        power = np.einsum("scn,sn->sc", rows, qd)[..., None] * reactions
+        each = range(len(ground.names))
+        return np.stack([power[:, ground.owners == c].sum(axis=1) for c in each], axis=1)
 
     def _power_beside(self, q: Array, qd: Array) -> Array:
         """Return R (S, N), the power that links of energies get otherwise than from joints."""
@@ -255,6 +265,8 @@ class Behind:
     given: Mask
     given_before: Mask
     """Columns, with those of the joint's own torque, spring and losses."""
+    contacts: Array
+    """Contacts that hold a frame behind the joint, (n, contacts): 1, else 0."""
 
 
 def _column(source: Source) -> Source:

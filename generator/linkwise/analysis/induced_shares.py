@@ -72,7 +72,7 @@ class InducedShares:
         terms = self.sources.open_terms(packed, q, qd, qdd)
         forces = self.sources.forces(out, terms, q, qd, qdd)
         try:
-            moved = self.sources.accelerations(terms, forces, rows, q, qd, qdd)
+            moved = self.sources.answers(terms, forces, rows, q, qd, qdd).accelerations
         except ValueError as error:
             raise LinkwiseError(f"--induced: {timed(str(error), out[0], '--induced')}") from error
         row, worst = self.first, Closure()

@@ -20,7 +20,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from linkwise_runtime.motion.induced_accelerations import Response, response_of
@@ -67,10 +67,10 @@ class InducedSources:
             found += [("acc_contact", (c,)) for c in range(len(self.robot.contacts.names))]
         return tuple(found)
 
-    def accelerations(
+    def answers(
         self, terms: TermArrays, forces: Array, rows: Array | None, q: Array, qd: Array, qdd: Array
-    ) -> Array:
-        """Return q̈_x (S, n, X) of forces F_x, then of `shares_beside`.
+    ) -> "SourceAnswers":
+        """Return the answers to forces F_x (S, n, X), then to `shares_beside`.
 
         terms: packed values of the open tree; rows: A (S, C, n) of contacts
 
@@ -79,13 +79,15 @@ class InducedSources:
         ground, model = self.robot.contacts, opened(self.robot)
         ties = None if self.robot.constrained is None else self.robot.constrained.constraints
         free: Response = response_of(model.backend, ties, q, qd, self._mass(terms.acceleration, q.shape[1]))
-        response = free if rows is None else StandingResponse(free, rows)
-        moved = [response.accelerations(forces)]
+        every = [free.accelerations(forces)]
         if ties is not None:
-            moved.append(response.of_velocities())
-        if isinstance(response, StandingResponse) and ground is not None:
-            moved.append(response.of_contacts(qdd, ground.owners, len(ground.names)))
-        return np.concatenate(cast("list[Array]", moved), axis=2)
+            every.append(free.of_velocities())
+        moved = np.concatenate(cast("list[Array]", every), axis=2)
+        if rows is None or ground is None:
+            return SourceAnswers(moved, np.zeros((len(q), 0, moved.shape[2])))
+        own = StandingResponse(free, rows).of_contacts(qdd, ground.owners, len(ground.names))
+        held = StandingResponse(free, rows).held(moved)
+        return SourceAnswers(*(np.concatenate(two, axis=2) for two in zip(held, own, strict=True)))
 
     def forces(self, out: Array, packed: TermArrays, q: Array, qd: Array, qdd: Array) -> Array:
         """Return F_x (S, n, X).
@@ -147,6 +149,15 @@ HELD_RANK = 1e-11
 """Eigenvalues of A M⁻¹ Aᵀ below this part of the largest are zero."""
 
 
+class SourceAnswers(NamedTuple):
+    """Answers of a robot to X sources."""
+
+    accelerations: Array
+    """q̈_x (S, n, X)."""
+    reactions: Array
+    """Forces λ_x of contacts that are on, (S, C, X); no row without contacts."""
+
+
 @dataclass(frozen=True)
 class StandingResponse:
     """Response of a robot to forces at S samples, while contacts hold frames of it.
@@ -158,7 +169,7 @@ class StandingResponse:
     is the acceleration due to a force while the held frames stay fixed. In a measured motion they are not
     quite fixed: K A q̈ is the acceleration due to the contacts themselves, as the held frames turn and slip,
     and with it all sources sum to q̈. Forces that contacts could carry move nothing, so that it does not
-    matter how contacts share them.
+    matter how contacts share them. The contacts answer a force with λ_x = −(A M⁻¹ Aᵀ)⁺ A M⁻¹ F_x.
     """
 
     free: Any
@@ -166,35 +177,29 @@ class StandingResponse:
     rows: Array
     """Contact rows A (S, C, n)."""
 
-    def accelerations(self, forces: Array) -> Array:
-        """Return the accelerations (S, n, X) due to columns of forces (S, n, X)."""
-        return self._kept(self.free.accelerations(forces))
+    def held(self, free: Array) -> SourceAnswers:
+        """Return the answers where contacts hold, for accelerations (S, n, X) without them."""
+        by_rows, inverse = self._by_rows
+        moved = self.rows @ free
+        return SourceAnswers(free - by_rows @ moved, -inverse @ moved)
 
-    def of_velocities(self) -> Array:
-        """Return the accelerations due to the velocity terms of ties, by cause (S, n, n)."""
-        return self._kept(self.free.of_velocities())
-
-    def of_contacts(self, qdd: Array, owners: Array, count: int) -> Array:
-        """Return the accelerations (S, n, contacts) due to each contact itself.
+    def of_contacts(self, qdd: Array, owners: Array, count: int) -> SourceAnswers:
+        """Return the answers (…, contacts) to each contact itself.
 
         owners: contact of each row; count: number of contacts
         """
         moved = np.einsum("scn,sn->sc", self.rows, qdd)
         each = np.zeros((*moved.shape, count))
         each[:, np.arange(len(owners)), owners] = moved
-        found: Array = self._by_rows @ each
-        return found
-
-    def _kept(self, accelerations: Array) -> Array:
-        kept: Array = accelerations - self._by_rows @ (self.rows @ accelerations)
-        return kept
+        by_rows, inverse = self._by_rows
+        return SourceAnswers(by_rows @ each, inverse @ each)
 
     @cached_property
-    def _by_rows(self) -> Array:
-        """Matrix K (S, n, C)."""
+    def _by_rows(self) -> tuple[Array, Array]:
+        """Matrices K (S, n, C) and (A M⁻¹ Aᵀ)⁺ (S, C, C)."""
         answered = self.free.accelerations(np.swapaxes(self.rows, 1, 2))
-        found: Array = answered @ np.linalg.pinv(self.rows @ answered, rcond=HELD_RANK, hermitian=True)
-        return found
+        inverse: Array = np.linalg.pinv(self.rows @ answered, rcond=HELD_RANK, hermitian=True)
+        return answered @ inverse, inverse
 
 
 def timed(text: str, time: Array, flag: str) -> str:

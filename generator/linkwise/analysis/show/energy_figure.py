@@ -47,7 +47,9 @@ GAP, TALLEST, TIP = 0.85, 0.95, 0.2
 """Heights of the room for arrows between lanes, which are 1 high, of the largest energy, and of a tip."""
 WIDEST = 0.9
 """Width of the largest arrow in its span."""
-PASSED, AREA, EDGE = "#B4BAC4", "#F3E3C3", "#8C6D31"
+PASSED, REST, AREA, EDGE = "#B4BAC4", "#DDE1E6", "#F3E3C3", "#8C6D31"
+ROUNDED = 1e-3
+"""Part of the largest work below which the work of loads is not told."""
 NOTHING = 1e-9
 """Part of the largest work below which a work is only rounding."""
 
@@ -73,9 +75,14 @@ class Lanes:
         return cls(every, tuple(largest_few(sizes, MOST)[0]), names, joints)
 
     @property
+    def is_jointed(self) -> bool:
+        """True if flows between segments are known."""
+        return any(self.joints)
+
+    @property
     def bases(self) -> list[float]:
         """Heights of the lanes' ground lines."""
-        return [-lane * (1.0 + GAP) for lane in range(len(self.shown))]
+        return [-lane * (1.0 + (GAP if self.is_jointed else 0.1)) for lane in range(len(self.shown))]
 
     def carrier(self, segment: int) -> str:
         """Return the name of what carries a segment."""
@@ -83,8 +90,24 @@ class Lanes:
         return "the ground" if carrier is None else self.names[carrier]
 
     def colour(self, segment: int) -> str:
-        """Return the colour of a segment's joints."""
-        return tone([at for at, one in enumerate(self.every) if one.joints].index(segment))
+        """Return the colour of a shown segment's joints."""
+        return tone(self.shown.index(segment))
+
+    def causes(self, work: SegmentWork) -> list[tuple[str, str, Array]]:
+        """Return label, colour and work of each cause, torques of segments that are not shown as one."""
+        found = []
+        hidden = [at for at in work.torques if at not in self.shown]
+        for at in self.shown:
+            if at in work.torques:
+                found.append((f"torque of {self.joints[at]}", self.colour(at), work.torques[at]))
+        if hidden:
+            rest = np.sum([work.torques[at] for at in hidden], axis=0)
+            found.append((f"torques of {len(hidden)} others", REST, rest))
+        own = {"gravity": GRAVITY, HANDED_ON: PASSED, LOST: BROWN}
+        for number, (label, one) in enumerate(work.others.items(), len(found)):
+            found.append((label, own.get(label, tone(number)), one))
+        most = max(float(abs(one).max(initial=0.0)) for *_, one in found)
+        return [cause for cause in found if float(abs(cause[2]).max(initial=0.0)) > NOTHING * most]
 
 
 def energy(result: AnalysisResult, phase: int) -> "Figure":
@@ -94,8 +117,8 @@ def energy(result: AnalysisResult, phase: int) -> "Figure":
     """
     every = segments_of(result.robot)
     work = work_of_segments(result, every, phase)
-    lanes = Lanes.of(result, every, np.sum([abs(one) for one in work.by_cause.values()], axis=0))
-    figure = new_figure(10.4, 2.3 + 1.3 * len(lanes.shown))
+    lanes = Lanes.of(result, every, work.size)
+    figure = new_figure(10.4, 2.3 + (1.3 if lanes.is_jointed else 0.8) * len(lanes.shown))
     grid = figure.add_gridspec(2, 2, height_ratios=(len(lanes.shown), 0.36), width_ratios=(2.4, 1))
     left = figure.add_subplot(grid[0, 0])
     right = figure.add_subplot(grid[0, 1], sharey=left)
@@ -107,9 +130,11 @@ def energy(result: AnalysisResult, phase: int) -> "Figure":
     if phase:
         _shade(left, result, phase)
     _bars(right, work, lanes)
+    flowing = ", and the power that flows between them" if lanes.is_jointed else ""
+    left.set_title(f"Energy of each segment{flowing}")
+    right.set_title("Work on each segment")
     span = drawn(result.phases[phase - 1].name, 34) if phase else "the whole movement"
-    left.set_title("Energy of each segment, and the power that flows between them")
-    right.set_title(f"Work on each segment: {span}")
+    right.set_xlabel(f"J, over {span}")
     _legend(figure.add_subplot(grid[1, :]), right, bool(widest))
     write_title(figure, result, "How energy flows")
     write_note(figure, *_notes(lanes, flows, widest), foot(result))
@@ -137,6 +162,8 @@ def _energies(panel: Any, result: AnalysisResult, lanes: Lanes) -> None:
         panel.plot(time, base + scale * values, color=EDGE, linewidth=1.3, zorder=2)
         panel.plot(time[[0, -1]], [base, base], color=INK, linewidth=0.7, zorder=2)
         top = int(values.argmax())
+        if not values[top] > NOTHING * above.max():
+            continue
         x, y = float(time[top]), base + scale * float(values[top])
         panel.plot(x, y, "o", color=EDGE, markersize=4, zorder=5)
         late = x > time[0] + 0.75 * (time[-1] - time[0])
@@ -201,14 +228,14 @@ def _name_lanes(panel: Any, lanes: Lanes) -> None:
     names = [lanes.names[at] for at in lanes.shown]
     panel.set_yticks([base + 0.3 for base in lanes.bases], names, fontweight="bold", fontsize=10)
     panel.tick_params(axis="y", length=0)
-    has_joints = any(lanes.every[at].joints for at in lanes.shown)
-    panel.set_ylim(lanes.bases[-1] - 0.06, lanes.bases[0] + 1.0 + (GAP + 0.05) * has_joints)
+    panel.set_ylim(lanes.bases[-1] - 0.06, lanes.bases[0] + 1.0 + (GAP + 0.05) * lanes.is_jointed)
     panel.spines["left"].set_visible(False)
     panel.grid(False)
-    for base, at in zip(lanes.bases, lanes.shown, strict=True):
+    for base, above, at in zip(lanes.bases, (None, *lanes.shown), lanes.shown, strict=False):
         if lanes.every[at].joints:
+            aside = lanes.every[at].carrier != above
             panel.annotate(
-                f"through {lanes.joints[at]}",
+                f"through {lanes.joints[at]}" + f"\nfrom {lanes.carrier(at)}" * aside,
                 (0, base + 1.0 + GAP / 2),
                 (-4, 0),
                 xycoords=panel.get_yaxis_transform(),
@@ -235,13 +262,10 @@ def _shade(panel: Any, result: AnalysisResult, phase: int) -> None:
 def _bars(panel: Any, work: SegmentWork, lanes: Lanes) -> None:
     """Draw the work of each cause on each segment, stacked from zero outwards, and a mark at the sum."""
     shown = list(lanes.shown)
-    most = max(float(abs(one).max(initial=0.0)) for one in work.by_cause.values())
+    most = float(work.size.max(initial=0.0))
     begun = np.zeros((2, len(shown)))
     middles = np.array(lanes.bases) + 0.3
-    for number, (label, every) in enumerate(work.by_cause.items()):
-        if not float(abs(every).max(initial=0.0)) > NOTHING * most:
-            continue
-        fill = {"gravity": GRAVITY, HANDED_ON: PASSED, LOST: BROWN}.get(label, tone(number))
+    for label, fill, every in lanes.causes(work):
         for side in (0, 1):
             part = np.maximum(every[shown], 0.0) if side == 0 else np.minimum(every[shown], 0.0)
             name = drawn(label, 40) if side == 0 else None
@@ -255,7 +279,6 @@ def _bars(panel: Any, work: SegmentWork, lanes: Lanes) -> None:
     panel.grid(axis="y", visible=False)
     panel.tick_params(axis="y", length=0, labelleft=False)
     panel.spines["left"].set_visible(False)
-    panel.set_xlabel("J")
     for base, at in zip(lanes.bases, shown, strict=True):
         if lanes.every[at].joints:
             panel.annotate(
@@ -276,8 +299,12 @@ def _passed(work: SegmentWork, lanes: Lanes, at: int, most: float) -> str:
     if abs(out) > NOTHING * most:
         way = "from" if out > 0.0 else "to"
         told.append(f"{abs(out):.3g} J {way} {lanes.carrier(at)}")
-    way = "given" if own >= 0.0 else "taken"
-    told.append(f"{abs(own):.3g} J {way} by {lanes.joints[at]}")
+    if abs(own) > NOTHING * most:
+        told.append(f"{abs(own):.3g} J {'given' if own > 0.0 else 'taken'} by {lanes.joints[at]}")
+    behind = sum(work.out[k] for k, one in enumerate(lanes.every) if one.carrier == at)
+    outside = float(work.whole[at] - work.into[at] + behind)
+    if abs(outside) > ROUNDED * most:
+        told.append(f"{abs(outside):.3g} J {'from' if outside > 0.0 else 'to'} loads, ties or contacts")
     return "\n".join(told)
 
 

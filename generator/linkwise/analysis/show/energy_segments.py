@@ -95,16 +95,24 @@ def segment_flows(result: AnalysisResult, segments: tuple[Segment, ...], spans: 
 class SegmentWork:
     """Net work on segments, (segments,) in J each."""
 
-    by_cause: dict[str, Array]
-    """Work by what a cause is called; it sums to what the energies gained."""
+    torques: dict[int, Array]
+    """Work of the torques of each segment's joints, by its index."""
+    others: dict[str, Array]
+    """Work of all else, by what it is called; with that of torques it is what the energies gained."""
     out: Array
     """Work that came from the carrier, and what with the joints' own came into the segment."""
     into: Array
 
     @property
+    def size(self) -> Array:
+        """Magnitudes of all work, added up."""
+        size: Array = np.sum(np.abs([*self.torques.values(), *self.others.values()]), axis=0)
+        return size
+
+    @property
     def whole(self) -> Array:
         """Gain of the segments' energies."""
-        whole: Array = np.sum(list(self.by_cause.values()), axis=0)
+        whole: Array = np.sum([*self.torques.values(), *self.others.values()], axis=0)
         return whole
 
 
@@ -116,30 +124,28 @@ def work_of_segments(result: AnalysisResult, segments: tuple[Segment, ...], phas
     for at, one in enumerate(segments):
         if one.joints:
             out[at], into[at] = net["flow_before"][one.joints[0]], net["flow"][one.joints[-1]]
-    causes = {
-        label: np.array([work[list(one.links)].sum() for one in segments])
-        for label, work in _causes(result, segments, net).items()
+
+    def of_segments(work: Array) -> Array:
+        return np.array([work[list(one.links)].sum() for one in segments])
+
+    torques = {
+        at: of_segments(net["gain_tau"][:, list(one.joints)].sum(axis=1))
+        for at, one in enumerate(segments)
+        if one.joints
     }
-    return SegmentWork(causes, out, into)
+    others = {label: of_segments(work) for label, work in _others(result, net, bool(torques)).items()}
+    return SegmentWork(torques, others, out, into)
 
 
-def _causes(
-    result: AnalysisResult, segments: tuple[Segment, ...], net: Mapping[str, Array]
-) -> dict[str, Array]:
-    """Return the work of each cause on the holders of energy: torques by segment, all else by kind."""
+def _others(result: AnalysisResult, net: Mapping[str, Array], is_jointed: bool) -> dict[str, Array]:
+    """Return the work of causes on the holders of energy, by kind: torques only where no segment has any."""
     nothing = np.zeros(len(result.robot.holders))
 
     def of(*names: str) -> Array:
         there = (net[name].reshape(len(nothing), -1).sum(axis=1) for name in names if name in net)
         return sum(there, nothing)
 
-    found = {
-        f"torque of {joints_label(result.robot, one)}": net["gain_tau"][:, list(one.joints)].sum(axis=1)
-        for one in segments
-        if one.joints
-    }
-    if not found:
-        found["torques"] = of("gain_tau")
+    found = {} if is_jointed else {"torques": of("gain_tau")}
     if result.robot.is_written:
         named = enumerate(result.robot.share_names)
         found |= {name: net["gain_share"][:, :, m].sum(axis=1) for m, name in named}
