@@ -51,7 +51,7 @@ def test_the_flow_into_the_last_link_is_its_joints_force_and_torque_by_hand(swin
     speed = LENGTH * (across * rate[..., None])[:, :2].sum(axis=1)
     turned = across * change[..., None] - along * rate[..., None] ** 2
     mass_centre = LENGTH * turned[:, :2].sum(axis=1) + CENTRE * turned[:, 2]
-    force = MASS * (mass_centre + [0.0, G])
+    force = MASS * (mass_centre + np.array([0.0, G]))
     arm = CENTRE * along[:, 2]
     torque = INERTIA * change[:, 2] + arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]
     by_force = (force * speed).sum(axis=1)
