@@ -21,6 +21,7 @@ class Option:
     """Declaration of a field's option, beside type and default.
 
     flag: spelling of the flag, by default that of the field's name
+    key: key that is not the flag's, as `from` cannot be one
     read: makes the field's value of the texts that were written
     needs: flag, or flag and value, without which this option has no meaning; nothing is its default then
     is_file: whether texts of the field are paths of files
@@ -34,6 +35,11 @@ class Option:
     needs: str = ""
     is_file: bool = False
     is_key: bool = True
+    key: str = ""
+
+    def key_of(self, name: str) -> str:
+        """Return the key of the field of this name."""
+        return self.key or _key(self.flag or name)
 
 
 class Written(NamedTuple):
@@ -43,6 +49,11 @@ class Written(NamedTuple):
     kind: Any
     default: Any
     option: Option
+
+    @property
+    def flag(self) -> str:
+        """Spelling of the flag."""
+        return self.option.flag or flag_of(self.key)
 
 
 def option(default: T, help: str, flag: str = "", **more: Any) -> T:
@@ -71,7 +82,7 @@ def written(kind: type, is_optional: bool = False) -> Iterator[Written]:
                 hint, default = tuple[str, ...], ()
             elif declared.needs or (is_optional and default is MISSING):
                 hint, default = hint | None, None
-            yield Written(_key(declared.flag or own.name), hint, default, declared)
+            yield Written(declared.key_of(own.name), hint, default, declared)
 
 
 def chosen(kind: type[T], given: Mapping[str, Any]) -> T:
@@ -86,7 +97,7 @@ def chosen(kind: type[T], given: Mapping[str, Any]) -> T:
         found = given.get(_key(flag))
         is_met = not flag or (found == value if value else found is not None)
         if not is_met and given.get(one.key) is not None:
-            several = " and ".join(flag_of(each.key) for each in options if each.option.needs == needed)
+            several = " and ".join(each.flag for each in options if each.option.needs == needed)
             raise LinkwiseError(f"{several} go with {needed}; add it")
     return _chosen(kind, given)
 
@@ -99,7 +110,7 @@ def _chosen(kind: type[T], given: Mapping[str, Any]) -> T:
             if all(given.get(one.key) is not None for one in needed):
                 values[own.name] = _chosen(inner, given)
         elif (declared := own.metadata.get(OPTION)) is not None:
-            value = given.get(_key(declared.flag or own.name))
+            value = given.get(declared.key_of(own.name))
             if value not in (None, (), []):
                 values[own.name] = _value(declared, value)
     return kind(**values)

@@ -188,12 +188,12 @@ REFUSED = {
     "short": (
         lambda table: table[:300],
         FORCE,
-        r"plate.csv: row 301, time column: it ends at 0.299 s, the motion at 0.59 s; cut the motion's log",
+        r"plate.csv: row 301, time column: it ends at 0.299 s, the motion at 0.59 s; analyse less of the motion",
     ),
     "late": (
         lambda table: table[50:],
         FORCE,
-        r"plate.csv: row 2, time column: it begins at 0.05 s, the motion at 0 s; cut the motion's log there",
+        r"plate.csv: row 2, time column: it begins at 0.05 s, the motion at 0 s; analyse less of the motion, by --from",
     ),
     "body": (
         lambda table: table,

@@ -36,6 +36,8 @@ ANALYSIS: dict[str, Any] = {
     "qpos": "mujoco",
     "edges": "trim",
     "convention": "gradient",
+    "from_time": 0.5,
+    "to_time": 1.5,
     "phase": ("stance=push",),
     "power_terms": True,
     "payload": ("hand=2",),
@@ -54,6 +56,8 @@ ANALYSIS: dict[str, Any] = {
     "trace_windows": 0.2,
     "trace_restart": ("phases",),
 }
+FLAGS = {"from_time": "--from", "to_time": "--to"}
+"""Flags that are words of Python, so that keys and fields have other names."""
 ROBOT = {
     "lock": ("elbow=0.5",),
     "base": "floating",
@@ -78,7 +82,7 @@ SMOOTHED = Lowpass(7.0, 4, "even")
 READ = Reading("deg", "t", (("a", "elbow"), ("b", "wrist")), True, 125.0, 0.25, "/arm")
 WRITTEN = AnalysisChoices(
     READ,
-    Processing("savitzky-golay", 9, 3, SMOOTHED, "trim", "gradient"),
+    Processing("savitzky-golay", 9, 3, SMOOTHED, "trim", "gradient", 0.5, 1.5),
     Outputs(
         phases=(Phase("stance", "", "push", None),),
         power_terms=True,
@@ -119,7 +123,7 @@ def called(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
         for name, values in chosen.items():
             if values is None:
                 continue
-            flag = f"--{name.replace('_', '-')}"
+            flag = FLAGS.get(name, f"--{name.replace('_', '-')}")
             words += [flag] if values is True else [flag[:2] + "no-" + flag[2:]] * (values is False)
             if not isinstance(values, bool):
                 several = values if isinstance(values, tuple) else (values,)

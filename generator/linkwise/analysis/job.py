@@ -198,7 +198,8 @@ class Job:
         values: all samples, (rows, S)
         """
         robot = self.decomposer.robot
-        poles = pole_warnings(robot.tree, robot.joints, self.samples)
+        analysed = self.samples.within(*span_of(self.samples, self.asked.processing))
+        poles = pole_warnings(robot.tree, robot.joints, analysed)
         warnings = (*self.samples.warnings, *self._twice_borne(), *poles, *self._never_on(done))
         return Analysis(
             **vars(done),
@@ -261,21 +262,21 @@ def prepared(
     switches = (*switch_columns(asked.contacts, opened), *phase_columns(outputs.phases, opened))
     samples, closed = _samples(opened, robot, reading, switches, progress, buffer)
     with within(str(log)):
-        span_of(samples, processing)
+        start, stop = span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
         slips = tuple(slip_warnings(samples, robot.constrained, processing))
     samples = replace(samples, warnings=(*samples.warnings, *slips))
-    borne = placed_loads(asked.loads, robot, samples.time, reading.ignore_extra, progress, buffer)
-    times = contact_times(asked.contacts, opened, robot, reading, samples.time, progress, buffer)
+    motion = samples.time[start:stop]
+    borne = placed_loads(asked.loads, robot, motion, reading.ignore_extra, progress, buffer)
+    times = contact_times(asked.contacts, opened, robot, reading, motion, progress, buffer)
     every = (*borne, *(() if times is None else times.loads))
     phases = placed_phases(outputs.phases, opened, robot, every, reading, progress)
     traced = None
     if outputs.trace:
-        span = slice(*span_of(samples, processing))
-        time, q = samples.time[span], samples.q[span]
-        restarts = restart_times(outputs.trace_restart, phases, robot, times, time, q)
-        made = AskedTrace.of(outputs.trace, outputs.trace_windows, restarts, robot, time)
+        q = samples.q[start:stop]
+        restarts = restart_times(outputs.trace_restart, phases, robot, times, motion, q)
+        made = AskedTrace.of(outputs.trace, outputs.trace_windows, restarts, robot, motion)
         traced = TracedRows.of(made, robot, borne, samples)
     told = ToldBeside(outputs.power_terms, points, bearings, outputs.induced_power, traced)
     decomposer = Decomposer.of(robot, processing.convention, borne, times, told)

@@ -238,6 +238,8 @@ class AnalysisResult(WholeMovement):
             else "no filter"
         )
         parts += [f"{made.edges} edges", f"{made.convention} convention"]
+        ends = (("from", made.start), ("to", made.stop))
+        parts += [f"{word} {time:g} s" for word, time in ends if time is not None]
         for source in dict.fromkeys(borne.source for borne in self.loads):
             names = listed([borne.name for borne in self.loads if borne.source == source])
             parts.append(printable(f"loads {names} of {source}" if source else f"loads {names}"))

@@ -4,7 +4,7 @@ Columns of joints that follow others by the robot's file, or are held, are left 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -50,6 +50,12 @@ class Samples:
     """Number of the first sample's row in the log; None where they were resampled."""
     inputs: Array = field(default_factory=lambda: np.zeros((0, 0)))
     """Inputs of written energies; not filtered."""
+
+    def within(self, start: int, stop: int) -> "Samples":
+        """Return the samples start..stop alone."""
+        some = slice(start, stop)
+        first = None if self.first_row is None else self.first_row + start
+        return replace(self, time=self.time[some], q=self.q[some], inputs=self.inputs[some], first_row=first)
 
 
 CLOSE = {"rad": 0.01, "m": 0.001}

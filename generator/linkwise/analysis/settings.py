@@ -113,7 +113,8 @@ class Processing:
     the ends this equals the paper's filter after the derivative. `window` (in samples) and `degree` are
     Savitzky–Golay's. `edges` says whether samples near the ends get one-sided formulas or are cut off.
     `convention` "closing" makes velocity terms sum to the torque; "gradient" is the paper's Eq. 1, twice
-    that. Raises LinkwiseError for impossible values.
+    that. `start` and `stop`, in s, are the range of time that is analysed; all of the log is filtered, and
+    derivatives at its ends see what is beyond. Raises LinkwiseError for impossible values.
     """
 
     derivative: Derivative = option("five-point", "How velocities and accelerations are made")
@@ -128,8 +129,20 @@ class Processing:
     convention: Convention = option(
         "closing", "Velocity terms: closing sums to the torque, gradient is Eq. 1"
     )
+    start: float | None = option(
+        None,
+        "Time in s from which the log is analysed, once all of it is filtered",
+        "--from",
+        key="from_time",
+    )
+    stop: float | None = option(None, "Time in s up to which it is analysed", "--to", key="to_time")
 
     def __post_init__(self) -> None:
+        for flag, time in (("--from", self.start), ("--to", self.stop)):
+            if time is not None and not math.isfinite(time):
+                raise LinkwiseError(f"{flag} {time:g}: give a time in s")
+        if self.start is not None and self.stop is not None and self.start >= self.stop:
+            raise LinkwiseError(f"--from {self.start:g} is not before --to {self.stop:g}")
         if self.derivative == "savitzky-golay":
             if self.degree < 2:
                 raise LinkwiseError(f"--degree {self.degree}: an acceleration needs 2 or more")

@@ -7,6 +7,7 @@ import numpy as np
 from linkwise_runtime.motion.tracer import TraceState
 
 from linkwise.analysis.disk_rows import let_go
+from linkwise.analysis.even_time import TOLERANCE
 from linkwise.analysis.filtering import derivatives
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.phases import PlacedPhase
@@ -31,11 +32,14 @@ INNER, LEAST = 4096, 1024
 BLOCK_BYTES = 48 << 20
 """Approximate size in bytes of a block handed on: some three of them are in memory at any time."""
 
+LEAST_SAMPLES = 2
+"""Fewest samples of a range of time: one has no duration."""
+
 
 def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
     """Return the first sample analysed and the one after the last.
 
-    Raises LinkwiseError if there are too few samples.
+    Raises LinkwiseError if there are too few samples, of the log or in the range of time.
     """
     count, needed = len(samples.time), processing.span
     cut = needed // 2 if processing.edges == "trim" else 0
@@ -44,7 +48,20 @@ def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
             f"{count} samples, but the {processing.derivative} formula"
             f"{' with trimmed edges' if cut else ''} needs {needed + 2 * cut} or more"
         )
-    return cut, count - cut
+    start, stop = cut, count - cut
+    slack = TOLERANCE / samples.rate  # times are rounded where they are written
+    if processing.start is not None:
+        start = max(start, int(np.searchsorted(samples.time, processing.start - slack)))
+    if processing.stop is not None:
+        stop = min(stop, int(np.searchsorted(samples.time, processing.stop + slack, side="right")))
+    if stop - start < LEAST_SAMPLES:
+        given = (("--from", processing.start), ("--to", processing.stop))
+        flags = " ".join(f"{flag} {time:g}" for flag, time in given if time is not None)
+        raise LinkwiseError(
+            f"{flags}: {max(0, stop - start)} samples are there, and {LEAST_SAMPLES} are needed; the log runs"
+            f" from {samples.time[0]:.6g} to {samples.time[-1]:.6g} s"
+        )
+    return start, stop
 
 
 class MovementSums:

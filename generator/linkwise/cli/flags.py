@@ -12,7 +12,7 @@ from typing import Annotated, Any, cast, get_origin
 import typer
 
 from linkwise.cli import tell
-from linkwise.option import chosen, flag_of, written
+from linkwise.option import chosen, written
 from linkwise.pipeline import is_program
 from linkwise.robot import DESCRIPTIONS
 
@@ -71,7 +71,7 @@ def _flags(kind: Any, usual: Mapping[str, Any]) -> Iterator[Parameter]:
     """Yield the parameters of which typer makes the flags of a dataclass."""
     panel = getattr(kind, "PANEL", None)
     for one in written(kind):
-        flag, hint, default, own = flag_of(one.key), one.kind, usual.get(one.key, one.default), one.option
+        flag, hint, default, own = one.flag, one.kind, usual.get(one.key, one.default), one.option
         if get_origin(hint) is tuple:
             hint, default = list[Path] | None if own.is_file else list[str] | None, None
         elif own.is_file:

@@ -98,7 +98,9 @@ def read_torque_log(
         start, stop = span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(q, samples.rate, processing.lowpass)
-            start, stop = _settled(start, stop, samples.rate, processing.lowpass)
+            whole = span_of(samples, replace(processing, start=None, stop=None))
+            first, last = _settled(*whole, samples.rate, processing.lowpass)
+            start, stop = max(start, first), min(stop, last)
         _refuse_still(q[start:stop], robot, measured)
     told = samples.warnings, samples.ignored
     return TorqueLog(path.name, samples.rate, q, noise, measured, torque, start, stop, *told, closed)

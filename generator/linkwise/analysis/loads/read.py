@@ -191,6 +191,6 @@ def _check_time(time: Array, motion: Array, first_row: int) -> None:
     ):
         if late > step:
             raise LinkwiseError(
-                f"row {row}, time column: it {verb} at {own:.6g} s, the motion at {other:.6g} s; cut the"
-                " motion's log there"
+                f"row {row}, time column: it {verb} at {own:.6g} s, the motion at {other:.6g} s; analyse less"
+                " of the motion, by --from and --to"
             )
