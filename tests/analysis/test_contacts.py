@@ -66,6 +66,32 @@ def test_a_foot_that_touches_at_a_point_leaves_a_moment_to_the_base(folder: Path
     assert np.abs(result.torque[:, 2]).max() > 1.0
 
 
+@pytest.mark.parametrize("kind", ["pressed", "pressed-point"])
+def test_a_pressed_foot_is_held_where_its_measured_load_acts(kind: str, folder: Path) -> None:
+    time = np.arange(80) / 100
+    place = np.stack([0.3 + 0.5 * time, -0.1 + 0.2 * time, 0.04 + 0.0 * time], 1)
+    plate = Load("plate", "foot", (3.0, 700.0, 0.0), point=place, time=time, point_in="world")
+    contacts = Contacts((Contact("foot", kind, (0.1, 0.0, 0.0), name="sole"),), loads=(plate,))
+    result = analyze(folder / "moving.csv", folder / "leg", contacts=contacts, induced=["foot"])
+    rows = ["moment_up"] * (kind == "pressed") + ["force_x", "force_y", "force_z"]
+    assert [row for row in result.rows.axes["constraint"].names] == [f"sole {row}" for row in rows]
+    kinematics = result.robot.model.kinematics
+    at = np.linalg.solve(kinematics.pose(result.q, "foot"), np.insert(place, 3, 1.0, axis=1)[..., None])
+    jacobian = np.stack([kinematics.jacobian(q, "foot", p[:3, 0]) for q, p in zip(result.q, at, strict=True)])
+    force = np.stack([result[f"force/sole force_{axis}"] for axis in "xyz"], 1)
+    free = analyze(folder / "moving.csv", folder / "leg")
+    left = free.torque - np.einsum("srn,sr->sn", jacobian[:, 3:], force)
+    assert np.abs(result.torque - left).max() < 1e-9 * np.abs(free.torque).max()
+    moment = result.contact_wrench[:, 0, :3]
+    arm = place - kinematics.pose(result.q, "foot")[:, :3] @ [0.1, 0.0, 0.0, 1.0]
+    assert np.abs(moment - np.cross(arm, force)).max() < 1e-9 * np.abs(free.torque).max(), "no moment there"
+
+
+def test_a_pressed_foot_needs_a_load_that_presses(folder: Path) -> None:
+    with pytest.raises(LinkwiseError, match="'sole' is pressed, and 0 loads are measured on its body"):
+        analyze(folder / "moving.csv", folder / "leg", contacts=[FOOT._replace(kind="pressed")])
+
+
 def test_the_ground_bears_of_velocities_the_same_share_in_the_gradient_convention(folder: Path) -> None:
     closing, gradient = (
         analyze(folder / "moving.csv", folder / "leg", contacts=[FOOT], processing=Processing(convention=how))

@@ -193,7 +193,7 @@ REFUSED = {
     "late": (
         lambda table: table[50:],
         FORCE,
-        r"plate.csv: row 2, time column: it begins at 0.05 s, the motion at 0 s; analyse less of the motion, by --from",
+        r"plate.csv: row 2, time column: it begins at 0.05 s, the motion at 0 s; analyse less of the motion",
     ),
     "body": (
         lambda table: table,

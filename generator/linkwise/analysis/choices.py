@@ -7,6 +7,7 @@ from pathlib import Path
 from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.contacts import Contacts, WhileColumn
+from linkwise.analysis.contacts.pressed import PRESSED
 from linkwise.analysis.job import Outputs, Request
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.opened_robot import OpenedRobot, named_body
@@ -48,7 +49,8 @@ class AnalysisChoices:
     contact: tuple[str, ...] = option(
         (),
         "Frame that the ground holds, at a point in its axes, m; KIND is held, point, hinged,AX,AY,AZ"
-        " about an axis, or rolling,RADIUS; NAME:FRAME=… names it; may be repeated",
+        " about an axis, rolling,RADIUS, or pressed or pressed-point where its measured load acts;"
+        " NAME:FRAME=… names it; may be repeated",
         metavar="FRAME=KIND@X,Y,Z",
     )
     contact_while: tuple[str, ...] = option(
@@ -136,7 +138,13 @@ def constant_loads(given: Sequence[str], robot: OpenedRobot) -> tuple[Load, ...]
     return tuple(found)
 
 
-NUMBERS = {"held": (), "point": (), "hinged": ("AX", "AY", "AZ"), "rolling": ("RADIUS",)}
+NUMBERS = {
+    "held": (),
+    "point": (),
+    "hinged": ("AX", "AY", "AZ"),
+    "rolling": ("RADIUS",),
+    **dict.fromkeys(PRESSED, ()),
+}
 """Names of the numbers that follow each kind of contact."""
 
 

@@ -265,12 +265,13 @@ class AnalysisResult(WholeMovement):
 
         Moments are in N·m, forces in N.
         """
-        ground = self.robot.contacts
-        if ground is None:
+        ground, times = self.robot.contacts, self.times
+        if ground is None or times is None:
             return np.zeros((len(self.time), 0, 6))
-        forces = self.constraint_force[:, self.robot.contact_rows]
+        model, q, forces = self.robot.model, self.q, self.constraint_force[:, self.robot.contact_rows]
+        press = times.press(model, self.time, q)
         each = range(len(ground.names))
-        return np.stack([ground.wrench(c, self.robot.model, self.q, forces) for c in each], axis=1)
+        return np.stack([ground.wrench(c, model, q, forces, press[:, c]) for c in each], axis=1)
 
     def dense(self, quantity: str) -> Array:
         """Return a quantity (S, …) over its axes, zero where it has no row."""

@@ -163,7 +163,8 @@ def stream(
                     own[:] = out[:, extended.own]
                 if not sums.add(own, closure):
                     raise _overflow(samples, decomposer, own, at)
-            sums.closure |= against_recursion(decomposer.robot, decomposer.loads, rows, block)
+            loads, times = decomposer.loads, decomposer.times
+            sums.closure |= against_recursion(decomposer.robot, loads, times, rows, block)
             sums.closure.check()
             if pending is not None:
                 pending.result()

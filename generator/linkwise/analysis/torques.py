@@ -9,7 +9,8 @@ from linkwise_runtime.motion.tracer import TraceState
 
 from linkwise.analysis.borne_joints import BorneJoint, ReactionShares
 from linkwise.analysis.closed_motion import reason_of
-from linkwise.analysis.contacts.ground import ContactTerms, Standing
+from linkwise.analysis.contacts.ground import Standing
+from linkwise.analysis.contacts.terms import ContactTerms
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.induced_power import PowerShares
@@ -222,7 +223,8 @@ class Decomposer:
                 " do not tell all that contacts bear, nor the log how the base turns; cut the log there, or"
                 " describe the base by turns that stay apart"
             )
-        return ground.standing(q, self.times.shares(model, time, q))
+        times = self.times
+        return ground.standing(model, q, times.shares(model, time, q), times.press(model, time, q))
 
     def _add_passive(self, out: Array, standing: Standing | None, q: Array, qd: Array, qdd: Array) -> None:
         """Fill the passive torques of the joints, and add them to the joint torques."""

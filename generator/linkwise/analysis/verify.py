@@ -6,9 +6,10 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
-from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
+from linkwise_runtime.rule.joint_tree import TreeFrame
 
 from linkwise.analysis.contacts.ground import GroundContacts
+from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_rows import ResultRows
@@ -121,7 +122,11 @@ def worst_of(pairs: list[tuple[float, float]]) -> tuple[float, float]:
 
 
 def against_recursion(
-    robot: OpenedRobot, loads: Sequence[PlacedLoad], rows: ResultRows, block: Array
+    robot: OpenedRobot,
+    loads: Sequence[PlacedLoad],
+    times: ContactTimes | None,
+    rows: ResultRows,
+    block: Array,
 ) -> Closure:
     """Return the errors of τ_ij, P_ij, τ_ie of some samples of a block (rows, S) against Newton–Euler.
 
@@ -137,7 +142,8 @@ def against_recursion(
     partial = robot.recursion.partial_torque(q, qd, qdd)
     asked = [load_torque(robot.recursion, borne, block[0], q) for borne in loads]
     every = np.concatenate([partial, *(torque[:, :, None] for torque in asked)], axis=2)
-    free, left = _borne(robot, robot.recursion, every, q, rows.dense("contact", block))
+    press = None if times is None else times.press(robot.model, block[0], q)
+    free, left = _borne(robot, robot.recursion, every, q, rows.dense("contact", block), press)
     ours = np.concatenate([rows.dense(name, block) for name in ("tau_link", "tau_load")], axis=2)
     apart, watts = [(0.0, 0.0)], 0.0
     for unit in dict.fromkeys(robot.units):
@@ -164,11 +170,16 @@ def against_recursion(
 
 
 def _borne(
-    robot: OpenedRobot, recursion: NewtonEuler, torque: Array, q: Array, shares: Array
+    robot: OpenedRobot,
+    recursion: NewtonEuler,
+    torque: Array,
+    q: Array,
+    shares: Array,
+    press: Array | None,
 ) -> tuple[Array, Array]:
     """Return what joints carry of torques (S, n, X) of the open tree: without contacts, and with them.
 
-    shares: those of the contacts, (S, contacts)
+    shares: those of the contacts, (S, contacts); press: where loads press on these, (S, contacts, 3)
     """
     tree, mapped = robot.package.manifest.tree, None
     if robot.constrained is not None and tree is not None:
@@ -176,9 +187,14 @@ def _borne(
         projected = np.einsum("snm,snj->smj", mapped, torque)
         torque = np.zeros_like(torque)
         torque[:, list(robot.driven)] = projected
-    if robot.contacts is None or tree is None:
+    if robot.contacts is None or tree is None or press is None:
         return torque, torque
-    return torque, _left(recursion, tree, robot.contacts, torque, q, shares, mapped)
+    frames = {frame.name: frame for frame in tree.frames}
+    rows = [
+        contact_rows(recursion, frames[str(one.frame)], one, q, press[:, c])
+        for c, one in enumerate(robot.contacts.contacts)
+    ]
+    return torque, _left(robot.contacts, rows, torque, shares, mapped)
 
 
 def _largest_sum(torque: Array, joints: list[int]) -> float:
@@ -218,21 +234,13 @@ RANK = 1e-11
 
 
 def _left(
-    recursion: NewtonEuler,
-    tree: JointTree,
-    ground: GroundContacts,
-    torque: Array,
-    q: Array,
-    shares: Array,
-    mapped: Array | None,
+    ground: GroundContacts, each: Sequence[Array], torque: Array, shares: Array, mapped: Array | None
 ) -> Array:
     """Return what contacts with shares (S, contacts) leave of torques (S, n, X).
 
-    mapped: G (S, n, m) from the m joints that do not follow others, at whose indices the torques stand to
+    each: rows (S, C, n) of each contact; mapped: G (S, n, m) from the m joints that do not follow others, at whose indices the torques stand to
     all joints; None if no joint follows
     """
-    frames = {frame.name: frame for frame in tree.frames}
-    each = [contact_rows(recursion, frames[str(one.frame)], one, q) for one in ground.contacts]
     weights = np.concatenate([np.repeat(shares[:, [c]], one.shape[1], 1) for c, one in enumerate(each)], 1)
     rows = np.concatenate(each, axis=1) * (weights > 0.0)[..., None]
     if mapped is not None:

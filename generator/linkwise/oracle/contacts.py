@@ -74,14 +74,20 @@ class ContactEquations:
         return rate
 
 
-def contact_rows(recursion: NewtonEuler, frame: TreeFrame, contact: Contact, q: Array) -> Array:
-    """Return A of a contact on a frame, (samples, rows, n)."""
+def contact_rows(
+    recursion: NewtonEuler, frame: TreeFrame, contact: Contact, q: Array, press: Array | None = None
+) -> Array:
+    """Return A of a contact on a frame, (samples, rows, n).
+
+    press: where measured loads press in the world, (samples, 3), for the kinds that are held there
+    """
     samples, n = q.shape
     units, many = np.tile(np.eye(n), (samples, 1)), np.repeat(q, n, 0)
     place = np.array(frame.translation) + np.array(frame.rotation) @ np.array(contact.point)
     speed = recursion.points([(frame.joint, place)], many, units, 0.0 * units)[0]
     moved = np.swapaxes(speed.reshape(samples, n, 6), -1, -2)
     turn, shift = moved[:, :3], moved[:, 3:]
+    normal: Array
     match contact.kind:
         case "held":
             parts = [turn, shift]
@@ -91,8 +97,15 @@ def contact_rows(recursion: NewtonEuler, frame: TreeFrame, contact: Contact, q: 
             parts = [across @ np.swapaxes(axes, -1, -2) @ turn, shift]
         case "point":
             parts = [shift]
+        case "pressed" | "pressed-point":  # the point of the body that is now where loads press is at rest
+            assert press is not None
+            arm = press - recursion.places([(frame.joint, place)], q)[:, 0]
+            parts = [shift + np.cross(turn, arm[..., None], axis=1)]
+            if contact.kind == "pressed":
+                normal = np.array(contact.normal)
+                parts.insert(0, np.tensordot(normal / np.linalg.norm(normal), turn, (0, 1))[:, None])
         case _:  # a rolling ball: the point one radius below its centre is at rest
-            normal: Array = np.array(contact.normal)
+            normal = np.array(contact.normal)
             down = -contact.radius * normal / np.linalg.norm(normal)
             parts = [shift + np.cross(turn, down[None, :, None], axis=1)]
     return np.concatenate(parts, 1)

@@ -14,7 +14,7 @@ to their shares. If they cannot carry it, as a foot that touches at a single poi
 the joints b: a residual.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,8 +26,8 @@ from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.constrained_model import ConstrainedModel
-from linkwise.analysis.term_rows import NAMES, TermArrays
-from linkwise.arrays import Array, Index
+from linkwise.analysis.contacts.pressed import PRESSED, moment, rows_at
+from linkwise.arrays import Array
 
 WRENCH = ("moment_x", "moment_y", "moment_z", "force_x", "force_y", "force_z")
 BLIND = 1e-4
@@ -61,10 +61,16 @@ class GroundContacts:
         return np.array([owner for owner, _ in self._rows()])
 
     def _rows(self) -> Iterator[tuple[int, str]]:
-        for number, (name, constraints) in enumerate(zip(self.names, self.constraints, strict=True)):
-            for row in constraints.rows:
-                if row.rpartition(" ")[0] == name:
-                    yield number, row
+        for number, (name, contact) in enumerate(zip(self.names, self.contacts, strict=True)):
+            rows = [self.constraints[number].rows[at] for at in self._own(number)]
+            if contact.kind in PRESSED:
+                rows = [f"{name} {part}" for part in PRESSED[contact.kind]]
+            yield from ((number, row) for row in rows)
+
+    def _own(self, number: int) -> list[int]:
+        """Return the places of a contact's rows among those of its constraints, where ties may have some."""
+        rows = self.constraints[number].rows
+        return [at for at, row in enumerate(rows) if row.rpartition(" ")[0] == self.names[number]]
 
     @cached_property
     def wrench_rows(self) -> tuple[int | None, ...]:
@@ -76,35 +82,41 @@ class GroundContacts:
             for turns, part in zip(held, parts, strict=True)
         )
 
-    def wrench(self, number: int, model: Dynamics, q: Array, forces: Array) -> Array:
+    def wrench(self, number: int, model: Dynamics, q: Array, forces: Array, press: Array) -> Array:
         """Return the wrench (S, 6) of a contact on its body, in the world's axes.
 
         It is the moment about the contact's point, then the force.
 
-        forces: constraint forces of all rows, (S, C)
+        forces: constraint forces of all rows, (S, C); press: where loads press in the world, (S, 3)
         """
         contact, own = self.contacts[number], forces[:, self.owners == number]
-        force, moment = own[:, -3:], np.zeros((len(own), 3))
+        force, turn = own[:, -3:], np.zeros((len(own), 3))
         match contact.kind:
             case "held":
-                moment = own[:, :3]
+                turn = own[:, :3]
             case "hinged":
                 axes = np.asarray(model.kinematics.pose(q, contact.frame))[:, :3, :3] @ axes_around(
                     contact.axis
                 )
-                moment = np.einsum("sxa,sa->sx", axes[..., :2], own[:, :2])
+                turn = np.einsum("sxa,sa->sx", axes[..., :2], own[:, :2])
             case "rolling":
-                moment = np.cross(self.touch(number), force)
-        return np.concatenate([moment, force], axis=1)
+                turn = np.cross(self.touch(number), force)
+            case "pressed" | "pressed-point":
+                arm = press - self.places(model, q)[number]
+                turn = moment(contact.kind, own, arm, self._normal(number))
+        return np.concatenate([turn, force], axis=1)
+
+    def _normal(self, number: int) -> Array:
+        """Return the unit normal (3,) of the ground under a contact; zeros where it has none."""
+        normal = np.array(self.contacts[number].normal or (0.0, 0.0, 0.0))
+        found: Array = normal / (np.linalg.norm(normal) or 1.0)
+        return found
 
     def touch(self, number: int) -> Array:
         """Return the vector (3,) from a contact's point to where it touches: for rolling, down the radius."""
         contact = self.contacts[number]
-        if contact.kind != "rolling" or contact.normal is None:
-            return np.zeros(3)
-        normal = np.array(contact.normal)
-        down: Array = -contact.radius * normal / np.linalg.norm(normal)
-        return down
+        down: Array = -contact.radius * self._normal(number)
+        return down if contact.kind == "rolling" else np.zeros(3)
 
     def record(self, joints: Sequence[str]) -> dict[str, Any]:
         """Return the contacts as plain data, to record in the outputs; lengths are in m."""
@@ -150,12 +162,18 @@ class GroundContacts:
                 return int(lost[:, 0].argmax())
         return None
 
-    def standing(self, q: Array, shares: Array) -> "Standing":
-        """Return how the ground holds the robot at q (S, n), by shares w (S, contacts), 0 if off."""
+    def standing(self, model: Dynamics, q: Array, shares: Array, press: Array) -> "Standing":
+        """Return how the ground holds the robot at q (S, n), by shares w (S, contacts), 0 if off.
+
+        press: where loads press on each contact's body in the world, (S, contacts, 3); read for those kinds
+        """
         found = []
-        for name, constraints in zip(self.names, self.constraints, strict=True):
-            own = [at for at, row in enumerate(constraints.rows) if row.rpartition(" ")[0] == name]
-            found.append(np.asarray(constraints.jacobian(q))[:, own])
+        for c, (contact, constraints) in enumerate(zip(self.contacts, self.constraints, strict=True)):
+            held = np.asarray(constraints.jacobian(q))[:, self._own(c)]
+            if contact.kind in PRESSED:
+                arm = press[:, c] - self.places(model, q)[c]
+                held = rows_at(contact.kind, held, arm, self._normal(c))
+            found.append(held)
         weights = shares[:, self.owners]
         every = np.concatenate(found, axis=1) * (weights > 0.0)[..., None]
         moved = every
@@ -228,81 +246,3 @@ class Standing:
         """Return A q̇ (S, C), the velocity of what contacts hold, in m/s and rad/s."""
         found: Array = np.einsum("scn,sn->sc", self.every, qd)
         return found
-
-
-@dataclass(frozen=True, eq=False)
-class _Kind:
-    """Values of one kind: a block (joints, pairs) for joints that contacts load, then those of others."""
-
-    rows: tuple[tuple[int, ...], ...]
-    block: tuple[int, int]
-    places: tuple[Index, Index]
-    """Row and column in the block of each packed value of its joints."""
-    sources: Index
-    """Index of these packed values."""
-    others: Index
-    """Index of the packed values of the other joints."""
-
-    @classmethod
-    def of(cls, rows: Sequence[tuple[int, ...]], joints: Sequence[int]) -> "_Kind":
-        """Return the kind for rows (i, j[, k], source) of the free robot."""
-        mine = [row for row in rows if row[0] in joints]
-        rest = [row for row in rows if row[0] not in joints]
-        pairs = sorted({row[1:-1] for row in mine})
-        place = {pair: at for at, pair in enumerate(pairs)}
-        size = len(joints) * len(pairs)
-        made = [(i, *pair, a * len(pairs) + b) for a, i in enumerate(joints) for b, pair in enumerate(pairs)]
-        made += [(*row[:-1], size + at) for at, row in enumerate(rest)]
-        return cls(
-            tuple(sorted(made)),
-            (len(joints), len(pairs)),
-            (_index(joints.index(row[0]) for row in mine), _index(place[row[1:-1]] for row in mine)),
-            _index(row[-1] for row in mine),
-            _index(row[-1] for row in rest),
-        )
-
-    def left(self, packed: Array, standing: Standing, joints: Sequence[int], n: int) -> Array:
-        """Return the values (S, count) that contacts leave, in the order of the sources of `rows`."""
-        samples = len(packed)
-        whole = np.zeros((samples, n, self.block[1]))
-        whole[:, np.asarray(joints)[self.places[0]], self.places[1]] = packed[:, self.sources]
-        block = standing.left(whole)[:, list(joints)].reshape(samples, -1)
-        return np.concatenate([block, packed[:, self.others]], axis=1)
-
-
-@dataclass(frozen=True, eq=False)
-class ContactTerms:
-    """Torque terms of a robot on contacts: each link's weight and motion load joints through the ground too.
-
-    With T of `Standing.transfer`, each term c_ijk of the free robot becomes
-
-        c^_ijk = c_ijk - sum_b T_ib c_bjk
-
-    at joint i. It belongs to the link j and the cause k of c_bjk, and is no longer symmetric in i and k.
-    """
-
-    kinds: tuple[_Kind, ...]
-    joints: tuple[int, ...]
-
-    @classmethod
-    def of(cls, free: TermArrays, contacts: GroundContacts) -> "ContactTerms":
-        """Return the terms for those of the free robot."""
-        kinds = tuple(_Kind.of(getattr(free, name), contacts.joints) for name in NAMES)
-        return cls(kinds, contacts.joints)
-
-    @property
-    def rows(self) -> TermArrays:
-        """Index (i, j[, k], source) of the values that `left` returns."""
-        return TermArrays(*(kind.rows for kind in self.kinds))
-
-    def left(self, packed: TermArrays, standing: Standing, n: int) -> TermArrays:
-        """Return the values that contacts leave, from the packed ones of the free robot with n joints."""
-        found = (
-            kind.left(np.asarray(getattr(packed, name)), standing, self.joints, n)
-            for name, kind in zip(NAMES, self.kinds, strict=True)
-        )
-        return TermArrays(*found)
-
-
-def _index(numbers: Iterable[int]) -> Index:
-    return np.fromiter(numbers, dtype=np.intp)

@@ -11,6 +11,7 @@ from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.ground import GroundContacts
+from linkwise.analysis.contacts.pressed import PRESSED
 from linkwise.analysis.loads.placed import moving_joints
 from linkwise.analysis.opened_robot import OpenedRobot, body_frame
 from linkwise.errors import LinkwiseError
@@ -71,11 +72,11 @@ def _unactuated(robot: OpenedRobot, given: Sequence[str]) -> tuple[int, ...]:
 
 
 def _named(robot: OpenedRobot, contact: Contact) -> Contact:
-    """Return the contact with its name, and if it rolls, the ground's normal: given, or against gravity."""
+    """Return the contact with its name, and the ground's normal if it counts: given, or against gravity."""
     tree = robot.package.manifest.tree
     gravity = (0.0, 0.0, 0.0) if tree is None else tree.gravity
     name = contact.name or str(contact.frame)
-    if contact.kind != "rolling":
+    if contact.kind not in ("rolling", *PRESSED):
         return contact._replace(name=name)
     try:
         return contact._replace(name=name, normal=ground_normal(contact, f"contact {name!r}", gravity))
@@ -85,8 +86,9 @@ def _named(robot: OpenedRobot, contact: Contact) -> Contact:
 
 def _constraints(robot: OpenedRobot, contact: Contact) -> Any:
     model: Any = robot.model
+    held = contact._replace(kind="held") if contact.kind in PRESSED else contact
     try:
-        return model.constrained(contacts=[contact])
+        return model.constrained(contacts=[held])
     except (TypeError, ValueError) as error:
         told = str(error).replace("contacts[0]", f"contact {contact.name!r}")
         told = told.replace("give it a name=", "give it another, as NAME:FRAME")

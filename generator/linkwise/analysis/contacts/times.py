@@ -11,6 +11,7 @@ from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.analysis.column_matching import time_column
 from linkwise.analysis.contacts import Contacts, WhileColumn
+from linkwise.analysis.contacts.pressed import PRESSED
 from linkwise.analysis.disk_rows import collected
 from linkwise.analysis.loads import FORCE
 from linkwise.analysis.loads.placed import PlacedLoad, Wrench, model_pose
@@ -107,6 +108,17 @@ class ContactTimes:
         size: Array = np.linalg.norm(sum(pushes, np.zeros((len(time), 3))), axis=1)
         return size
 
+    def press(self, model: Dynamics, time: Array, q: Array) -> Array:
+        """Return where a load that is measured on each contact's body acts in the world, (S, contacts, 3).
+
+        It is zero where no load is measured.
+        """
+        out = np.zeros((len(time), len(self.measured), 3))
+        for number, loads in enumerate(self.measured):
+            for load in _wrenches(loads[:1], model, time, q):
+                out[:, number] = load.place
+        return out
+
     def torque(self, model: Dynamics, time: Array, q: Array) -> Array:
         """Return the torques (S, n) that joints would need to carry the measured loads."""
         return sum((load.torque(model, time, q) for load in self.loads), np.zeros_like(q))
@@ -149,6 +161,12 @@ def contact_times(
             raise LinkwiseError(
                 f"contact {name!r}: no load of --contact-loads acts on its body ({_told(loads)}); say when"
                 f" it is on with --contact-while {name}=COLUMN"
+            )
+    for contact, some in zip(robot.ground.contacts, found, strict=True):
+        if contact.kind in PRESSED and len(some) != 1:
+            raise LinkwiseError(
+                f"contact {contact.name!r} is {contact.kind}, and {len(some)} loads are measured on its body:"
+                " it is where one presses; give that one with --contact-loads"
             )
     return ContactTimes(switches, found, contacts.least_force)
 
