@@ -74,7 +74,7 @@ def test_a_pressed_foot_is_held_where_its_measured_load_acts(kind: str, folder: 
     contacts = Contacts((Contact("foot", kind, (0.1, 0.0, 0.0), name="sole"),), loads=(plate,))
     result = analyze(folder / "moving.csv", folder / "leg", contacts=contacts, induced=["foot"])
     rows = ["moment_up"] * (kind == "pressed") + ["force_x", "force_y", "force_z"]
-    assert [row for row in result.rows.axes["constraint"].names] == [f"sole {row}" for row in rows]
+    assert list(result.rows.axes["constraint"].names) == [f"sole {row}" for row in rows]
     kinematics = result.robot.model.kinematics
     at = np.linalg.solve(kinematics.pose(result.q, "foot"), np.insert(place, 3, 1.0, axis=1)[..., None])
     jacobian = np.stack([kinematics.jacobian(q, "foot", p[:3, 0]) for q, p in zip(result.q, at, strict=True)])

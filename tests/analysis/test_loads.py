@@ -188,12 +188,12 @@ REFUSED = {
     "short": (
         lambda table: table[:300],
         FORCE,
-        r"plate.csv: row 301, time column: it ends at 0.299 s, the motion at 0.59 s; analyse less of the motion",
+        r"plate.csv: row 301, time column: it ends at 0.299 s, the motion at 0.59 s; analyse less",
     ),
     "late": (
         lambda table: table[50:],
         FORCE,
-        r"plate.csv: row 2, time column: it begins at 0.05 s, the motion at 0 s; analyse less of the motion",
+        r"plate.csv: row 2, time column: it begins at 0.05 s, the motion at 0 s; analyse less",
     ),
     "body": (
         lambda table: table,

@@ -23,7 +23,7 @@ from linkwise.analysis.phases import Phase, PlacedPhase, phase_columns, placed_p
 from linkwise.analysis.result import AnalysisResult, WholeMovement
 from linkwise.analysis.result_rows import Column
 from linkwise.analysis.samples import Samples, pole_warnings, read_samples
-from linkwise.analysis.settings import Processing, Reading, choices
+from linkwise.analysis.settings import Processing, Reading, Units, choices
 from linkwise.analysis.show import draw
 from linkwise.analysis.stream import Sink, span_of, stream
 from linkwise.analysis.torques import Decomposer, ToldBeside
@@ -106,6 +106,16 @@ class Outputs:
         "be repeated",
         metavar="POINT",
     )
+    storage: str = option(
+        "",
+        "Also write what --induced tells as OpenSim's storage files, NAME_POINT.sto",
+        "--induced-sto",
+        metavar="NAME",
+        is_key=False,
+    )
+    storage_units: Units = option(
+        "rad", "Unit of their angles; rad if not given", "--sto-units", needs="--induced-sto", is_key=False
+    )
     induced_power: bool = option(
         False, "Tell by its sources the power that each link gets, and that which flows through each joint"
     )
@@ -132,9 +142,13 @@ class Outputs:
     )
 
     def __post_init__(self) -> None:
-        for flag, given in (("--trace-windows", self.trace_windows), ("--trace-restart", self.trace_restart)):
-            if given and not self.trace:
-                raise LinkwiseError(f"{flag} goes with --trace; add it")
+        for flag, given, needed, there in (
+            ("--induced-sto", self.storage, "--induced", self.induced),
+            ("--trace-windows", self.trace_windows, "--trace", self.trace),
+            ("--trace-restart", self.trace_restart, "--trace", self.trace),
+        ):
+            if given and not there:
+                raise LinkwiseError(f"{flag} goes with {needed}; add it")
 
 
 @dataclass(frozen=True)

@@ -238,7 +238,8 @@ def _left(
 ) -> Array:
     """Return what contacts with shares (S, contacts) leave of torques (S, n, X).
 
-    each: rows (S, C, n) of each contact; mapped: G (S, n, m) from the m joints that do not follow others, at whose indices the torques stand to
+    each: rows (S, C, n) of each contact
+    mapped: G (S, n, m) from the m joints that do not follow others, at whose indices the torques stand to
     all joints; None if no joint follows
     """
     weights = np.concatenate([np.repeat(shares[:, [c]], one.shape[1], 1) for c, one in enumerate(each)], 1)

@@ -12,11 +12,18 @@ from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.run import analyze_to
 from linkwise.cli import Json, tell
 from linkwise.cli.flags import takes
-from linkwise.cli.log_options import UNITS, Backend, Log, RobotOption, opened_robot
+from linkwise.cli.log_options import UNITS, Backend, LogIfAny, RobotIfAny, opened_robot
+from linkwise.cli.opensim_setup import with_setup
 from linkwise.escape import json_text, listed
 from linkwise.progress import progress as shown_progress
 from linkwise.robot import Options
 
+Setup = Annotated[
+    Path | None,
+    typer.Option(
+        help="Setup of OpenSim's induced acceleration analysis, in place of LOG, --robot and what it says"
+    ),
+]
 Out = Annotated[Path, typer.Option(help="Directory to write; a former result is replaced")]
 
 app = typer.Typer(add_completion=False)
@@ -24,21 +31,25 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 @takes(
-    *("log", "robot", "out", "units", "time", "topic", "qpos"),
+    *("log", "robot", "opensim_setup", "out", "units", "time", "topic", "qpos"),
     ...,
-    *("induced", "induced_power", "reaction", "trace", "trace_windows", "trace_restart"),
-    *("backend", "page", "as_json"),
+    *("induced", "induced_sto", "sto_units", "induced_power", "reaction"),
+    *("trace", "trace_windows", "trace_restart", "backend", "page", "as_json"),
+    complete=with_setup,
 )
 def analyze(
-    log: Log,
-    robot: RobotOption,
     out: Out,
     chosen: AnalysisChoices,
     options: Options,
+    log: LogIfAny = None,
+    robot: RobotIfAny = None,
+    opensim_setup: Setup = None,
     backend: Backend = None,
     as_json: Json = False,
 ) -> None:
     """Decompose a recorded movement: every torque term, as a table, figures and a page."""
+    assert log is not None, "`with_setup` sees to it"
+    assert robot is not None, "`with_setup` sees to it"
     with shown_progress() as progress:
         package = opened_robot(robot, backend, options, progress)
     package = with_payloads(package, chosen.payloads(package))

@@ -34,12 +34,16 @@ def is_given(context: typer.Context, option: str) -> bool:
 
 
 def takes(
-    *order: str | EllipsisType, without: Collection[str] = (), **usual: Any
+    *order: str | EllipsisType,
+    without: Collection[str] = (),
+    complete: Callable[[dict[str, Any]], dict[str, Any]] = dict,
+    **usual: Any,
 ) -> Callable[[Command], Command]:
     """Return a decorator that gives a command the flags of its parameters that are dataclasses.
 
     order: names as --help lists them, ... for all others, which stand in the order of the signature
     without: options of the dataclasses that the command does not have
+    complete: makes of what was given, by name, what the command gets
     usual: defaults that differ from those of the dataclasses
     """
 
@@ -49,6 +53,7 @@ def takes(
 
         @wraps(command)
         def run(**given: Any) -> None:
+            given = complete(given)
             made = {name: chosen(kind, given) for name, kind in kinds.items()}
             command(**made, **{name: given[name] for name in own if name not in kinds})
 

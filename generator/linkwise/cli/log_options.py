@@ -26,13 +26,14 @@ UNITS = {
 }
 """Units in which progress is counted, by stage."""
 
-Log = Annotated[
-    Path,
-    typer.Argument(help="Motion log: .csv, .mot, .sto, .parquet, .npz, HDF5, or a bag of ROS"),
-]
-RobotOption = Annotated[
-    Path, typer.Option(help="Directory of a generated robot; or a robot's file, of which a package is kept")
-]
+_LOG = typer.Argument(help="Motion log: .csv, .mot, .sto, .parquet, .npz, HDF5, or a bag of ROS")
+_ROBOT = typer.Option(
+    help="Directory of a generated robot; or a robot's file, of which a package is kept", show_default=False
+)
+Log = Annotated[Path, _LOG]
+LogIfAny = Annotated[Path | None, _LOG]
+RobotOption = Annotated[Path, _ROBOT]
+RobotIfAny = Annotated[Path | None, _ROBOT]
 Backend = Annotated[str | None, typer.Option(help="Back end of the package; its fastest if not given")]
 
 

@@ -108,7 +108,7 @@ def ties(model: Element, frames: Frames) -> Iterator[AnchoredTie]:
     """Yield the constraints between two bodies."""
     for constraint in members(model, "ConstraintSet"):
         if constraint.tag in KINDS and is_enforced(constraint):
-            first, second = (_end(constraint, number, frames) for number in (1, 2))
+            first, second = (anchor_of(constraint, number, frames) for number in (1, 2))
             place = f"constraint {name_of(constraint)!r}"
             (length,) = numbers_of(constraint, "constant_distance", "0", place, 1)
             yield AnchoredTie(name_of(constraint), KINDS[constraint.tag], first, second, length)
@@ -124,7 +124,7 @@ def unmodelled(model: Element) -> Iterator[Loop]:
             )
 
 
-def _end(constraint: Element, number: int, frames: Frames) -> Anchor:
+def anchor_of(constraint: Element, number: int, frames: Frames) -> Anchor:
     """Return an end of a constraint: a frame, or a place on a body."""
     frame = text_of(constraint, f"socket_frame{number}")
     body = text_of(constraint, f"socket_body_{number}") or text_of(constraint, f"body_{number}")

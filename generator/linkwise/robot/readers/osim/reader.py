@@ -142,14 +142,14 @@ def _forces(model: Element) -> Iterator[Omission]:
     """Yield the forces that act by themselves, which the torques leave out."""
     for force in members(model, "ForceSet"):
         acts = yes(force, "appliesForce", True) and not yes(force, "isDisabled")
-        if acts and not _gives(force):
+        if acts and not gives_torque(force):
             coordinate = text_of(force, "coordinate")
             yield Omission(
                 ACTING.get(force.tag, force.tag), name_of(force), coordinate and f"on {coordinate}"
             )
 
 
-def _gives(force: Element) -> bool:
+def gives_torque(force: Element) -> bool:
     """Return whether a force is a muscle or an actuator, which give the joints' torques."""
     return "Muscle" in force.tag or force.tag.endswith("Actuator")
 
@@ -160,7 +160,7 @@ def _known(element: Element) -> Known | None:
 
 def _ignored(model: Element) -> tuple[Note, ...]:
     """Return notes on parts of the model that do not enter its dynamics, or that give the torques."""
-    counts = Counter(force.tag for force in members(model, "ForceSet") if _gives(force))
+    counts = Counter(force.tag for force in members(model, "ForceSet") if gives_torque(force))
     counts.update(part.tag for part in members(model, "ContactGeometrySet"))
     counts.update(part.tag for part in members(model, "MarkerSet"))
     weightless = (body for body in members(model, "BodySet") if _has_inertia_alone(body))

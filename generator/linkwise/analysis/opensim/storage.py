@@ -1,0 +1,149 @@
+"""Induced accelerations as OpenSim's storage files: a file a coordinate or body, a column a source.
+
+Files and columns have the names that OpenSim's InducedAccelerations gives them. Its muscles and actuators are
+the torques of joints here, by the names of the coordinates. What it counts as velocity is all that velocities
+do: velocity forces, ties that turn, and J̇ q̇ of the point. What contacts do themselves has columns of its own
+here, as a motion that was measured slips.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from linkwise.analysis.induced_points import JOINTS, InducedPoint
+from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.result_quantities import LOSSES
+from linkwise.analysis.result_rows import ResultRows
+from linkwise.analysis.settings import Units
+from linkwise.arrays import Array
+from linkwise.escape import file_name, file_names
+from linkwise.extras import extra
+
+CENTRE = "center_of_mass"
+"""Name that OpenSim gives to the centre of mass."""
+TOTAL, GRAVITY, VELOCITY = "total", "gravity", "velocity"
+OF_VELOCITY = ("acc_qd", "acc_kinematic", "acc_constraint")
+ENDS = {
+    "x": "_X",
+    "y": "_Y",
+    "z": "_Z",
+    "angular_x": "_Ox",
+    "angular_y": "_Oy",
+    "angular_z": "_Oz",
+}
+"""What column names end in, by component of a point, in OpenSim's order."""
+TEXT = """
+This file contains accelerations of coordinates or bodies.
+
+Units are S.I. units (seconds, meters, Newtons, ...)
+If the header above contains a line with 'inDegrees', this indicates whether rotational values are in degrees (yes) or radians (no).
+
+"""  # noqa: E501, as OpenSim writes it
+
+
+@dataclass(frozen=True)
+class StorageFile:
+    """A storage file: its name without ending, its columns, and the rows of the result that each sums."""
+
+    name: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[int, ...], ...]
+    turns: tuple[bool, ...]
+    """True for columns that are angles."""
+
+
+def write_storages(folder: Path, result: AnalysisResult, name: str, units: Units) -> None:
+    """Write NAME_COORDINATE.sto, NAME_BODY.sto and NAME_center_of_mass.sto of all points into a folder.
+
+    units: of angles; lengths are in m
+    """
+    files = [*storage_files(result.rows)]
+    paths = file_names(f"{file_name(name)}_{file_name(file.name)}" for file in files)
+    paths = [str(folder / f"{path}.sto") for path in paths]
+    for path, file in zip(paths, files, strict=True):
+        Path(path).write_text(_header(file, result.total, units), encoding="utf-8")
+    for part in result.parts():
+        for path, file in zip(paths, files, strict=True):
+            _append(Path(path), file, part.values, units)
+
+
+def storage_files(rows: ResultRows) -> Iterator[StorageFile]:
+    """Yield the files of a result's rows: of each coordinate, each body, the centre of mass."""
+    for number, point in enumerate(rows.points):
+        sources = [_sources(rows, number, row) for row in point.rows]
+        if point.name == JOINTS and point.frame is None:
+            for joint, found, unit in zip(point.rows, sources, point.units, strict=True):
+                turns = (unit.startswith("rad"),) * len(found)
+                yield StorageFile(joint, tuple(found), tuple(map(tuple, found.values())), turns)
+        else:
+            yield _of_point(point, dict(zip(point.rows, sources, strict=True)))
+
+
+def _of_point(point: InducedPoint, sources: Mapping[str, dict[str, list[int]]]) -> StorageFile:
+    ends = [row for row in ENDS if row in sources]
+    every = [(source, row) for source in sources[ends[0]] for row in ends]
+    return StorageFile(
+        point.frame or CENTRE,
+        tuple(f"{source}{ENDS[row]}" for source, row in every),
+        tuple(tuple(sources[row][source]) for source, row in every),
+        tuple(row.startswith("angular") for _, row in every),
+    )
+
+
+def _sources(rows: ResultRows, point: int, component: str) -> dict[str, list[int]]:
+    """Return the rows of each source of a component's acceleration, in OpenSim's order."""
+    found: dict[str, list[int]] = {TOTAL: []}
+    own = rows.axes["component"].names.index(component)
+    for row, (quantity, at) in enumerate(rows.places):
+        if quantity.startswith("acc") and at[:2] == (point, own):
+            found.setdefault(_source(rows, quantity, at[2:]), []).append(row)
+    last = [source for source in (GRAVITY, VELOCITY) if source in found]
+    contacts = [source for source in found if source.startswith("contact_")]
+    first = [source for source in found if source not in (*last, *contacts)]
+    return {source: found[source] for source in (*first, *last, *contacts)}
+
+
+def _source(rows: ResultRows, quantity: str, at: Sequence[int]) -> str:
+    """Return the name of a source: of joints as they are called, of what OpenSim lacks with its kind."""
+    if quantity in OF_VELOCITY:
+        return VELOCITY
+    match quantity:
+        case "acc":
+            return TOTAL
+        case "acc_gravity":
+            return GRAVITY
+        case "acc_tau":
+            found = rows.axes["joint"].names[at[0]]
+        case "acc_share":
+            found = rows.axes["share"].names[at[1]]
+        case "acc_contact":
+            found = f"contact_{rows.axes['contact'].names[at[0]]}"
+        case "acc_load":
+            found = f"load_{rows.axes['load'].names[at[0]]}"
+        case _:
+            assert quantity in LOSSES
+            found = f"{quantity.removeprefix('acc_')}_{rows.axes['joint'].names[at[0]]}"
+    return "_".join(found.split())  # blanks part columns
+
+
+def _header(file: StorageFile, samples: int, units: Units) -> str:
+    facts = (
+        f"version=1\nnRows={samples}\nnColumns={1 + len(file.columns)}"
+        f"\ninDegrees={'yes' if units == 'deg' else 'no'}"
+    )
+    names = "\t".join(("time", *file.columns))
+    return f"{'_'.join(file.name.split())}\n{facts}\n{TEXT}endheader\n{names}\n"
+
+
+def _append(path: Path, file: StorageFile, values: Array, units: Units) -> None:
+    """Append the samples of a part of the result (rows, S), in numbers that read back exactly."""
+    scales = np.where(file.turns, np.degrees(1.0) if units == "deg" else 1.0, 1.0)
+    columns = [values[0]]
+    columns += [scale * values[list(rows)].sum(axis=0) for scale, rows in zip(scales, file.rows, strict=True)]
+    arrow, csv = extra("pyarrow"), extra("pyarrow.csv")
+    table = arrow.table(columns, names=[str(number) for number in range(len(columns))])
+    how = csv.WriteOptions(include_header=False, delimiter="\t", quoting_style="none")
+    with path.open("ab") as out:
+        csv.write_csv(table, out, how)
