@@ -25,6 +25,10 @@ WELD = """<WeldConstraint name="held"><isEnforced>false</isEnforced><socket_fram
 <socket_parent>/ground</socket_parent><translation>{at}</translation><orientation>0 0 {turned}</orientation>
 </PhysicalOffsetFrame><PhysicalOffsetFrame name="here"><socket_parent>{body}</socket_parent>
 <translation>{point}</translation></PhysicalOffsetFrame></frames></WeldConstraint>"""
+ROLL = """<RollingOnSurfaceConstraint name="held"><isEnforced>false</isEnforced>
+<socket_rolling_body>{body}</socket_rolling_body><socket_surface_body>/ground</socket_surface_body>
+<friction_coefficient>1e9</friction_coefficient><contact_radius>1e9</contact_radius>
+</RollingOnSurfaceConstraint>"""
 HEADER = "force\nversion=1\nnRows=2\nnColumns=7\ninDegrees=no\nendheader\n"
 
 
@@ -35,6 +39,7 @@ class Foot:
     body: str
     point: Row
     welded: bool
+    rolls: bool = False
 
 
 def induced_accelerations(model: OpenSimModel, q: Any, qd: Any, foot: Foot | None, folder: Path) -> Any:
@@ -72,6 +77,8 @@ def holding(model: OpenSimModel, state: Any, foot: Foot) -> str:
     stands = body.findStationLocationInGround(state, osim.Vec3(*foot.point))
     turned = body.getRotationInGround(state).convertRotationToBodyFixedXYZ().get(2)
     at, point = (" ".join(map(repr, place)) for place in (map(stands.get, range(3)), foot.point))
+    if foot.rolls:
+        return ROLL.format(body=model.path(foot.body))
     if not foot.welded:
         return POINT.format(body=model.path(foot.body), at=at, point=point)
     return WELD.format(body=model.path(foot.body), at=at, point=point, turned=turned)

@@ -1,5 +1,7 @@
 """A robot of planar joints and hinges about z in OpenSim, built by OpenSim's own interface."""
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -112,6 +114,20 @@ class OpenSimModel:
             self.model.getCoordinateSet().get(name).setSpeedValue(numbered, float(k))
         speeds = [round(speed) for speed in numbers(numbered.getU())]
         return [speeds.index(k) for k in range(len(self.names))]
+
+
+class LoadedModel(OpenSimModel):
+    """A model of a file in place of one that is built."""
+
+    def __init__(self, file: Path, names: Sequence[str]) -> None:
+        osim.Logger.setLevelString("Error")
+        osim.Logger.removeFileSink()
+        self.model = osim.Model(str(file))
+        self.root = "ground"
+        every = self.model.getBodySet()
+        self.bodies = [every.get(k).getName() for k in range(every.getSize())]
+        self.names = list(names)
+        self.controls = {}
 
 
 def numbers(vector: Any) -> Any:
