@@ -53,14 +53,19 @@ def write_storage(path: Path, table: np.ndarray, names: Sequence[str]) -> None:
     path.write_text("\n".join([path.stem, "version=1", facts, "\t".join(["time", *names]), *rows]) + "\n")
 
 
+def motion(samples: int) -> np.ndarray:
+    """Return time and coordinates (S, 1 + 10) of a movement in s, rad and m."""
+    time, number = np.arange(samples) / RATE, np.arange(len(COORDINATES))
+    q = 0.2 * np.sin(2 * np.pi * time[:, None] * (0.3 + 0.07 * number) + number)
+    return np.column_stack([time, q])
+
+
 def write_case(folder: Path, constraints: str = "", loads: str = "", bodies: str = "All") -> Path:
     """Write all files into a folder; return the setup. The foot moves somewhat, as a measured one does."""
     (folder / "leg.osim").write_text(MODEL)
-    time = np.arange(SAMPLES) / RATE
-    count = len(COORDINATES)
-    pace = 0.3 + 0.07 * np.arange(count)
-    q = 0.2 * np.sin(2 * np.pi * time[:, None] * pace + np.arange(count))
-    write_storage(folder / "walk.sto", np.column_stack([time, q]), COORDINATES)
+    walk = motion(SAMPLES)
+    time = walk[:, 0]
+    write_storage(folder / "walk.sto", walk, COORDINATES)
     start, way = np.array(CENTRE_OF_PRESSURE).T
     force = np.tile([10.0, 600.0, -5.0], (SAMPLES, 1))
     plate = np.column_stack([time, force, start + way * time[:, None]])

@@ -81,7 +81,7 @@ class Analysis(AnalysisResult):
 class Outputs:
     """Files to write, and their contents: the table's format, figures by name, whether to write the page."""
 
-    table: Format = option("parquet", "Format of the table", "--format", is_key=False)
+    table: Format = option("parquet", "Format of the table; none for no table", "--format", is_key=False)
     figures: tuple[str, ...] = option(
         (),
         "paper or causes, alone or with :JOINT, shares, power, energy, energy:PHASE, induced, induced:POINT,"

@@ -21,15 +21,20 @@ from linkwise.analysis.settings import choices
 from linkwise.arrays import Array
 from linkwise.extras import extra
 
-Format = Literal["parquet", "csv"]
+Format = Literal["parquet", "csv", "none"]
 
 
 @contextmanager
 def open_table(path: Path, columns: Sequence[Column], note: str) -> Iterator[Callable[[Array], None]]:
     """Open `path`, .parquet or .csv, and give the function that writes a block (columns, samples) to it.
 
+    Nothing is written to a path that ends in .none.
+
     note: JSON that is kept in a Parquet file's schema
     """
+    if path.suffix == ".none":
+        yield lambda block: None
+        return
     if path.suffix == ".csv":
         with path.open("w", encoding="utf-8", newline="") as file:
             rows = csv.writer(file)

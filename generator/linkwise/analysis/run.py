@@ -15,7 +15,7 @@ from linkwise.analysis.job import Analysis, Outputs, Request, prepared
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.opened_robot import OpenedRobot
-from linkwise.analysis.opensim.storage import write_storages
+from linkwise.analysis.opensim.storage import begin_storages
 from linkwise.analysis.outputs import open_table
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.phases import Phase
@@ -93,8 +93,8 @@ def analyze_to(
     """Analyse a log of any length with flat memory; `out` appears when everything is done.
 
     Returns the analysis and the paths of the files written. Samples of the analysis are in a file without a
-    name where figures, storage files or a page are asked for; otherwise it has none. Raises LinkwiseError, as
-    `analyze` does, and where `out` holds something else than a former result or cannot be written.
+    name where figures or a page are asked for; otherwise it has none. Raises LinkwiseError, as `analyze`
+    does, and where `out` holds something else than a former result or cannot be written.
     """
     robot, outputs = with_contacts(robot, asked.contacts), asked.outputs
     phases = [phase.name for phase in outputs.phases]
@@ -109,7 +109,9 @@ def analyze_to(
     with whole_directory(out, _refuse_unless_result) as draft:
         job = prepared(log, robot, asked, progress, draft)
         note = json_text(job.note())
-        keep = (job.count, draft) if outputs.page or outputs.figures or outputs.storage else (0, None)
+        keep = (job.count, draft) if outputs.page or outputs.figures else (0, None)
+        naming = outputs.storage, outputs.storage_units
+        store = begin_storages(draft, job.decomposer.rows, job.count, *naming)
         with (
             open_table(draft / f"analysis.{outputs.table}", job.columns, note) as table,
             EverySample(len(job.columns), *keep) as kept,
@@ -117,6 +119,7 @@ def analyze_to(
 
             def sink(block: Array) -> None:
                 table(block)
+                store(block)
                 if keep[0]:
                     kept(block)
 
@@ -127,12 +130,10 @@ def analyze_to(
 
 
 def _write_beside_table(draft: Path, analysis: Analysis, outputs: Outputs) -> None:
-    """Write the record, the figures, OpenSim's storage files and the page."""
+    """Write the record, the figures and the page."""
     files = file_names("-".join(map(file_name, name.split(":", 1))) for name in outputs.figures)
     for file, name in zip(files, outputs.figures, strict=True):
         (draft / f"{file}.png").write_bytes(figure_png(analysis, name))
-    if outputs.storage:
-        write_storages(draft, analysis, outputs.storage, outputs.storage_units)
     if outputs.page:
         (draft / "report.html").write_bytes(report(analysis).encode())
     files = sorted([RECORD, *(file.name for file in draft.iterdir())])

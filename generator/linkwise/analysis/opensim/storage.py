@@ -6,14 +6,13 @@ do: velocity forces, ties that turn, and J̇ q̇ of the point. What contacts do 
 here, as a motion that was measured slips.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from linkwise.analysis.induced_points import JOINTS, InducedPoint
-from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import LOSSES
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.settings import Units
@@ -54,19 +53,29 @@ class StorageFile:
     """True for columns that are angles."""
 
 
-def write_storages(folder: Path, result: AnalysisResult, name: str, units: Units) -> None:
-    """Write NAME_COORDINATE.sto, NAME_BODY.sto and NAME_center_of_mass.sto of all points into a folder.
+def begin_storages(
+    folder: Path, rows: ResultRows, samples: int, name: str, units: Units
+) -> Callable[[Array], None]:
+    """Begin NAME_COORDINATE.sto, NAME_BODY.sto and NAME_center_of_mass.sto of all points in a folder.
 
-    units: of angles; lengths are in m
+    Return the function that writes a block (rows, some samples) of the result to all of them; without a name
+    it does nothing.
+
+    samples: number of all samples; units: of angles; lengths are in m
     """
-    files = [*storage_files(result.rows)]
-    paths = file_names(f"{file_name(name)}_{file_name(file.name)}" for file in files)
-    paths = [str(folder / f"{path}.sto") for path in paths]
+    if not name:
+        return lambda block: None
+    files = [*storage_files(rows)]
+    names = file_names(f"{file_name(name)}_{file_name(file.name)}" for file in files)
+    paths = [folder / f"{own}.sto" for own in names]
     for path, file in zip(paths, files, strict=True):
-        Path(path).write_text(_header(file, result.total, units), encoding="utf-8")
-    for part in result.parts():
+        path.write_text(_header(file, samples, units), encoding="utf-8")
+
+    def write(block: Array) -> None:
         for path, file in zip(paths, files, strict=True):
-            _append(Path(path), file, part.values, units)
+            _append(path, file, block, units)
+
+    return write
 
 
 def storage_files(rows: ResultRows) -> Iterator[StorageFile]:
@@ -139,11 +148,20 @@ def _header(file: StorageFile, samples: int, units: Units) -> str:
 
 def _append(path: Path, file: StorageFile, values: Array, units: Units) -> None:
     """Append the samples of a part of the result (rows, S), in numbers that read back exactly."""
-    scales = np.where(file.turns, np.degrees(1.0) if units == "deg" else 1.0, 1.0)
-    columns = [values[0]]
-    columns += [scale * values[list(rows)].sum(axis=0) for scale, rows in zip(scales, file.rows, strict=True)]
+    columns = [values[0], *(_sum(values, rows) for rows in file.rows)]
+    for column, turns in zip(columns[1:], file.turns, strict=True):
+        if turns and units == "deg":
+            np.degrees(column, out=column)
     arrow, csv = extra("pyarrow"), extra("pyarrow.csv")
     table = arrow.table(columns, names=[str(number) for number in range(len(columns))])
     how = csv.WriteOptions(include_header=False, delimiter="\t", quoting_style="none")
     with path.open("ab") as out:
         csv.write_csv(table, out, how)
+
+
+def _sum(values: Array, rows: Sequence[int]) -> Array:
+    """Return the sum (S,) of rows; neighbours are added without a copy of them."""
+    cuts = [at for at in range(1, len(rows)) if rows[at] != rows[at - 1] + 1]
+    runs = zip([0, *cuts], [*cuts, len(rows)], strict=True)
+    found: Array = sum(values[rows[a] : rows[b - 1] + 1].sum(axis=0) for a, b in runs)
+    return found
