@@ -43,7 +43,9 @@ def write_case(folder: Path, samples: int, bodies: int = 0) -> Path:
     write_storage(folder / "walk.sto", motion(samples), COORDINATES)
     (folder / "motors.xml").write_text(ACTUATORS.format("".join(map(ACTUATOR.format, COORDINATES))))
     text = SETUP.format(constraints="", loads="", bodies=" ".join(BODIES[:bodies]))
-    text = text.replace("1.2</final_time>", "1e9</final_time>").replace("0.2</initial_time>", "0</initial_time>")
+    text = text.replace("1.2</final_time>", "1e9</final_time>").replace(
+        "0.2</initial_time>", "0</initial_time>"
+    )
     text = text.replace("<states_file/>", "<force_set_files>motors.xml</force_set_files>")
     (folder / "setup.xml").write_text(text)
     return folder / "setup.xml"

@@ -230,15 +230,15 @@ def _listed(analysis: Element, tag: str, usual: str, there: list[str]) -> list[s
 
     Raises LinkwiseError for a name that the model does not have.
     """
-    words = text_of(analysis, tag).split() if analysis.find(tag) is not None else usual.split()
-    if ALL in map(str.lower, words):
-        own = [CENTRE_OF_MASS for word in words if word.lower() == CENTRE_OF_MASS]
-        return [*(name for name in there if name != CENTRE_OF_MASS), *own[:1]]
-    words = [CENTRE_OF_MASS if word.lower() == CENTRE_OF_MASS else word for word in words]
+    text = text_of(analysis, tag) if analysis.find(tag) is not None else usual
+    lower = {name.lower(): name for name in (ALL, CENTRE_OF_MASS)}  # OpenSim takes capitals in these two
+    words = [lower.get(word.lower(), word) for word in text.split()]
     for word in words:
-        if word not in there:
+        if word not in (*there, ALL):
             near = listed(map(repr, nearest_first(word, there)))
             raise LinkwiseError(f"{tag}: the model has no {word!r}; it has {near}, and All is all of them")
+    if ALL in words:
+        words = [name for name in there if name != CENTRE_OF_MASS or name in words]
     return list(dict.fromkeys(words))
 
 
