@@ -34,6 +34,7 @@ def test_a_setup_is_a_command_line(tmp_path: Path) -> None:
     assert points[1].startswith("body1,"), "at its centre of mass"
     assert asked.options == {
         "ignore_extra": True,
+        "induced_whole": True,
         "induced_sto": "walk_InducedAccelerations",
         "sto_units": "rad",
         "from_time": 0.2,
@@ -217,8 +218,8 @@ def test_a_setup_and_its_command_line_write_the_same(tmp_path: Path) -> None:
     ]
     options = "walk.sto --robot leg.osim --from 0.2 --to 1.2 --cutoff 6 --filter-order 3 --induced joints"
     contact = "--contact sole:body3=pressed --contact-loads plate.xml --contact-threshold 20"
-    store = "--induced centre-of-mass --induced-sto walk_InducedAccelerations --sto-units deg --format none"
-    analyze(tmp_path, *options.split(), *contact.split(), *store.split())
+    store = "--induced centre-of-mass --induced-whole --induced-sto walk_InducedAccelerations --sto-units deg"
+    analyze(tmp_path, *options.split(), *contact.split(), *store.split(), "--format", "none")
     assert {file.name: file.read_bytes() for file in (tmp_path / "out").glob("*.sto")} == files
 
 

@@ -55,6 +55,7 @@ ANALYSIS: dict[str, Any] = {
     "trace": ("knee",),
     "trace_windows": 0.2,
     "trace_restart": ("phases",),
+    "induced_whole": True,
 }
 FLAGS = {"from_time": "--from", "to_time": "--to"}
 """Flags that are words of Python, so that keys and fields have other names."""
@@ -87,6 +88,7 @@ WRITTEN = AnalysisChoices(
         phases=(Phase("stance", "", "push", None),),
         power_terms=True,
         induced=("joints",),
+        induced_whole=True,
         induced_power=True,
         reactions=("knee,world",),
         trace=("knee",),

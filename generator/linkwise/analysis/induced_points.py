@@ -42,6 +42,14 @@ class InducedPoint:
         return _centre(robot, kinematics, q, qd)
 
 
+@dataclass(frozen=True)
+class InducedPlan:
+    """Points whose acceleration is told, and whether weights and velocities are one source each."""
+
+    points: tuple[InducedPoint, ...] = ()
+    whole: bool = False
+
+
 def induced_points(texts: Sequence[str], robot: OpenedRobot) -> tuple[InducedPoint, ...]:
     """Return the points that are written as FRAME, FRAME,X,Y,Z, joints or centre-of-mass.
 

@@ -3,14 +3,14 @@
 A point accelerates by J q̈_x of each source of `InducedSources`, and by J̇ q̇ itself.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from linkwise.analysis.contacts.ground import Standing
-from linkwise.analysis.induced_points import InducedPoint
+from linkwise.analysis.induced_points import InducedPlan, InducedPoint
 from linkwise.analysis.induced_sources import AT_ONCE, InducedSources, timed
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_rows import Place, ResultRows
@@ -31,10 +31,11 @@ class InducedShares:
     """Row of the result at which these begin."""
 
     @classmethod
-    def of(cls, robot: OpenedRobot, points: Sequence[InducedPoint], others: ResultRows) -> "InducedShares":
+    def of(cls, robot: OpenedRobot, plan: InducedPlan, others: ResultRows) -> "InducedShares":
         """Plan the rows of the points; others: all rows of torques and motion."""
-        sources = InducedSources.of(robot, others) if points else InducedSources(robot, {})
-        return cls(robot, tuple(points), sources, len(others))
+        empty = InducedSources(robot, {})
+        sources = InducedSources.of(robot, others, plan.whole) if plan.points else empty
+        return cls(robot, plan.points, sources, len(others))
 
     @property
     def places(self) -> Iterator[Place]:
@@ -42,8 +43,9 @@ class InducedShares:
 
         They are its acceleration, the shares of the sources, those of ties and contacts, and J̇ q̇ by cause.
         """
-        shares: list[Place] = [("acc", ()), *self.sources.every, *self.sources.shares_beside()]
-        shares += [("acc_kinematic", (s,)) for s in range(len(self.robot.joints))]
+        shares: list[Place] = [("acc", ()), *self.sources.places, *self.sources.shares_beside()]
+        if not self.sources.whole:
+            shares += [("acc_kinematic", (s,)) for s in range(len(self.robot.joints))]
         components = list(dict.fromkeys(row for point in self.points for row in point.rows))
         for number, point in enumerate(self.points):
             for row in point.rows:
@@ -57,7 +59,7 @@ class InducedShares:
         The torques of `out` must be filled already. packed: values of the robot's model
         """
         worst = Closure()
-        numbers = max(1, len(self.sources.every) * q.shape[1])
+        numbers = max(1, len(self.sources.places) * q.shape[1])
         step = max(1, AT_ONCE // numbers)
         for at in range(0, len(q), step) if self.points else ():
             some = slice(at, at + step)
@@ -80,7 +82,11 @@ class InducedShares:
             jacobian, rate = point.maps(self.robot, q, qd)
             own = np.einsum("src,sc->sr", rate, qd)
             whole = np.einsum("src,sc->sr", jacobian, qdd) + own
-            shares = np.concatenate([jacobian @ moved, rate * qd[:, None, :]], axis=2)
+            shares = jacobian @ moved
+            if self.sources.whole:
+                shares[..., len(self.sources.places) - 1] += own
+            else:
+                shares = np.concatenate([shares, rate * qd[:, None, :]], axis=2)
             apart = np.abs(shares.sum(axis=2) - whole).max(axis=0, initial=0.0)
             sizes = np.abs(shares).sum(axis=2).max(axis=0, initial=0.0)
             for r, unit in enumerate(point.units):

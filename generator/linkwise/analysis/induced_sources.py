@@ -33,6 +33,9 @@ from linkwise.arrays import Array
 
 AT_ONCE = 1 << 21
 """Force values of the sources that are computed at once."""
+VELOCITY, WEIGHT = "acc_velocity", "acc_weight"
+WHOLE = {WEIGHT: "acc_gravity", VELOCITY: "acc_qd"}
+"""Sources as one each, and the quantity of their parts by link and joint."""
 Source = tuple[str, tuple[int, ...]]
 """Quantity of a source's shares, and the index along each axis behind those of points: link, cause, load."""
 
@@ -45,14 +48,31 @@ class InducedSources:
     every: dict[Source, list[tuple[int, int]]]
     """Pairs of a coordinate and the place of its torque, by source: a row of the result, a packed value, a
     joint."""
+    summed: tuple[tuple[str, Array], ...] = ()
+    """Sources that are one each: the quantity, and a matrix (packed values, n) that sums these by joint."""
 
     @classmethod
-    def of(cls, robot: OpenedRobot, rows: ResultRows) -> "InducedSources":
-        """Collect the sources of a robot; rows: those of torques."""
+    def of(cls, robot: OpenedRobot, rows: ResultRows, whole: bool = False) -> "InducedSources":
+        """Collect the sources of a robot; rows: those of torques; whole: weights and velocities as one each.
+
+        Shares with names of links that are written stay apart.
+        """
         found: dict[Source, list[tuple[int, int]]] = {}
+        summed = [quantity for quantity in WHOLE if whole and not (robot.is_written and quantity == WEIGHT)]
         for quantity, at, i, place in _parts(robot, rows):
-            found.setdefault((quantity, at), []).append((i, place))
-        return cls(robot, found)
+            if quantity not in [WHOLE[one] for one in summed]:
+                found.setdefault((quantity, at), []).append((i, place))
+        return cls(robot, found, tuple((one, _by_joint(robot, WHOLE[one])) for one in summed))
+
+    @property
+    def whole(self) -> bool:
+        """True if all that velocities do is one source, the last of forces."""
+        return bool(self.summed)
+
+    @property
+    def places(self) -> tuple[Source, ...]:
+        """Sources of forces, in the order of their columns."""
+        return (*self.every, *((quantity, ()) for quantity, _ in self.summed))
 
     def open_terms(self, packed: TermArrays, q: Array, qd: Array, qdd: Array) -> TermArrays:
         """Return the packed values of the tree without ties; packed: those of the robot's model."""
@@ -61,7 +81,7 @@ class InducedSources:
     def shares_beside(self) -> tuple[tuple[str, tuple[int, ...]], ...]:
         """Return what accelerates beside forces: ties by cause, then contacts."""
         found: list[Source] = []
-        if self.robot.constrained is not None:
+        if self.robot.constrained is not None and not self.whole:
             found += [("acc_constraint", (s,)) for s in range(len(self.robot.joints))]
         if self.robot.contacts is not None:
             found += [("acc_contact", (c,)) for c in range(len(self.robot.contacts.names))]
@@ -80,7 +100,9 @@ class InducedSources:
         ties = None if self.robot.constrained is None else self.robot.constrained.constraints
         free: Response = response_of(model.backend, ties, q, qd, self._mass(terms.acceleration, q.shape[1]))
         every = [free.accelerations(forces)]
-        if ties is not None:
+        if ties is not None and self.whole:
+            every[0][..., -1] += np.asarray(free.of_velocities()).sum(axis=-1)
+        elif ties is not None:
             every.append(free.of_velocities())
         moved = np.concatenate(cast("list[Array]", every), axis=2)
         if rows is None or ground is None:
@@ -100,13 +122,18 @@ class InducedSources:
         torques |= {"acc_qd": packed.velocity, "acc_gravity": packed.gravity}
         if self.robot.is_written:
             torques["acc_share"] = model.named_shares(q, qd)[:, *self.robot.structure.share_rows.T]
-        forces = np.zeros((*q.shape, len(self.every)))
+        forces = np.zeros((*q.shape, len(self.places)))
         for x, ((quantity, at), places) in enumerate(self.every.items()):
             there = torques.get(quantity, out.T)
             moved = qd[:, at[-1]] if quantity == "acc_qd" else 1.0
             for i, place in places:
                 torque = there[:, place] * moved
                 forces[:, i, x] += torque if quantity == "acc_tau" else -torque
+        for x, (quantity, by_joint) in enumerate(self.summed, len(self.every)):
+            each = np.asarray(torques[WHOLE[quantity]])
+            if quantity == VELOCITY:
+                each = each * qd[:, model.layout.velocity[:, 2]]
+            forces[:, :, x] = -each @ by_joint
         return forces
 
     def _mass(self, packed: Array, n: int) -> Array:
@@ -117,6 +144,14 @@ class InducedSources:
         for own in self.robot.passive:
             mass[:, own.coordinate, own.coordinate] += own.ratio**2 * own.armature
         return mass
+
+
+def _by_joint(robot: OpenedRobot, quantity: str) -> Array:
+    """Return the matrix (packed values, n) that sums packed values of velocity or gravity by joint."""
+    layout = opened(robot).layout
+    joints = (layout.velocity if quantity == WHOLE[VELOCITY] else layout.gravity)[:, 0]
+    found: Array = np.eye(len(robot.joints))[joints]
+    return found
 
 
 def opened(robot: OpenedRobot) -> Any:

@@ -13,7 +13,7 @@ from linkwise.analysis.column_matching import with_columns
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.times import contact_times, switch_columns
 from linkwise.analysis.filtering import lowpass
-from linkwise.analysis.induced_points import induced_points
+from linkwise.analysis.induced_points import InducedPlan, induced_points
 from linkwise.analysis.loads import Loads
 from linkwise.analysis.loads.read import placed_loads
 from linkwise.analysis.logs import Log, open_log
@@ -106,6 +106,9 @@ class Outputs:
         "be repeated",
         metavar="POINT",
     )
+    induced_whole: bool = option(
+        False, "Tell weights, and all that velocities do, as one source each, not by link and joint"
+    )
     storage: str = option(
         "",
         "Also write what --induced tells as OpenSim's storage files, NAME_POINT.sto",
@@ -190,7 +193,7 @@ class Job:
             "payloads": [payload.record() for payload in robot.payloads],
             "loads": [borne.record() for borne in self.decomposer.loads],
             "contacts": [] if robot.contacts is None else list(robot.contacts.names),
-            "induced": [point.name for point in self.decomposer.induced.points],
+            "induced": [point.name for point in self.decomposer.rows.points],
             "trace": None if self.decomposer.traced is None else self.decomposer.traced.record(),
             "reactions": [joint.name for joint in self.decomposer.reactions.borne],
         }
@@ -292,7 +295,8 @@ def prepared(
         restarts = restart_times(outputs.trace_restart, phases, robot, times, motion, q)
         made = AskedTrace.of(outputs.trace, outputs.trace_windows, restarts, robot, motion)
         traced = TracedRows.of(made, robot, borne, samples)
-    told = ToldBeside(outputs.power_terms, points, bearings, outputs.induced_power, traced)
+    planned = InducedPlan(points, outputs.induced_whole)
+    told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced)
     decomposer = Decomposer.of(robot, processing.convention, borne, times, told)
     return Job(log.name, asked, samples, decomposer, closed, phases)
 

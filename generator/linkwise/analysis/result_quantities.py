@@ -155,6 +155,11 @@ TABLE = {
         "induced_gravity point component link",
         "acceleration by the link's weight alone",
     ),
+    "acc_weight": ("induced_weight point component", "acceleration by the weight of all links alone"),
+    "acc_velocity": (
+        "induced_velocities point component",
+        "acceleration by all that velocities do: forces on links, ties that turn, and the point's own",
+    ),
     "acc_share": (
         "induced_shares point component link share",
         "acceleration by the share of this name on the link alone",

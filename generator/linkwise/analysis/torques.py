@@ -12,7 +12,7 @@ from linkwise.analysis.closed_motion import reason_of
 from linkwise.analysis.contacts.ground import Standing
 from linkwise.analysis.contacts.terms import ContactTerms
 from linkwise.analysis.contacts.times import ContactTimes
-from linkwise.analysis.induced_points import InducedPoint
+from linkwise.analysis.induced_points import InducedPlan
 from linkwise.analysis.induced_power import PowerShares
 from linkwise.analysis.induced_shares import InducedShares
 from linkwise.analysis.loads.placed import PlacedLoad
@@ -37,7 +37,7 @@ class ToldBeside(NamedTuple):
 
     power_terms: bool = False
     """True to tell power by cause and order too."""
-    points: Sequence[InducedPoint] = ()
+    induced: InducedPlan = InducedPlan()
     """Points whose acceleration is told by source."""
     borne: Sequence[BorneJoint] = ()
     """Joints whose whole wrench is told by cause."""
@@ -97,8 +97,11 @@ class Decomposer:
             terms = ContactTerms.of(of_robot, robot.contacts)
             of_robot = terms.rows
         measured = [] if times is None else [at for at, loads in enumerate(times.measured) if loads]
-        places, points = torque_places(robot, of_robot, loads, told.power_terms, measured), told.points
-        induced = InducedShares.of(robot, points, ResultRows.of(robot, places, loads))
+        places, points = (
+            torque_places(robot, of_robot, loads, told.power_terms, measured),
+            told.induced.points,
+        )
+        induced = InducedShares.of(robot, told.induced, ResultRows.of(robot, places, loads))
         reactions = ReactionShares(robot, tuple(told.borne), tuple(loads), convention)
         traced = told.traced
         places += induced.places

@@ -114,6 +114,7 @@ def read_setup(path: Path) -> InducedSetup:
         options = {
             "ignore_extra": True,
             "induced": points,
+            "induced_whole": True,
             "induced_sto": f"{name_of(tool)}_{name_of(analysis)}",
             "sto_units": "deg" if yes(analysis, "in_degrees", True) else "rad",
             **_times(tool, analysis),

@@ -23,7 +23,7 @@ from linkwise.extras import extra
 CENTRE = "center_of_mass"
 """Name that OpenSim gives to the centre of mass."""
 TOTAL, GRAVITY, VELOCITY = "total", "gravity", "velocity"
-OF_VELOCITY = ("acc_qd", "acc_kinematic", "acc_constraint")
+OF_VELOCITY = ("acc_velocity", "acc_qd", "acc_kinematic", "acc_constraint")
 ENDS = {
     "x": "_X",
     "y": "_Y",
@@ -121,7 +121,7 @@ def _source(rows: ResultRows, quantity: str, at: Sequence[int]) -> str:
     match quantity:
         case "acc":
             return TOTAL
-        case "acc_gravity":
+        case "acc_gravity" | "acc_weight":
             return GRAVITY
         case "acc_tau":
             found = rows.axes["joint"].names[at[0]]

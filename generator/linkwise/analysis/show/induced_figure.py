@@ -36,7 +36,7 @@ MOST = 8
 """Joints whose torques have curves of their own; all other torques are summed in one."""
 NOTHING = 1e-9
 """Part of the largest component below which a component is only rounding."""
-MOTION = ("acc_qd", "acc_constraint", "acc_kinematic")
+MOTION = ("acc_qd", "acc_constraint", "acc_kinematic", "acc_velocity")
 Kind = Literal["sum", "torque", "torques", "named", "velocity", "passive", "load", "contact"]
 
 
@@ -110,7 +110,7 @@ def _sources(result: AnalysisResult, point: int, components: Sequence[int]) -> l
         named = enumerate(result.robot.share_names)
         found += [source("named", name, "acc_share", number=m, share=m) for m, name in named]
     else:
-        found.append(source("named", "gravity", "acc_gravity"))
+        found.append(source("named", "gravity", "acc_gravity", "acc_weight"))
     found.append(source("velocity", "velocities", *MOTION))
     if any(name in result.rows for name in LOSSES):
         found.append(source("passive", "springs and losses", *LOSSES))
