@@ -146,7 +146,7 @@ def test_what_accelerates_a_point_is_shown_by_source_and_adds_up(driver, tmp_pat
     loads = Loads.of([Load("pull", "link3", force=(0.0, -5.0, 0.0))], None)
     result, _ = analyze_to(tmp_path / "out", log, robot, Request(outputs=wanted, loads=loads), silent)
     opened(driver, (tmp_path / "out" / "report.html").as_uri())
-    curves = "return [...document.getElementById('induced').data].map((c) => [c.name, Array.from(c.y)])"
+    curves = "return [...document.getElementById('sourced').data].map((c) => [c.name, Array.from(c.y)])"
     choose(driver, "component", 1)
     (name, whole), *parts = driver.execute_script(curves)
     assert name == "all together"
@@ -162,7 +162,7 @@ def test_what_accelerates_a_point_is_shown_by_source_and_adds_up(driver, tmp_pat
         *(f"torque of joint{i}" for i in (1, 2, 3)), "gravity", "velocities", "load pull"
     ]  # fmt: skip
     np.testing.assert_allclose(np.sum([y for _, y in parts], axis=0), whole, atol=1e-10 * np.abs(whole).max())
-    cursor = "return document.getElementById('induced-cursor').style.left"
+    cursor = "return document.getElementById('sourced-cursor').style.left"
     before = driver.execute_script(cursor)
     choose(driver, "slider", 10)
     assert driver.execute_script(cursor) != before

@@ -75,7 +75,7 @@ def test_columns_are_those_of_the_package_and_sum_to_what_velocities_ask(tmp_pat
                 rtol=1e-9,
                 atol=1e-8,
             )
-            np.testing.assert_allclose(found[f"energy_from/{name}"], expected.energy[:, s, w], atol=1e-8)
+            np.testing.assert_allclose(found[f"kinetic_from/{name}"], expected.energy[:, s, w], atol=1e-8)
 
 
 def test_a_trace_does_not_depend_on_the_blocks_in_which_it_is_made(
@@ -113,8 +113,8 @@ def test_tied_joints_are_traced_in_independent_ones(tmp_path: Path) -> None:
     own = import_package(robot).load().constraints.independent
     found = analyze(log(tmp_path, list(own), size=0.3), robot, trace=["all"])
     check_closes(found, 1e-7)
-    assert {c.name for c in found.columns if c.name.startswith("energy_from")} == {
-        f"energy_from/{name}" for name in (f"torque:{own[0]}", "gravity", "start")
+    assert {c.name for c in found.columns if c.name.startswith("kinetic_from")} == {
+        f"kinetic_from/{name}" for name in (f"torque:{own[0]}", "gravity", "start")
     }
 
 

@@ -185,7 +185,7 @@ TABLE = {
         "traced_velocity_torque joint cause origin",
         "torque on the joint by the part of the cause's velocity that goes back to the source",
     ),
-    "energy_from": (
+    "kinetic_from": (
         "traced_energy origin",
         "kinetic energy of the velocities that go back to the source, which it alone changes",
     ),
@@ -249,7 +249,7 @@ BY_SOURCE = {
 """Name with axes, and meaning, of arrays in which springs, damping and so on stand side by side."""
 UNITS = {"tau": TORQUE, "force": "torque:constraint", "power": "W", "acc": "acceleration:component"}
 UNITS |= {"time": "s", "q": "position:joint", "qd": "velocity:joint", "qdd": "acceleration:joint"}
-UNITS |= {"energy": "J", "gain": "W", "flow": "W", "reaction": "torque:wrench"}
+UNITS |= {"energy": "J", "kinetic": "J", "gain": "W", "flow": "W", "reaction": "torque:wrench"}
 UNITS |= {"contact": "", "slip": "velocity:constraint"}
 """Unit by the first part of a name, as the runtime writes it: torque:joint depends on the joint."""
 OF_PACKAGES = {
@@ -302,6 +302,10 @@ QUANTITIES: Mapping[str, ResultQuantity] = {
 """All quantities by name, in the order of a Dataset."""
 REACTION_OF = {torque: torque.replace("tau", "reaction", 1) for torque in PASSIVE}
 """Parts of a reaction by what ties do not carry of joints' passive torques, by torque."""
+REACTIONS = tuple(name for name in QUANTITIES if name.partition("_")[0] == "reaction")
+"""Wrenches of joints, and their shares by cause."""
+TRACED = ("qd_from", "tau_from", "kinetic_from")
+"""Velocities, what they ask for, and their energies, by the sources that they came from."""
 INDUCED = tuple(name for name in QUANTITIES if name.partition("_")[0] == "acc")
 """An acceleration, and its shares by source."""
 BY_POWER = tuple(name for name in QUANTITIES if name.partition("_")[0] in ("energy", "gain", "flow"))

@@ -123,7 +123,7 @@ class TracedRows:
             causes = sorted({at[2] for _, at in velocity if at[0] == i})
             found += [("qd_from", (i, o)) for o in every]
             found += [("tau_from", (i, k, o)) for k in causes for o in every]
-        found += [("energy_from", (o,)) for o in every]
+        found += [("kinetic_from", (o,)) for o in every]
         if len(found) > MOST:
             raise LinkwiseError(
                 f"--trace: {len(self.asked.joints)} joints, {len(every)} sources in windows of"
@@ -197,7 +197,7 @@ class TracedRows:
         """Fill rows of a block in `out` (rows, S) from v_s (S, n, o), energies (S, o) and C (S, m, m)."""
         for row, (i, o) in rows["qd_from"].listed():
             out[row] = velocity[:, i, o]
-        for row, (o,) in rows["energy_from"].listed():
+        for row, (o,) in rows["kinetic_from"].listed():
             out[row] = energy[:, o]
         independent = list(self.robot.driven)
         for (i, k), of_pair in groupby(rows["tau_from"].listed(), key=lambda place: tuple(place[1][:2])):

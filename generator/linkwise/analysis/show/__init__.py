@@ -10,11 +10,13 @@ from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.causes_figure import causes
 from linkwise.analysis.show.contacts_figure import contacts
 from linkwise.analysis.show.energy_figure import energy
-from linkwise.analysis.show.induced_figure import induced
+from linkwise.analysis.show.induced_figure import induced_panels
 from linkwise.analysis.show.paper_figure import paper
 from linkwise.analysis.show.power_figure import power
-from linkwise.analysis.show.reaction_figure import reaction
+from linkwise.analysis.show.reaction_figure import reaction_panels
 from linkwise.analysis.show.shares_figure import shares
+from linkwise.analysis.show.sourced_panels import figure_of
+from linkwise.analysis.show.trace_figure import trace_panels
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.plotstyle import saved, styled
@@ -27,9 +29,10 @@ FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {
     "shares": shares,
     "causes": causes,
     "power": power,
-    "induced": induced,
+    "induced": figure_of(induced_panels),
     "energy": energy,
-    "reaction": reaction,
+    "reaction": figure_of(reaction_panels),
+    "trace": figure_of(trace_panels),
     "contacts": contacts,
 }
 
@@ -37,8 +40,8 @@ FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {
 def draw(result: AnalysisResult, name: str) -> "Figure":
     """Draw one of FIGURES by its name.
 
-    The names "paper:JOINT", "causes:JOINT", "induced:POINT" and "reaction:JOINT" choose another joint or
-    point than the first, "energy:PHASE" a phase in place of the whole movement.
+    The names "paper:JOINT", "causes:JOINT", "induced:POINT", "reaction:JOINT" and "trace:JOINT" choose
+    another joint or point than the first, "energy:PHASE" a phase in place of the whole movement.
 
     Raises LinkwiseError for another name.
     """
@@ -109,6 +112,6 @@ def check_figure(name: str, robot: OpenedRobot, told: FigureNames) -> None:
     ):
         raise LinkwiseError(
             f"--figure {name}: give one of {', '.join(FIGURES)}, causes:JOINT or paper:JOINT with a joint of"
-            f" {listed(nearest_first(joint, robot.driven_joints))}, induced:POINT or"
-            " reaction:JOINT"
+            f" {listed(nearest_first(joint, robot.driven_joints))}, induced:POINT,"
+            " reaction:JOINT or trace:JOINT"
         )

@@ -10,9 +10,18 @@ from linkwise.analysis.joint_causes import are_motions_whole
 from linkwise.analysis.loads.placed import model_pose
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result import AnalysisResult
-from linkwise.analysis.result_quantities import BY_POWER, FORCES, GROUND, INDUCED, MOTION, TORQUE_OF
+from linkwise.analysis.result_quantities import (
+    BY_POWER,
+    FORCES,
+    GROUND,
+    INDUCED,
+    MOTION,
+    REACTIONS,
+    TORQUE_OF,
+    TRACED,
+)
 from linkwise.analysis.result_rows import Column, ResultRows
-from linkwise.analysis.show.induced_figure import TITLES, components, numbers_of_curves, source_curves
+from linkwise.analysis.show.induced_figure import induced_panels
 from linkwise.analysis.show.page_curves import (
     CurveSums,
     at_instants,
@@ -24,6 +33,9 @@ from linkwise.analysis.show.page_curves import (
     point_data,
     stride_for,
 )
+from linkwise.analysis.show.reaction_figure import reaction_panels
+from linkwise.analysis.show.sourced_panels import SourcedPanels
+from linkwise.analysis.show.trace_figure import trace_panels
 from linkwise.arrays import Array
 from linkwise.escape import printable, script_data
 from linkwise.plotstyle import COLOURS, GRAVITY, ON_DARK
@@ -51,14 +63,24 @@ def view(result: AnalysisResult) -> dict[str, str]:
     }
 
 
-OFF_PAGE = (*TORQUE_OF, *FORCES, *GROUND, *INDUCED, *BY_POWER)
+OFF_PAGE = (*TORQUE_OF, *FORCES, *GROUND, *INDUCED, *BY_POWER, *REACTIONS, *TRACED)
 """Quantities that a page does not hold: power, the product of two that it holds, power by source, and those
-of contacts; of induced accelerations it holds sums."""
+of contacts; of what `sourced` shows it holds sums."""
 
 
-def numbers_on_page(rows: ResultRows) -> int:
-    """Return the largest count of numbers per sample on a page."""
-    return sum(name not in OFF_PAGE for name, _ in rows.places) + numbers_of_curves(rows)
+def sourced(result: AnalysisResult) -> list[SourcedPanels]:
+    """Return what the page shows by sources: points that are accelerated, joints that carry, traces."""
+    traced = () if result.traced is None else result.traced["joints"]
+    return [
+        *(induced_panels(result, point, angular=True) for point in range(len(result.induced))),
+        *(reaction_panels(result, number) for number in range(len(result.reactions))),
+        *(trace_panels(result, number) for number in range(len(traced))),
+    ]
+
+
+def numbers_on_page(rows: ResultRows, shown: Sequence[SourcedPanels] = ()) -> int:
+    """Return the count of numbers per sample on a page."""
+    return sum(name not in OFF_PAGE for name, _ in rows.places) + sum(one.count for one in shown)
 
 
 def page_data(result: AnalysisResult) -> str:
@@ -70,8 +92,9 @@ def page_data(result: AnalysisResult) -> str:
     Names are made printable, except those of columns, which are the table's. Joints that follow others are
     left out.
     """
-    robot = result.robot
-    stride = stride_for(result.total, numbers_on_page(result.rows), NUMBERS, SAMPLES)
+    robot, by_source, sums = result.robot, sourced(result), CurveSums(result)
+    pieces = page_pieces(len(sums.keys) + sum(one.count for one in by_source))
+    stride = stride_for(result.total, numbers_on_page(result.rows, by_source), NUMBERS, SAMPLES)
     instants = replace(result, values=at_instants(result, stride))
     force, pressed = _largest_forces(result)
     shown = [
@@ -93,7 +116,7 @@ def page_data(result: AnalysisResult) -> str:
         "columns": [_column(result.columns[at], robot.driven) for at in shown],
         "values": encoded(instants.values[shown]),
         "together": are_motions_whole(result),
-        "curves": curve_data(result, stride > 1),
+        "curves": curve_data(result, sums, pieces, stride > 1),
         "work": _work(result),
         "largestPower": _largest_power(result),
         "colours": list(COLOURS),
@@ -107,7 +130,7 @@ def page_data(result: AnalysisResult) -> str:
         "largestForce": force,
         "loads": _loads(instants),
         "reactions": _reactions(instants, pressed),
-        "induced": [_induced(result, point, stride > 1) for point in range(len(result.induced))],
+        "sourced": [_sourced(result, one, pieces if stride > 1 else None) for one in by_source],
     }
     return script_data(data)
 
@@ -220,23 +243,21 @@ def _reactions(result: AnalysisResult, largest: Array) -> list[dict[str, str]]:
     return out
 
 
-def _induced(result: AnalysisResult, point: int, is_thinned: bool) -> dict[str, Any]:
-    """Return the components of an acceleration, and its sources' curves, (rows, samples) each or thinned."""
-    name, rows = result.induced[point], components(result, point)
-    pieces = page_pieces(result, CurveSums(result)) if is_thinned else result.total
+def _sourced(result: AnalysisResult, shown: SourcedPanels, pieces: int | None) -> dict[str, Any]:
+    """Return panels, and the curves of their sources, (panels, samples) each, or thinned to pieces."""
     return {
-        "name": printable(TITLES.get(name, name)),
-        "rows": [{"name": printable(row), "unit": unit} for row, unit in rows.values()],
+        "name": printable(shown.title),
+        "rows": [{"name": printable(name), "unit": unit} for name, unit in shown.panels],
         "curves": [
             {
                 "kind": source.kind,
                 "label": printable(source.label),
                 "at": source.number,
-                "points": point_data(result, found, pieces)
-                if is_thinned
-                else {"values": encoded(found.values)},
+                "points": {"values": encoded(found.values)}
+                if pieces is None
+                else point_data(result, found, pieces),
             }
-            for source, found in source_curves(result, point, list(rows), pieces)
+            for source, found in shown.curves(result, pieces or result.total)
         ],
     }
 

@@ -9,7 +9,6 @@ import numpy as np
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import MOTION, PASSIVE, QUANTITIES
 from linkwise.analysis.show.drawn_curves import DrawnCurves, drawn_curves, piece_size
-from linkwise.analysis.show.induced_figure import numbers_of_curves
 from linkwise.arrays import Array
 from linkwise.extras import extra
 
@@ -67,19 +66,17 @@ class CurveSums:
         return sums
 
 
-def page_pieces(result: AnalysisResult, sums: CurveSums) -> int:
-    """Return the number of pieces into which long curves of a page are cut."""
-    curves = len(sums.keys) + numbers_of_curves(result.rows)
+def page_pieces(curves: int) -> int:
+    """Return the number of pieces into which each of so many long curves of a page is cut."""
     return max(2, min(PIECES, POINTS // (2 * curves)))
 
 
-def curve_data(result: AnalysisResult, is_thinned: bool) -> dict[str, Any]:
+def curve_data(result: AnalysisResult, sums: CurveSums, pieces: int, is_thinned: bool) -> dict[str, Any]:
     """Return the mean and largest magnitude of each curve, by its key, and if thinned its points.
 
     The mean and the largest magnitude are over all samples. The points of a curve that is drawn whole are the
     samples on the page. The instant of the largest torque by motion is included, too.
     """
-    sums = CurveSums(result)
     mean, peak = np.zeros((2, len(sums.keys)))
     moving = result.rows.numbers(*MOTION)
     most, busiest = 0.0, float(result.time[0])
@@ -90,7 +87,6 @@ def curve_data(result: AnalysisResult, is_thinned: bool) -> dict[str, Any]:
         moved = np.abs(part.values[moving]).max(axis=0, initial=0.0)
         if moved.max() > most:
             most, busiest = float(moved.max()), float(part.time[moved.argmax()])
-    pieces = page_pieces(result, sums)
     return {
         "keys": [" ".join("null" if x is None else str(x) for x in key) for key in sums.keys],
         "mean": mean.tolist(),

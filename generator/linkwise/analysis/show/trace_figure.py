@@ -1,0 +1,75 @@
+"""Panels of what velocities ask of a joint, and of its own velocity, by the sources that these came from."""
+
+from typing import Any
+
+from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD, START, TORQUE
+
+from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.result_rows import OVER_TIME
+from linkwise.analysis.show.sourced_panels import SourceCurve, SourcedPanels, largest_alone
+from linkwise.analysis.traced_rows import CONTACT
+from linkwise.arrays import Index
+
+MOST = 7
+"""Sources that have curves of their own; all others are summed in one."""
+PASSIVE = ("spring", "damping", "friction")
+
+
+def trace_panels(result: AnalysisResult, number: int) -> SourcedPanels:
+    """Return panels for what velocities ask of a joint that was asked for, and for its own velocity."""
+    assert result.traced is not None
+    joint = result.robot.joints.index(result.traced["joints"][number])
+    name, unit = result.robot.plot_joints[joint], result.robot.units[joint]
+    torques = result.rows.numbers("tau_from", joint=joint)
+    panels = [("its velocity", unit + OVER_TIME["velocity"])]
+    quantities: list[tuple[str, dict[str, Any]]] = [("qd_from", {"joint": joint})]
+    if len(torques):
+        panels.insert(0, ("asked by velocities", result.robot.torque_units[joint]))
+        quantities.insert(0, ("tau_from", {"joint": joint}))
+    return SourcedPanels(
+        f"Where the velocities came from that load {name}, and its own",
+        panels,
+        _sources(result, joint, quantities),
+        ("parts of velocities that the forces of one source gave since the start, in joint coordinates",),
+    )
+
+
+def _sources(
+    result: AnalysisResult, joint: int, quantities: list[tuple[str, dict[str, Any]]]
+) -> list[SourceCurve]:
+    """Return the sum, and the sources with the largest mean magnitudes."""
+    origins = result.rows.axes["origin"].names
+
+    def rows(*which: int) -> tuple[Index, ...]:
+        return tuple(result.rows.numbers(name, **at, origin=list(which)) for name, at in quantities)
+
+    wholes = {"tau_from": "tau_qd", "qd_from": "qd"}
+    whole = tuple(result.rows.numbers(wholes[name], joint=joint) for name, _ in quantities)
+    every = [_named(result, name, rows(o)) for o, name in enumerate(origins)]
+    alone, rest = largest_alone(result, every, MOST)
+    found = [SourceCurve("sum", "all together", 0, whole), *(every[o] for o in alone)]
+    if rest:
+        found.append(SourceCurve("others", f"{len(rest)} other sources", 0, rows(*rest)))
+    return found
+
+
+def _named(result: AnalysisResult, origin: str, rows: tuple[Index, ...]) -> SourceCurve:
+    """Return the curve of a source, named in words."""
+    robot = result.robot
+    kind, _, rest = origin.partition(BETWEEN)
+    named = [joint for joint in robot.joints if rest == joint or rest.startswith(f"{joint} ")]
+    joint = max(named, key=len, default="")
+    shown = robot.plot_joints[robot.joints.index(joint)] + rest[len(joint) :] if joint else rest
+    if kind == TORQUE:
+        return SourceCurve("joint", f"torque of {shown}", robot.driven.index(robot.joints.index(joint)), rows)
+    if kind in PASSIVE:
+        return SourceCurve("passive", f"{kind} of {shown}", 0, rows)
+    if kind == LOAD:
+        number = next(e for e, load in enumerate(result.loads) if rest.startswith(load.name))
+        return SourceCurve("load", f"load {rest}", number, rows)
+    if kind == CONTACT:
+        return SourceCurve("contact", f"ground at {rest}", 0, rows)
+    if origin.startswith(START):
+        return SourceCurve("start", origin.replace(START, "motion at the start", 1), 0, rows)
+    shares = [m for m, name in enumerate(robot.share_names) if origin.startswith(name)]
+    return SourceCurve("named", origin, max(shares, default=0), rows)
