@@ -363,6 +363,7 @@ MOTIONS = (
             "windows": (),
             "restarts": (),
             "by_link": False,
+            "weight": "apart",
         },
         own="passive",
         ties="kept",

@@ -556,6 +556,7 @@ class Dynamics(RobotCalls):
         windows: Any = (),
         restarts: Any = (),
         by_link: bool = False,
+        weight: str = "apart",
     ) -> TracedMotion[Array]:
         """Return a motion's velocities by the forces that gave them: parts that sum to qd.
 
@@ -571,12 +572,14 @@ class Dynamics(RobotCalls):
         windows: length in s, or instants, (W - 1,): sources are cut there, at the samples next to them
         restarts: instants at which the trace begins anew: all velocities are those of the start there
         by_link: whether gravity is a source for each link
+        weight: "apart", as a source: it and the torques that hold it then give velocities that grow with time
+        and cancel each other; or "borne": torques are those beyond what holds the weight, which is no source
 
         Between samples velocities go by cubics that have the accelerations of the samples. Raises ValueError
         for a gap in time, for instants outside the motion, for kinetic energies of degree three or more in
         the velocities, and as `forward_dynamics` and `Constraints` do.
         """
-        given = Traced(q, qd, qdd, time, tau, loads, passive, constraints, windows, restarts, by_link)
+        given = Traced(q, qd, qdd, time, tau, loads, passive, constraints, windows, restarts, by_link, weight)
         traced: TracedMotion[Array] = trace_motion(self, given)
         return traced
 

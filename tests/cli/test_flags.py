@@ -54,6 +54,7 @@ ANALYSIS: dict[str, Any] = {
     "reaction": ("knee,world",),
     "trace": ("knee",),
     "trace_windows": 0.2,
+    "trace_weight": "borne",
     "trace_restart": ("phases",),
     "induced_whole": True,
 }
@@ -93,6 +94,7 @@ WRITTEN = AnalysisChoices(
         reactions=("knee,world",),
         trace=("knee",),
         trace_windows=0.2,
+        trace_weight="borne",
         trace_restart=("phases",),
     ),
     payload=("hand=2",),

@@ -122,6 +122,21 @@ def test_what_given_torques_leave_of_a_motion_is_the_residual(package_of: Packag
     assert np.abs(missing.total - motion[1]).max() <= 1e-8
 
 
+def test_weight_that_torques_bear_is_no_source(package_of: Packages) -> None:
+    robot = package_of(CRANE).load()
+    still = np.broadcast_to(motion_of(robot.n)[0][3], (81, robot.n))
+    held = robot.trace(still, 0.0 * still, 0.0 * still, TIME, weight="borne")
+    assert "gravity" not in held.sources
+    assert not held.velocity.any(), "nothing moves, and nothing moved it"
+    assert np.abs(robot.trace(still, 0.0 * still, 0.0 * still, TIME).of("gravity")).max() > 1.0
+    motion = motion_of(robot.n)
+    needed = robot.inverse_dynamics(*motion) + robot.passive_torque(*motion).total
+    borne = robot.trace(*motion, TIME, weight="borne")
+    assert np.abs(borne.total - motion[1]).max() <= 1e-8
+    given = robot.trace(*motion, TIME, tau=needed, weight="borne")
+    np.testing.assert_allclose(given.of("torque"), borne.of("torque"), rtol=1e-5, atol=1e-5)
+
+
 def test_springs_and_losses_are_sources_where_joints_have_them(tmp_path: Path) -> None:
     (tmp_path / "sprung.toml").write_text(SPRUNG)
     write_package(generate(read_system(tmp_path / "sprung.toml"), ["numpy"]), tmp_path / "sprung")
@@ -167,6 +182,7 @@ def test_what_cannot_be_traced_is_refused(package_of: Packages) -> None:
         r"restarts\[1\] is 0.301 s, next to the sample at 0.3 s, where another one is": lambda: robot.trace(
             *motion, TIME, restarts=[0.3, 0.301]
         ),
+        "weight is 'held'; give apart or borne": lambda: robot.trace(*motion, TIME, weight="held"),
         r"no source 'elbow' moves this robot; its sources are": lambda: robot.trace(*motion, TIME).of(
             "elbow"
         ),

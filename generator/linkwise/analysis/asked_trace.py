@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from linkwise_runtime.motion.traced import trace_parts, window_ends
@@ -16,6 +17,7 @@ from linkwise.escape import listed
 
 EVERY, PHASES = "all", "phases"
 """Words for all joints, and for begins and ends of phases."""
+Weight = Literal["apart", "borne"]
 AT_ONCE = 4096
 """Samples that are looked at for phases at once."""
 
@@ -27,6 +29,8 @@ class AskedTrace:
     joints: tuple[int, ...]
     parts: TraceParts
     windows: tuple[tuple[float, float], ...]
+    is_borne: bool
+    """True if torques are those beyond what holds the weight, which is no source."""
 
     @classmethod
     def of(
@@ -34,20 +38,27 @@ class AskedTrace:
         names: Sequence[str],
         windows: float | None,
         restarts: Sequence[float],
+        is_borne: bool,
         robot: OpenedRobot,
         time: Array,
     ) -> "AskedTrace":
         """Return the trace of a movement at these times, in s.
 
-        Raises LinkwiseError for a joint that is not there, and for times outside the movement.
+        Raises LinkwiseError for a joint that is not there, for times outside the movement, and for weight
+        that is borne of links that were written by hand.
         """
+        if is_borne and robot.is_written:
+            raise LinkwiseError(
+                f"--trace-weight borne: the links of {robot.name} were written by hand, and it is not said"
+                " which of their shares torques bear; leave it out"
+            )
         joints = [k for name in names for k in _joints(name, robot)]
         try:
             flags = "--trace-windows", "--trace-restart"
             parts = trace_parts(() if windows is None else windows, sorted(restarts), time.tolist(), flags)
         except ValueError as error:
             raise LinkwiseError(str(error)) from None
-        return cls(tuple(dict.fromkeys(joints)), parts, window_ends(parts, time.tolist()))
+        return cls(tuple(dict.fromkeys(joints)), parts, window_ends(parts, time.tolist()), is_borne)
 
 
 def restart_times(

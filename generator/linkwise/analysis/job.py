@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from linkwise.analysis.asked_trace import AskedTrace, restart_times
+from linkwise.analysis.asked_trace import AskedTrace, Weight, restart_times
 from linkwise.analysis.borne_joints import borne_joints
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples, slip_warnings
 from linkwise.analysis.column_matching import with_columns
@@ -138,6 +138,9 @@ class Outputs:
     trace_windows: float | None = option(
         None, "Cut the sources of --trace into windows of this length, s", metavar="S"
     )
+    trace_weight: Weight = option(
+        "apart", "Weight as a source of --trace, or borne by torques: these then are what is beyond"
+    )
     trace_restart: tuple[str, ...] = option(
         (),
         "Begin the trace anew at a time, s, or wherever a phase begins or ends; may be repeated",
@@ -149,6 +152,7 @@ class Outputs:
             ("--induced-sto", self.storage, "--induced", self.induced),
             ("--trace-windows", self.trace_windows, "--trace", self.trace),
             ("--trace-restart", self.trace_restart, "--trace", self.trace),
+            ("--trace-weight borne", self.trace_weight == "borne", "--trace", self.trace),
         ):
             if given and not there:
                 raise LinkwiseError(f"{flag} goes with {needed}; add it")
@@ -293,7 +297,8 @@ def prepared(
     if outputs.trace:
         q = samples.q[start:stop]
         restarts = restart_times(outputs.trace_restart, phases, robot, times, motion, q)
-        made = AskedTrace.of(outputs.trace, outputs.trace_windows, restarts, robot, motion)
+        cut = outputs.trace_windows, restarts, outputs.trace_weight == "borne"
+        made = AskedTrace.of(outputs.trace, *cut, robot, motion)
         traced = TracedRows.of(made, robot, borne, samples)
     planned = InducedPlan(points, outputs.induced_whole)
     told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced)

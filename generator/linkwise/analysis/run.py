@@ -7,7 +7,7 @@ from pathlib import Path
 
 from linkwise_runtime.quantities import Contact
 
-from linkwise.analysis.asked_trace import EVERY
+from linkwise.analysis.asked_trace import EVERY, Weight
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.standing import with_contacts
 from linkwise.analysis.disk_rows import EverySample
@@ -50,6 +50,7 @@ def analyze(
     reactions: Sequence[str] = (),
     trace: Sequence[str] = (),
     trace_windows: float | None = None,
+    trace_weight: Weight = "apart",
     trace_restart: Sequence[str] = (),
 ) -> Analysis:
     """Analyse a motion log with a generated robot, all samples in memory.
@@ -65,6 +66,7 @@ def analyze(
     induced_power: whether to tell by its sources the power that each link gets, and that through each joint
     trace: joints whose velocities, and what velocities ask of them, are traced to their sources, or "all"
     trace_windows: length in s of the windows of time into which these sources are cut
+    trace_weight: "apart", weight as a source, or "borne", torques as what is beyond what holds it
     trace_restart: times in s at which the trace begins anew, written as numbers, or "phases"
 
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
@@ -79,6 +81,7 @@ def analyze(
         phases=tuple(map(Phase.of, phases)),
         trace=tuple(trace),
         trace_windows=trace_windows,
+        trace_weight=trace_weight,
         trace_restart=tuple(map(str, trace_restart)),
     )
     asked = Request(reading or Reading(), processing or Processing(), outputs, borne, held)

@@ -96,6 +96,7 @@ class TracedRows:
             passive=True,
             torques_given=False,
             given=tuple(given),
+            is_borne=asked.is_borne,
             carried=carried,
             backend_at=cast(Any, backend_at) if robot.time_name or robot.inputs else None,
         )
@@ -137,6 +138,7 @@ class TracedRows:
         return {
             "joints": [self.robot.joints[i] for i in self.asked.joints],
             "sources": list(self.tracer.equations.sources),
+            "weight": "borne" if self.asked.is_borne else "apart",
             "windows": [list(window) for window in self.asked.windows],
             "begins_at_samples": list(self.asked.parts.restarts),
         }

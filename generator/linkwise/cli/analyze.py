@@ -34,7 +34,7 @@ app = typer.Typer(add_completion=False)
     *("log", "robot", "opensim_setup", "out", "units", "time", "topic", "qpos"),
     ...,
     *("induced", "induced_sto", "sto_units", "induced_power", "reaction"),
-    *("trace", "trace_windows", "trace_restart", "backend", "page", "as_json"),
+    *("trace", "trace_windows", "trace_weight", "trace_restart", "backend", "page", "as_json"),
     complete=with_setup,
 )
 def analyze(

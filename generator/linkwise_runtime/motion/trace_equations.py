@@ -63,6 +63,8 @@ class TraceEquations:
     """Names of the sources whose forces are the columns after that."""
     by_link: bool = False
     """True if gravity, or each share with a name, is a source for each link."""
+    is_borne: bool = False
+    """True if weight is no source, and torques are those beyond what holds it."""
     carried: tuple[ArrayBackend, ...] = ()
     """Back ends of the same joints with nothing but payloads, which are carried beside the robot's links."""
     backend_at: Callable[[Numbers], ArrayBackend] | None = None
@@ -82,7 +84,7 @@ class TraceEquations:
         joints = structure.joint_names if self.torques_given else self.coordinates
         shares = [
             f"{share}{BETWEEN}{link}" if self.by_link else share
-            for share in structure.share_names
+            for share in (() if self.is_borne else structure.share_names)
             for link in (structure.link_names if self.by_link else ("",))
         ]
         own = [
@@ -135,7 +137,10 @@ class TraceEquations:
             coriolis = found.mT @ (mass @ rate + coriolis @ found)
             mass, forces = found.mT @ mass @ found, found.mT @ forces
             needed = _times(found.mT, needed)
-        columns = self._with_actuators(backend, place, needed, forces, motion.given)
+        tau = motion.given[..., 0] if self.torques_given else None
+        if tau is not None and self.is_borne:
+            tau = tau - g.sum(-1)
+        columns = self._with_actuators(backend, place, needed, forces, tau)
         return TraceAt(qd, LinearEquations(mass, coriolis, columns), place)
 
     def _at(self, motion: SampledMotion) -> ArrayBackend:
@@ -166,6 +171,7 @@ class TraceEquations:
         # (..., n, N, M) in the order of the names: by share, then by link.
         by_link = xp.swapaxes(shares, -1, -2)
         kinds = [-by_link.reshape(*q.shape, -1) if self.by_link else -shares.sum(-2)]
+        kinds = [] if self.is_borne else kinds
         if self._passive:
             own = backend.answers.passive_torque(q, qd, 0.0 * q)[:3]
             identity = np.eye(structure.n)
@@ -179,17 +185,17 @@ class TraceEquations:
         place: ClosedPlace | None,
         needed: Numbers,
         forces: Numbers,
-        given: Numbers,
+        tau: Numbers | None,
     ) -> Numbers:
         """Return the forces (..., m, X) of all sources, with what the actuators give, and the start's zeros.
 
-        needed: torques (..., m) that the motion needs of the actuators
+        needed: torques (..., m) that the motion needs of the actuators; tau: those (..., n) that they gave
         """
         xp, start = namespace(forces), 0.0 * needed[..., None]
-        if not self.torques_given:
+        if tau is None:
             own = backend.constant(np.eye(needed.shape[-1]), needed) * needed[..., None]
             return xp.concat([own, forces, start], -1)
-        own = backend.constant(np.eye(given.shape[-2]), given) * given[..., :1]
+        own = backend.constant(np.eye(tau.shape[-1]), tau) * tau[..., None]
         if place is not None:
             own = place.found.map.mT @ own
         left = needed - own.sum(-1)

@@ -17,6 +17,8 @@ from .source_forces import AppliedLoads, loads_of
 from .trace_equations import BETWEEN, LOAD, TraceEquations
 from .tracer import TraceParts, Tracer
 
+WEIGHTS = ("apart", "borne")
+"""Ways to count weight: as a source, or as what torques hold."""
 GAP = 5.0
 """Steps longer than this many usual ones are a gap in the log."""
 
@@ -35,6 +37,7 @@ class Traced(NamedTuple):
     windows: object = ()
     restarts: object = ()
     by_link: bool = False
+    weight: object = "apart"
 
 
 class ReadTrace(NamedTuple):
@@ -61,7 +64,13 @@ def read_trace(robot: DrivenRobot, asked: Traced) -> ReadTrace:
     _check_traceable(backend, motion["q"])
     names = tuple(f"{LOAD}{BETWEEN}{name}" for name in loads.names(backend))
     equations = TraceEquations(
-        backend, constraints, bool(asked.passive), "tau" in motion, names, asked.by_link
+        backend,
+        constraints,
+        bool(asked.passive),
+        "tau" in motion,
+        names,
+        asked.by_link,
+        _borne(asked, backend),
     )
     vectors = numbers[len(named) :]
     return ReadTrace(times, _sampled(backend, loads, times, motion, vectors), equations, loads, vectors)
@@ -114,6 +123,18 @@ def _instants(time: object, q: Numbers) -> list[float]:
             f"by {usual:.4g} s; trace the parts before and after it alone"
         )
     return times
+
+
+def _borne(asked: Traced, backend: ArrayBackend) -> bool:
+    """Return whether torques bear the weight; raises ValueError for a word that is not in WEIGHTS."""
+    if asked.weight not in WEIGHTS:
+        raise ValueError(f"weight is {short(asked.weight)}; give {' or '.join(WEIGHTS)}")
+    if asked.weight == "borne" and backend.structure.shares:
+        raise ValueError(
+            f"the links of {backend.structure.name} were written by hand, and it is not said which of their "
+            "shares torques bear; leave weight out"
+        )
+    return asked.weight == "borne"
 
 
 def _check_traceable(backend: ArrayBackend, q: Numbers) -> None:

@@ -21,6 +21,9 @@ def trace_panels(result: AnalysisResult, number: int) -> SourcedPanels:
     joint = result.robot.joints.index(result.traced["joints"][number])
     name, unit = result.robot.plot_joints[joint], result.robot.units[joint]
     torques = result.rows.numbers("tau_from", joint=joint)
+    weight = ""
+    if result.traced["weight"] == "borne":
+        weight = "; torques are what is beyond what holds the weight"
     panels = [("its velocity", unit + OVER_TIME["velocity"])]
     quantities: list[tuple[str, dict[str, Any]]] = [("qd_from", {"joint": joint})]
     if len(torques):
@@ -30,7 +33,7 @@ def trace_panels(result: AnalysisResult, number: int) -> SourcedPanels:
         f"Where the velocities came from that load {name}, and its own",
         panels,
         _sources(result, joint, quantities),
-        ("parts of velocities that the forces of one source gave since the start, in joint coordinates",),
+        (f"parts of velocities that one source gave since the start, in joint coordinates{weight}",),
     )
 
 
