@@ -5,7 +5,6 @@ through the joints: as wide as the power, grey as far as it is passed on, and in
 as the joint gives or takes it. Bars beside the lanes say which cause gave each segment its energy.
 """
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,100 +13,33 @@ from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.drawn_curves import (
     drawn_curves,
     foot,
-    largest_few,
     new_figure,
     time_axis,
     write_note,
     write_title,
 )
+from linkwise.analysis.show.energy_lanes import GAP, NOTHING, PASSED, Lanes, draw_flows
 from linkwise.analysis.show.energy_segments import (
-    HANDED_ON,
-    LOST,
-    Segment,
     SegmentFlows,
     SegmentWork,
     energies,
-    joints_label,
     segment_flows,
     segments_of,
     work_of_segments,
 )
-from linkwise.arrays import Array
 from linkwise.extras import extra
-from linkwise.plotstyle import BROWN, GRAVITY, INK, drawn, tone
+from linkwise.plotstyle import INK, drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST = 7
-"""Segments with a lane; those with less energy flowing are left out."""
 SPANS = 24
 """Arrows at a joint over the movement."""
-GAP, TALLEST, TIP = 0.85, 0.95, 0.2
-"""Heights of the room for arrows between lanes, which are 1 high, of the largest energy, and of a tip."""
-WIDEST = 0.9
-"""Width of the largest arrow in its span."""
-PASSED, REST, AREA, EDGE = "#B4BAC4", "#DDE1E6", "#F3E3C3", "#8C6D31"
+TALLEST = 0.95
+"""Height of the largest energy in a lane, which is 1 high."""
+AREA, EDGE = "#F3E3C3", "#8C6D31"
 ROUNDED = 1e-3
 """Part of the largest work below which the work of loads is not told."""
-NOTHING = 1e-9
-"""Part of the largest work below which a work is only rounding."""
-
-
-@dataclass(frozen=True, eq=False)
-class Lanes:
-    """Segments that are drawn, each in a lane, from the top."""
-
-    every: tuple[Segment, ...]
-    shown: tuple[int, ...]
-    """Index of the segments with a lane."""
-    names: tuple[str, ...]
-    """Names of all segments."""
-    joints: tuple[str, ...]
-    """Names of their joints; empty without any."""
-
-    @classmethod
-    def of(cls, result: AnalysisResult, every: tuple[Segment, ...], sizes: Array) -> "Lanes":
-        """Return the lanes of the segments with the largest sizes."""
-        robot = result.robot
-        names = tuple(drawn(" + ".join(robot.plot_links[j] for j in one.links)) for one in every)
-        joints = tuple(drawn(joints_label(robot, one)) if one.joints else "" for one in every)
-        return cls(every, tuple(largest_few(sizes, MOST)[0]), names, joints)
-
-    @property
-    def is_jointed(self) -> bool:
-        """True if flows between segments are known."""
-        return any(self.joints)
-
-    @property
-    def bases(self) -> list[float]:
-        """Heights of the lanes' ground lines."""
-        return [-lane * (1.0 + (GAP if self.is_jointed else 0.1)) for lane in range(len(self.shown))]
-
-    def carrier(self, segment: int) -> str:
-        """Return the name of what carries a segment."""
-        carrier = self.every[segment].carrier
-        return "the ground" if carrier is None else self.names[carrier]
-
-    def colour(self, segment: int) -> str:
-        """Return the colour of a shown segment's joints."""
-        return tone(self.shown.index(segment))
-
-    def causes(self, work: SegmentWork) -> list[tuple[str, str, Array]]:
-        """Return label, colour and work of each cause, torques of segments that are not shown as one."""
-        found = []
-        hidden = [at for at in work.torques if at not in self.shown]
-        for at in self.shown:
-            if at in work.torques:
-                found.append((f"torque of {self.joints[at]}", self.colour(at), work.torques[at]))
-        if hidden:
-            rest = np.sum([work.torques[at] for at in hidden], axis=0)
-            found.append((f"torques of {len(hidden)} others", REST, rest))
-        own = {"gravity": GRAVITY, HANDED_ON: PASSED, LOST: BROWN}
-        for number, (label, one) in enumerate(work.others.items(), len(found)):
-            found.append((label, own.get(label, tone(number)), one))
-        most = max(float(abs(one).max(initial=0.0)) for *_, one in found)
-        return [cause for cause in found if float(abs(cause[2]).max(initial=0.0)) > NOTHING * most]
 
 
 def energy(result: AnalysisResult, phase: int) -> "Figure":
@@ -124,7 +56,7 @@ def energy(result: AnalysisResult, phase: int) -> "Figure":
     right = figure.add_subplot(grid[0, 1], sharey=left)
     _energies(left, result, lanes)
     flows = segment_flows(result, every, SPANS)
-    widest = _flows(left, flows, lanes)
+    widest = draw_flows(left, flows, lanes)
     _name_lanes(left, lanes)
     time_axis(left, result)
     if phase:
@@ -137,11 +69,12 @@ def energy(result: AnalysisResult, phase: int) -> "Figure":
     right.set_xlabel(f"J, over {span}")
     _legend(figure.add_subplot(grid[1, :]), right, bool(widest))
     write_title(figure, result, "How energy flows")
-    write_note(figure, *_notes(lanes, flows, widest), foot(result))
+    tied = result.robot.constrained is not None
+    write_note(figure, _note(lanes, flows, widest, tied), foot(result))
     return figure
 
 
-def _notes(lanes: Lanes, flows: SegmentFlows, widest: float) -> list[str]:
+def _note(lanes: Lanes, flows: SegmentFlows, widest: float, tied: bool) -> str:
     told = ["lanes: kinetic and potential energy above its least, all by one scale"]
     if widest:
         step = flows.time[1] - flows.time[0]
@@ -149,7 +82,9 @@ def _notes(lanes: Lanes, flows: SegmentFlows, widest: float) -> list[str]:
     left_out = len(lanes.every) - len(lanes.shown)
     if left_out:
         told.append(f"{left_out} segments that less work was done on are left out")
-    return [" · ".join(told)]
+    if tied:
+        told.append("what ties carry to a segment counts as if it came through its joints")
+    return " · ".join(told)
 
 
 def _energies(panel: Any, result: AnalysisResult, lanes: Lanes) -> None:
@@ -179,48 +114,6 @@ def _energies(panel: Any, result: AnalysisResult, lanes: Lanes) -> None:
             zorder=6,
             path_effects=[extra("matplotlib.patheffects").withStroke(linewidth=2, foreground="white")],
         )
-
-
-def _flows(panel: Any, flows: SegmentFlows, lanes: Lanes) -> float:
-    """Draw arrows between lanes; return the largest power in W, 0 without flows."""
-    shown = list(lanes.shown)
-    widest = float(np.abs([flows.out[shown], flows.into[shown]]).max(initial=0.0))
-    if not widest:
-        return 0.0
-    scale = WIDEST * (flows.time[1] - flows.time[0]) / widest
-    for base, at in zip(lanes.bases, shown, strict=True):
-        if lanes.every[at].joints:
-            ends = base + 1.0 + GAP, base + 1.0
-            for x, out, into in zip(flows.time.tolist(), flows.out[at], flows.into[at], strict=True):
-                _arrow(panel, x, ends, (scale * float(out), scale * float(into)), lanes.colour(at))
-    return widest
-
-
-def _arrow(panel: Any, x: float, ends: tuple[float, float], power: tuple[float, float], own: str) -> None:
-    """Draw the flow at a joint: above what the carrier gives, below what the segment gets, down if positive.
-
-    As far as both are the same it is passed on; the rest the joint gives, in its colour, or takes, hatched.
-    """
-    out, into = power
-    passed = min(abs(out), abs(into)) if out * into > 0.0 else 0.0
-    middle = (ends[0] + ends[1]) / 2
-    hatch = None if into > out else "/////"
-    for size, end, leaves in ((abs(out), ends[0], out < 0.0), (abs(into), ends[1], into > 0.0)):
-        start, stop = (middle, end) if leaves else (end, middle)
-        pointed = leaves or not passed
-        if size > passed:
-            corners = _bar(x, size, start, stop, pointed)
-            face = own if hatch is None else "white"
-            panel.fill(*corners.T, facecolor=face, edgecolor=own, hatch=hatch, linewidth=0, zorder=3)
-        if passed:
-            panel.fill(*_bar(x, passed, start, stop, pointed).T, color=PASSED, linewidth=0, zorder=4)
-
-
-def _bar(x: float, width: float, start: float, end: float, pointed: bool) -> Array:
-    """Return the corners of a bar from one height to another, where it may end in a point."""
-    left, right = x - width / 2, x + width / 2
-    neck = end + np.sign(start - end) * TIP * pointed
-    return np.array([(left, start), (right, start), (right, neck), (x, end), (left, neck)])
 
 
 def _name_lanes(panel: Any, lanes: Lanes) -> None:
@@ -298,7 +191,8 @@ def _passed(work: SegmentWork, lanes: Lanes, at: int, most: float) -> str:
     told = []
     if abs(out) > NOTHING * most:
         way = "from" if out > 0.0 else "to"
-        told.append(f"{abs(out):.3g} J {way} {lanes.carrier(at)}")
+        there = "ties" if lanes.every[at].carrier is None else lanes.carrier(at)  # the ground rests
+        told.append(f"{abs(out):.3g} J {way} {there}")
     if abs(own) > NOTHING * most:
         told.append(f"{abs(own):.3g} J {'given' if own > 0.0 else 'taken'} by {lanes.joints[at]}")
     behind = sum(work.out[k] for k, one in enumerate(lanes.every) if one.carrier == at)
