@@ -87,6 +87,33 @@ def test_a_pressed_foot_is_held_where_its_measured_load_acts(kind: str, folder: 
     assert np.abs(moment - np.cross(arm, force)).max() < 1e-9 * np.abs(free.torque).max(), "no moment there"
 
 
+def test_weights_and_velocities_as_a_whole_are_the_sums_of_their_parts(folder: Path) -> None:
+    log = write_csv(folder / "whole.csv", smooth(80, 5) * [1, 0.3, 0.3, 0.3, 0.3, 0.3], JOINTS[:-1])
+    push = Load("push", "pelvis", (20.0, -30.0, 0.0))
+    points = ["joints", "shank,0.1,0,0", "centre-of-mass"]
+    each, whole = (
+        analyze(log, folder / "coupled", contacts=[FOOT], loads=[push], induced=points, induced_whole=as_one)
+        for as_one in (False, True)
+    )
+    for one, parts in (
+        ("acc_weight", ["acc_gravity"]),
+        ("acc_velocity", ["acc_qd", "acc_kinematic", "acc_constraint"]),
+        *((name, [name]) for name in ("acc", "acc_tau", "acc_load", "acc_contact")),
+    ):
+        wanted = [each.dense(part).reshape(*each.dense(part).shape[:3], -1) for part in parts]
+        found = whole.dense(one).reshape(*whole.dense(one).shape[:3], -1)
+        if one in ("acc_weight", "acc_velocity"):
+            wanted = [np.concatenate(wanted, axis=-1).sum(axis=-1, keepdims=True)]
+        assert np.abs(found).max() > 0.0
+        assert np.abs(found - wanted[0]).max() < 1e-10 * max(1.0, np.abs(found).max())
+    assert not {"acc_qd", "acc_gravity", "acc_kinematic", "acc_constraint"} & {
+        c.quantity for c in whole.columns
+    }
+    assert whole.closure.induced_relative is not None
+    assert whole.closure.induced_relative < 1e-12
+    assert "induced_velocities" in whole.to_xarray()
+
+
 def test_a_pressed_foot_needs_a_load_that_presses(folder: Path) -> None:
     with pytest.raises(LinkwiseError, match="'sole' is pressed, and 0 loads are measured on its body"):
         analyze(folder / "moving.csv", folder / "leg", contacts=[FOOT._replace(kind="pressed")])

@@ -114,6 +114,17 @@ def test_what_a_setup_asks_beyond_is_told(old: str, new: str, told: str, tmp_pat
     assert any(told in line for line in asked.told)
 
 
+def test_muscles_are_no_sources(tmp_path: Path) -> None:
+    setup = changed(write_case(tmp_path), "<states_file/>", "<force_set_files>forces.xml</force_set_files>")
+    forces = '<Thelen2003Muscle name="soleus"/><CoordinateActuator name="a"/><BushingForce name="disc"/>'
+    text = "<OpenSimDocument><ForceSet><objects>{}</objects></ForceSet></OpenSimDocument>"
+    (tmp_path / "forces.xml").write_text(text.format(forces))
+    assert read_setup(setup).told == (
+        "sources are the torques of coordinates, in place of 2 muscles and actuators",
+        "force_set_files: BushingForce 'disc' is left out",
+    )
+
+
 def test_times_without_bounds_and_no_filter_ask_for_all_of_the_log(tmp_path: Path) -> None:
     setup = write_case(tmp_path)
     for old, new in (("0.2</ini", "-Inf</ini"), ("1.2</fin", "Inf</fin"), (">6</low", ">-1</low")):
@@ -172,7 +183,7 @@ REFUSED = {
     ),
     "actuators": ("<states_file/>", "<force_set_files>a.xml</force_set_files>", r"a.xml: no such file"),
 }
-"""What is replaced in a setup by what, and the message."""
+"""Text of a setup, the text in its place, and the message."""
 
 
 EVERYWHERE = ("tool", "no analysis", "misspelt", "kind")
@@ -246,7 +257,7 @@ def test_what_a_setup_says_is_not_given_again(tmp_path: Path) -> None:
     write_case(tmp_path)
     told = analyze(tmp_path, "--opensim-setup", "setup.xml", "--cutoff", "4", code=2)
     assert told == "linkwise: error: --cutoff: setup.xml says that; leave it out, or change it there\n"
-    told = analyze(tmp_path, "walk.sto", "--opensim-setup", "setup.xml", code=2)
+    told = analyze(tmp_path, "run.sto", "--opensim-setup", "setup.xml", code=2)
     assert told.startswith("linkwise: error: LOG: setup.xml says that")
     told = analyze(tmp_path, "walk.sto", code=2)
     assert told == "linkwise: error: Missing option '--robot'. See linkwise analyze --help\n"

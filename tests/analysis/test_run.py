@@ -72,8 +72,8 @@ def test_record_says_how(simulated):
         "lowpass": None,
         "edges": "one-sided",
         "convention": "closing",
-            "start": None,
-            "stop": None,
+        "start": None,
+        "stop": None,
     }
     assert record["samples"] == 601
     assert record["rate_hz"] == pytest.approx(100)

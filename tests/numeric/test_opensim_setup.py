@@ -1,4 +1,4 @@
-"""What a setup of OpenSim's induced acceleration analysis is answered with, against OpenSim's own analysis.
+"""Answers to setups of OpenSim's induced acceleration analysis, against OpenSim's own analysis.
 
 OpenSim takes positions, velocities and torques from the result, and tells what each source accelerates. Its
 velocity source has in it what the ground does to a foot that turns; here a contact tells that of itself, and
@@ -44,7 +44,7 @@ FILES = {
     "center_of_mass": ENDS["centre"],
 }
 Answers = dict[str, dict[str, Any]]
-"""What accelerates what, by file and source."""
+"""Accelerations by file and source."""
 
 
 class Result:

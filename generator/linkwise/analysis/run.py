@@ -46,6 +46,7 @@ def analyze(
     induced: Sequence[str] = (),
     contacts: Contacts | Sequence[Contact] = (),
     phases: Sequence[str] = (),
+    induced_whole: bool = False,
     induced_power: bool = False,
     reactions: Sequence[str] = (),
     trace: Sequence[str] = (),
@@ -61,6 +62,7 @@ def analyze(
     loads_cutoff: cutoff in Hz of the low-pass on loads from files
     induced: points whose acceleration is split by source: FRAME or FRAME,X,Y,Z, joints, centre-of-mass
     contacts: frames that the ground holds, whose reactions are found from the motion; `Contacts` says when
+    induced_whole: whether weights, and all that velocities do, are one source each, not by link and joint
     reactions: joints of the tree whose whole wrench is told by its causes: JOINT, or JOINT,AXES
     phases: phases of the movement for the figure "causes", written as for --phase: "stance/swing=LOAD"
     induced_power: whether to tell by its sources the power that each link gets, and that through each joint
@@ -76,6 +78,7 @@ def analyze(
     loaded, borne = with_contacts(loaded, held), Loads.of(loads, loads_cutoff)
     outputs = Outputs(
         induced=tuple(induced),
+        induced_whole=induced_whole,
         induced_power=induced_power,
         reactions=tuple(reactions),
         phases=tuple(map(Phase.of, phases)),

@@ -7,8 +7,6 @@ from linkwise.cli import tell
 from linkwise.errors import LinkwiseError
 from linkwise.option import written
 
-FLAG = "--opensim-setup"
-
 
 def with_setup(given: dict[str, Any]) -> dict[str, Any]:
     """Return what was given to `analyze`, with what a setup file has for it.
@@ -26,8 +24,8 @@ def with_setup(given: dict[str, Any]) -> dict[str, Any]:
     flags = {one.key: one.flag for one in written(AnalysisChoices)}
     usual = {one.key: one.default for one in written(AnalysisChoices)}
     found = {"log": setup.log, "robot": setup.robot, **setup.options}
-    for key in found:
-        if given[key] not in (None, [], usual.get(key)):
+    for key, value in found.items():
+        if given[key] not in (None, [], usual.get(key), value):
             flag = flags.get(key, {"log": "LOG"}.get(key, f"--{key}"))
             raise LinkwiseError(
                 f"{flag}: {given['opensim_setup']} says that; leave it out, or change it there"

@@ -5,7 +5,7 @@ beyond that is refused where results would be others, and told where it is left 
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from linkwise.input_file import require_file
 from linkwise.robot.notes import effects
 from linkwise.robot.readers.osim.constraints import coordinate_rules
 from linkwise.robot.readers.osim.document import (
+    LARGEST,
     as_xml,
     members,
     name_of,
@@ -39,7 +40,7 @@ NONE = ("", "Unassigned")
 """Texts that OpenSim writes where nothing is given."""
 ALL = "all"
 INITIAL, FINAL, THRESHOLD = "0", "1", "6"
-"""What OpenSim takes for times in s, and for the force in N, where a setup does not say."""
+"""Times in s, and a force in N, that OpenSim takes where a setup does not say."""
 ORDER = 3
 """Order of OpenSim's low-pass, of one pass."""
 KNOWN = {
@@ -88,7 +89,7 @@ def read_setup(path: Path) -> InducedSetup:
     """
     with within(str(path)):
         require_file(path)
-        tool = _tool(parse(path, as_xml=as_xml))
+        tool = _tool(parse(path, LARGEST, as_xml))
         analysis, others = _analysis(tool)
         told = [
             *effects(ignored([tool, analysis], lambda element: KNOWN.get(str(element.tag)), TOOL)),
@@ -97,7 +98,8 @@ def read_setup(path: Path) -> InducedSetup:
         robot = _file(path, tool, "model_file")
         if robot is None:
             raise LinkwiseError(f"<{TOOL}> has no model_file; name the .osim file there")
-        told += _left_out(path, tool, analysis)
+        told += _left_out(tool, analysis)
+        added = _forces(path, tool)
         is_filtered = bool(_told(tool, "coordinates_file"))
         log = _file(path, tool, "coordinates_file") or _file(path, tool, "states_file")
         if log is None:
@@ -111,6 +113,7 @@ def read_setup(path: Path) -> InducedSetup:
         (threshold,) = numbers_of(analysis, "force_threshold", THRESHOLD, f"<{ANALYSIS}>", 1)
         contacts = as_contacts(analysis, model, loads, threshold)
         points = _points(analysis, model)
+        told += _without_muscles(added, [] if yes(tool, "replace_force_set") else members(model, "ForceSet"))
         options = {
             "ignore_extra": True,
             "induced": points,
@@ -147,7 +150,7 @@ def _analysis(tool: Element) -> tuple[Element, list[str]]:
     return found[0], others
 
 
-def _left_out(path: Path, tool: Element, analysis: Element) -> Iterator[str]:
+def _left_out(tool: Element, analysis: Element) -> Iterator[str]:
     """Yield lines on what is left out; raise LinkwiseError for what would change the results."""
     if yes(analysis, "compute_potentials_only"):
         raise LinkwiseError(
@@ -163,17 +166,30 @@ def _left_out(path: Path, tool: Element, analysis: Element) -> Iterator[str]:
         yield "speeds_file: velocities are those of the coordinates"
     if tool.find("ControllerSet/objects/*") is not None:
         yield "ControllerSet: torques are those of the motion"
+
+
+def _forces(path: Path, tool: Element) -> list[Element]:
+    """Return the forces of files that a setup adds to those of the model."""
+    found: list[Element] = []
     for name in _told(tool, "force_set_files").split():
-        yield from _acting(path.parent / name.replace("\\", "/"))
+        file = path.parent / name.replace("\\", "/")
+        with within(f"force_set_files {file}"):
+            require_file(file)
+            found += parse(file, LARGEST, as_xml).iterfind("ForceSet/objects/*")
+    return found
 
 
-def _acting(path: Path) -> Iterator[str]:
-    """Yield lines on the forces of a file that act by themselves, which no torque of a joint is."""
-    with within(str(path)):
-        require_file(path)
-        for force in parse(path, as_xml=as_xml).iterfind("ForceSet/objects/*"):
-            if not gives_torque(force):
-                yield f"{path.name}: {force.tag} {name_of(force)!r} is left out"
+def _without_muscles(added: Sequence[Element], own: Iterable[Element]) -> Iterator[str]:
+    """Yield lines on forces that are no sources: muscles, and those of files that act by themselves.
+
+    own: forces of the model; those that act by themselves are told of where it is read
+    """
+    count = sum(gives_torque(force) for force in (*added, *own))
+    if count:
+        yield f"sources are the torques of coordinates, in place of {count} muscles and actuators"
+    for force in added:
+        if not gives_torque(force):
+            yield f"force_set_files: {force.tag} {name_of(force)!r} is left out"
 
 
 def _times(tool: Element, analysis: Element) -> dict[str, float]:

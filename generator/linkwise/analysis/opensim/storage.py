@@ -32,7 +32,7 @@ ENDS = {
     "angular_y": "_Oy",
     "angular_z": "_Oz",
 }
-"""What column names end in, by component of a point, in OpenSim's order."""
+"""Ends of column names by component of a point, in OpenSim's order."""
 TEXT = """
 This file contains accelerations of coordinates or bodies.
 
