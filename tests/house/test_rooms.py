@@ -52,6 +52,7 @@ RUNTIME = (
     "native",
     "lagrangians",
     "dynamics",
+    "motion_calls",
     "robot_calls",
     "control",
     "motion",

@@ -257,7 +257,7 @@ class PowerShares:
 
 @dataclass(frozen=True)
 class Behind:
-    """What is behind each joint: holders (n, H), and columns whose power is given there (n, G)."""
+    """Parts of the robot behind each joint: holders (n, H), and columns whose power is given there (n, G)."""
 
     holders: Mask
     before: Mask

@@ -33,7 +33,7 @@ Sum = tuple[int, int, list[int]]
 
 
 class ToldBeside(NamedTuple):
-    """What a result tells beside torques."""
+    """Choice of all that a result tells beside torques."""
 
     power_terms: bool = False
     """True to tell power by cause and order too."""

@@ -71,7 +71,7 @@ class SourcedPanels:
     """Panels of one thing, such as a point that is accelerated, and the sources of what they show."""
 
     title: str
-    """What they show, in words; what comes from the robot's file is not made printable."""
+    """Title in words; what comes from the robot's file is not made printable."""
     panels: Sequence[tuple[str, str]]
     """Name and unit of what each panel shows."""
     sources: Sequence[SourceCurve]
