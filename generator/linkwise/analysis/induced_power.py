@@ -257,7 +257,7 @@ class PowerShares:
 
 @dataclass(frozen=True)
 class Behind:
-    """Parts of the robot behind each joint: holders (n, H), and columns whose power is given there (n, G)."""
+    """Holders behind each joint (n, H), and columns of sources whose power is given there (n, G)."""
 
     holders: Mask
     before: Mask

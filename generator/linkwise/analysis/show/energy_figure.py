@@ -18,7 +18,7 @@ from linkwise.analysis.show.drawn_curves import (
     write_note,
     write_title,
 )
-from linkwise.analysis.show.energy_lanes import GAP, NOTHING, PASSED, EnergyLanes, draw_flows
+from linkwise.analysis.show.energy_lanes import GAP, NOTHING, PASSED, SegmentLanes, draw_flows
 from linkwise.analysis.show.energy_segments import (
     SegmentFlows,
     SegmentWork,
@@ -49,7 +49,7 @@ def energy(result: AnalysisResult, phase: int) -> "Figure":
     """
     every = segments_of(result.robot)
     work = work_of_segments(result, every, phase)
-    lanes = EnergyLanes.of(result, every, work.size)
+    lanes = SegmentLanes.of(result, every, work.size)
     figure = new_figure(10.4, 2.3 + (1.3 if lanes.is_jointed else 0.8) * len(lanes.shown))
     grid = figure.add_gridspec(2, 2, height_ratios=(len(lanes.shown), 0.36), width_ratios=(2.4, 1))
     left = figure.add_subplot(grid[0, 0])
@@ -74,7 +74,7 @@ def energy(result: AnalysisResult, phase: int) -> "Figure":
     return figure
 
 
-def _note(lanes: EnergyLanes, flows: SegmentFlows, widest: float, tied: bool) -> str:
+def _note(lanes: SegmentLanes, flows: SegmentFlows, widest: float, tied: bool) -> str:
     told = ["lanes: kinetic and potential energy above its least, all by one scale"]
     if widest:
         step = flows.time[1] - flows.time[0]
@@ -87,7 +87,7 @@ def _note(lanes: EnergyLanes, flows: SegmentFlows, widest: float, tied: bool) ->
     return " · ".join(told)
 
 
-def _energies(panel: Any, result: AnalysisResult, lanes: EnergyLanes) -> None:
+def _energies(panel: Any, result: AnalysisResult, lanes: SegmentLanes) -> None:
     """Draw each segment's energy above its least, all by one scale, and mark the largest."""
     found = drawn_curves(result, lambda part: energies(part, lanes.every)[list(lanes.shown)])
     above = found.values - found.values.min(axis=1, keepdims=True)
@@ -116,7 +116,7 @@ def _energies(panel: Any, result: AnalysisResult, lanes: EnergyLanes) -> None:
         )
 
 
-def _name_lanes(panel: Any, lanes: EnergyLanes) -> None:
+def _name_lanes(panel: Any, lanes: SegmentLanes) -> None:
     """Write the segments beside their lanes, and the joints beside the arrows."""
     names = [lanes.names[at] for at in lanes.shown]
     panel.set_yticks([base + 0.3 for base in lanes.bases], names, fontweight="bold", fontsize=10)
@@ -152,7 +152,7 @@ def _shade(panel: Any, result: AnalysisResult, phase: int) -> None:
     )
 
 
-def _bars(panel: Any, work: SegmentWork, lanes: EnergyLanes) -> None:
+def _bars(panel: Any, work: SegmentWork, lanes: SegmentLanes) -> None:
     """Draw the work of each cause on each segment, stacked from zero outwards, and a mark at the sum."""
     shown = list(lanes.shown)
     most = float(work.size.max(initial=0.0))
@@ -185,7 +185,7 @@ def _bars(panel: Any, work: SegmentWork, lanes: EnergyLanes) -> None:
             )
 
 
-def _passed(work: SegmentWork, lanes: EnergyLanes, at: int, most: float) -> str:
+def _passed(work: SegmentWork, lanes: SegmentLanes, at: int, most: float) -> str:
     """Return what flowed into a segment, in words."""
     out, own = float(work.out[at]), float(work.into[at] - work.out[at])
     told = []

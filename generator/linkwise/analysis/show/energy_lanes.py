@@ -1,4 +1,4 @@
-"""EnergyLanes of segments from the top of a figure, and arrows of power between them."""
+"""Lanes of segments from the top of a figure, and arrows of power between them."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -30,7 +30,7 @@ NOTHING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class EnergyLanes:
+class SegmentLanes:
     """Segments that are drawn, each in a lane, from the top."""
 
     every: tuple[Segment, ...]
@@ -42,7 +42,7 @@ class EnergyLanes:
     """Names of their joints; empty without any."""
 
     @classmethod
-    def of(cls, result: AnalysisResult, every: tuple[Segment, ...], sizes: Array) -> "EnergyLanes":
+    def of(cls, result: AnalysisResult, every: tuple[Segment, ...], sizes: Array) -> "SegmentLanes":
         """Return the lanes of the segments with the largest sizes."""
         robot = result.robot
         names = tuple(drawn(" + ".join(robot.plot_links[j] for j in one.links)) for one in every)
@@ -85,7 +85,7 @@ class EnergyLanes:
         return [cause for cause in found if float(abs(cause[2]).max(initial=0.0)) > NOTHING * most]
 
 
-def draw_flows(panel: Any, flows: SegmentFlows, lanes: EnergyLanes) -> float:
+def draw_flows(panel: Any, flows: SegmentFlows, lanes: SegmentLanes) -> float:
     """Draw arrows between lanes; return the largest power in W, 0 without flows."""
     shown = list(lanes.shown)
     widest = float(np.abs([flows.out[shown], flows.into[shown]]).max(initial=0.0))
