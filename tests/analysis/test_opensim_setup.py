@@ -234,6 +234,19 @@ def test_a_setup_and_its_command_line_write_the_same(tmp_path: Path) -> None:
     assert {file.name: file.read_bytes() for file in (tmp_path / "out").glob("*.sto")} == files
 
 
+def test_constraints_of_a_setup_hold(tmp_path: Path) -> None:
+    write_case(tmp_path, WELD, "plate.xml", "body2 body3")
+    analyze(tmp_path, "--opensim-setup", "setup.xml")
+    held, free = (
+        read_storage(tmp_path / f"out/walk_InducedAccelerations_{body}.sto") for body in ("body3", "body2")
+    )
+    size = max(np.abs(column).max() for name, column in free.items() if name != "time")
+    for source in ("gravity", *COORDINATES):  # velocities and the contact tell how it moves
+        for end in ("X", "Y", "Z", "Ox", "Oy", "Oz"):
+            assert np.abs(held[f"{source}_{end}"]).max() <= 1e-9 * size, f"{source}_{end}"
+    assert np.abs(free["gravity_Y"]).max() > 1.0
+
+
 def test_storage_files_are_headed_as_opensims_and_in_degrees_where_they_say_so(tmp_path: Path) -> None:
     setup = write_case(tmp_path, bodies=BODIES[1])
     analyze(tmp_path, "--opensim-setup", "setup.xml")
