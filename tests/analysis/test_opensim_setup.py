@@ -114,6 +114,14 @@ def test_what_a_setup_asks_beyond_is_told(old: str, new: str, told: str, tmp_pat
     assert any(told in line for line in asked.told)
 
 
+def test_states_come_before_coordinates_and_are_not_filtered(tmp_path: Path) -> None:
+    setup = changed(write_case(tmp_path), "<states_file/>", "<states_file>leg.osim</states_file>")
+    asked = read_setup(setup)
+    assert asked.log == tmp_path / "leg.osim"
+    assert "cutoff" not in asked.options
+    assert asked.told == ("coordinates_file: the motion is that of states_file, which is not filtered",)
+
+
 def test_muscles_are_no_sources(tmp_path: Path) -> None:
     setup = changed(write_case(tmp_path), "<states_file/>", "<force_set_files>forces.xml</force_set_files>")
     forces = '<Thelen2003Muscle name="soleus"/><CoordinateActuator name="a"/><BushingForce name="disc"/>'

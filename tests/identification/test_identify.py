@@ -396,6 +396,13 @@ BAD: dict[str, tuple[Callable[[OpenedRobot, Path], dict[str, Any]], str]] = {
         "100 samples are too few for --cutoff 2, which blurs 150 at either end; give a longer log, or "
         "raise it",
     ),
+    "what the filter blurs": (
+        lambda robot, folder: {
+            "log": planar_log(robot, folder, seconds=4),
+            "processing": Processing(lowpass=Lowpass(3.0), stop=0.5),
+        },
+        "--from and --to leave what --cutoff 3 blurs, up to",
+    ),
     "energies": (
         lambda robot, folder: {"log": planar_log(robot, folder), "robot": energies(folder)},
         "cart_pendulum is made of energies; only rigid links have parameters to identify",

@@ -13,9 +13,9 @@ from linkwise.analysis.column_matching import TIMES, with_columns, with_nearest
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.logs import open_log
 from linkwise.analysis.opened_robot import OpenedRobot
-from linkwise.analysis.samples import read_samples
+from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Lowpass, Processing, Reading
-from linkwise.analysis.stream import span_of
+from linkwise.analysis.stream import LEAST_SAMPLES, span_of
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
@@ -98,9 +98,7 @@ def read_torque_log(
         start, stop = span_of(samples, processing)
         if processing.lowpass is not None:
             lowpass(q, samples.rate, processing.lowpass)
-            whole = span_of(samples, replace(processing, start=None, stop=None))
-            first, last = _settled(*whole, samples.rate, processing.lowpass)
-            start, stop = max(start, first), min(stop, last)
+            start, stop = _within(start, stop, samples, processing, processing.lowpass)
         _refuse_still(q[start:stop], robot, measured)
     told = samples.warnings, samples.ignored
     return TorqueLog(path.name, samples.rate, q, noise, measured, torque, start, stop, *told, closed)
@@ -132,6 +130,23 @@ def _measured(
     if not found:
         raise LinkwiseError("--unmeasured names every joint; at least one torque must be there")
     return found
+
+
+def _within(
+    start: int, stop: int, samples: Samples, processing: Processing, filtered: Lowpass
+) -> tuple[int, int]:
+    """Return what of a range of samples the filter does not affect from the log's ends.
+
+    Raises LinkwiseError where nothing is left.
+    """
+    whole = span_of(samples, replace(processing, start=None, stop=None))
+    first, last = _settled(*whole, samples.rate, filtered)
+    if min(stop, last) - max(start, first) < LEAST_SAMPLES:
+        raise LinkwiseError(
+            f"--from and --to leave what --cutoff {filtered.cutoff:g} blurs, up to"
+            f" {samples.time[first]:.6g} s and from {samples.time[last - 1]:.6g} s; give what is between"
+        )
+    return max(start, first), min(stop, last)
 
 
 def _settled(start: int, stop: int, rate: float, filtered: Lowpass) -> tuple[int, int]:

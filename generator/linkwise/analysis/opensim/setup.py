@@ -90,23 +90,11 @@ def read_setup(path: Path) -> InducedSetup:
     with within(str(path)):
         require_file(path)
         tool = _tool(parse(path, LARGEST, as_xml))
-        analysis, others = _analysis(tool)
-        told = [
-            *effects(ignored([tool, analysis], lambda element: KNOWN.get(str(element.tag)), TOOL)),
-            *others,
-        ]
-        robot = _file(path, tool, "model_file")
-        if robot is None:
-            raise LinkwiseError(f"<{TOOL}> has no model_file; name the .osim file there")
+        analysis, told = _analysis(tool)
+        told += effects(ignored([tool, analysis], lambda element: KNOWN.get(str(element.tag)), TOOL))
         told += _left_out(tool, analysis)
+        log, robot, loads = _files(path, tool)
         added = _forces(path, tool)
-        is_filtered = bool(_told(tool, "coordinates_file"))
-        log = _file(path, tool, "coordinates_file") or _file(path, tool, "states_file")
-        if log is None:
-            raise LinkwiseError(
-                f"<{TOOL}> has neither coordinates_file nor states_file; name the motion there"
-            )
-        loads = _file(path, tool, "external_loads_file")
     with within(str(robot)):
         model, _ = read_document(robot)
     with within(str(path)):
@@ -114,6 +102,7 @@ def read_setup(path: Path) -> InducedSetup:
         contacts = as_contacts(analysis, model, loads, threshold)
         points = _points(analysis, model)
         told += _without_muscles(added, [] if yes(tool, "replace_force_set") else members(model, "ForceSet"))
+        told += _without_file(model) if JOINTS in points else ()
         options = {
             "ignore_extra": True,
             "induced": points,
@@ -121,12 +110,21 @@ def read_setup(path: Path) -> InducedSetup:
             "induced_sto": f"{name_of(tool)}_{name_of(analysis)}",
             "sto_units": "deg" if yes(analysis, "in_degrees", True) else "rad",
             **_times(tool, analysis),
-            **(_filter(tool) if is_filtered else {}),
+            **_filter(tool),
             **contacts.options,
         }
-    if JOINTS in points:
-        told += _without_file(model)
     return InducedSetup(log, robot, options, (*told, *contacts.told))
+
+
+def _files(path: Path, tool: Element) -> tuple[Path, Path, Path | None]:
+    """Return the log, the model and, if there are some, the external loads."""
+    robot = _file(path, tool, "model_file")
+    if robot is None:
+        raise LinkwiseError(f"<{TOOL}> has no model_file; name the .osim file there")
+    log = _file(path, tool, "states_file") or _file(path, tool, "coordinates_file")
+    if log is None:
+        raise LinkwiseError(f"<{TOOL}> has neither coordinates_file nor states_file; name the motion there")
+    return log, robot, _file(path, tool, "external_loads_file")
 
 
 def _tool(root: Element) -> Element:
@@ -162,6 +160,8 @@ def _left_out(tool: Element, analysis: Element) -> Iterator[str]:
     (interval,) = numbers_of(analysis, "step_interval", "1", f"<{ANALYSIS}>", 1)
     if interval != 1:
         yield f"step_interval {interval:g}: every sample is written"
+    if _told(tool, "states_file") and _told(tool, "coordinates_file"):
+        yield "coordinates_file: the motion is that of states_file, which is not filtered"
     if _told(tool, "speeds_file"):
         yield "speeds_file: velocities are those of the coordinates"
     if tool.find("ControllerSet/objects/*") is not None:
@@ -208,8 +208,10 @@ def _times(tool: Element, analysis: Element) -> dict[str, float]:
 
 
 def _filter(tool: Element) -> dict[str, float | int]:
+    """Return the options of the filter; OpenSim filters coordinates, and not states."""
     (cutoff,) = numbers_of(tool, "lowpass_cutoff_frequency_for_coordinates", "-1", f"<{TOOL}>", 1)
-    return {"cutoff": cutoff, "filter_order": ORDER} if cutoff > 0 else {}
+    is_filtered = cutoff > 0 and not _told(tool, "states_file")
+    return {"cutoff": cutoff, "filter_order": ORDER} if is_filtered else {}
 
 
 def _coordinates(model: Element) -> list[Element]:
