@@ -20,7 +20,7 @@ from linkwise.analysis.show.drawn_curves import (
     zero_line,
 )
 from linkwise.arrays import Array, Index
-from linkwise.plotstyle import BROWN, GRAVITY, INK, colour, dash, drawn
+from linkwise.plotstyle import BROWN, COLOURS, GRAVITY, INK, colour, dash, drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,6 +44,8 @@ class SourceCurve:
     """Index of the joint among those that have torques, of the load or of the named share; else 0."""
     rows: tuple[Index, ...]
     """Rows of the result that the curve sums up, for each panel."""
+    window: int = 0
+    """Index of the window of time in which the source acted; each has dashes of its own."""
 
     def values(self, part: AnalysisResult) -> Array:
         """Return the curve in each panel, (panels, S)."""
@@ -55,7 +57,8 @@ class SourceCurve:
             case "sum":
                 return {"color": INK, "linewidth": 2.4}
             case "joint":
-                return {"color": colour(self.number), "linewidth": 1.4, "linestyle": dash(self.number)}
+                again = dash(self.number + self.window * len(COLOURS))
+                return {"color": colour(self.number), "linewidth": 1.4, "linestyle": again}
             case "others":
                 return {"color": BROWN, "linewidth": 1.0}
             case "load":
@@ -63,7 +66,8 @@ class SourceCurve:
             case "named" if self.number:  # the first is grey
                 shade = colour(joints + loads + self.number - 1)
                 return {"color": shade, "linewidth": 1.4, "linestyle": "solid"}
-        return {"color": GRAVITY, "linewidth": 1.4, "linestyle": STYLES.get(self.kind, "solid")}
+        style = STYLES.get(self.kind, dash(self.window * len(COLOURS)))
+        return {"color": GRAVITY, "linewidth": 1.4, "linestyle": style}
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
 """Panels of what velocities ask of a joint, and of its own velocity, by the sources that these came from."""
 
+from dataclasses import replace
 from typing import Any
 
 from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD, START, TORQUE
@@ -48,7 +49,8 @@ def _sources(
 
     wholes = {"tau_from": "tau_qd", "qd_from": "qd"}
     whole = tuple(result.rows.numbers(wholes[name], joint=joint) for name, _ in quantities)
-    every = [_named(result, name, rows(o)) for o, name in enumerate(origins)]
+    windows = len(result.traced["windows"]) if result.traced else 1
+    every = [replace(_named(result, name, rows(o)), window=o % windows) for o, name in enumerate(origins)]
     alone, rest = largest_alone(result, every, MOST)
     found = [SourceCurve("sum", "all together", 0, whole), *(every[o] for o in alone)]
     if rest:
