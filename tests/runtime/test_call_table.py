@@ -428,6 +428,7 @@ def test_the_header_of_c_has_the_rows_and_nothing_else(which: str, package_at: L
     }
     beside = {
         "passive_torque": own,
+        "reactions": rigid and which != "tied",
         "partial_impedance": which != "tied",
         "frame_partial_impedance": rigid and which != "tied",
     }

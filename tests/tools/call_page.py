@@ -58,6 +58,7 @@ BESIDE_IN_C = {
     "link_1": "`packed` of one link and one sample, and so on for each link",
     "position_gradient": "`position_gradient` without its zeros",
     "passive_torque": "the sum of `passive_torque`, of one sample, where joints have any",
+    "reactions": "the wrenches of links, of which `reactions` are made; not of joints that are tied",
     "partial_impedance": "a [controller](control.md)",
     "frame_partial_impedance": "a [controller](control.md) of a frame",
 }

@@ -52,7 +52,7 @@
 
    For microcontrollers, -DLINKWISE_SMALL has samples computed one by one: less stack and code, and no function on blocks.
    Then functions take at most 14,428 bytes of stack in double and 7,964 in float, and those of torques,
-   coefficients, gradients and regressors 6,796 and 4,148. */
+   coefficients, gradients, regressors and reactions 6,796 and 4,148. */
 #ifndef LINKWISE_PUMA560_H
 #define LINKWISE_PUMA560_H
 
@@ -170,6 +170,17 @@ void puma560_regressor(size_t count, const double *q, const double *qd, const do
    Reads q, qd (count, JOINTS);
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS, 10), gravity (count, JOINTS, LINKS, 10). */
 void puma560_coefficient_regressors(size_t count, const double *q, const double *qd,
+    double *acceleration, double *velocity, double *gravity);
+
+/* Reactions: the whole wrenches that joints carry of each link, by cause, of which c2(i, j, k), c1(i, j, k) and g(i, j) are the
+   parts along the joints' axes. Where tau(k, j) stands in a row of tau, acceleration has six numbers, N_x, N_y, N_z, f_x, f_y
+   and f_z: the moment about the world's origin and the force, in the world's axes, that link j needs for each unit of qdd_k,
+   and velocity those for each unit of qd_k; gravity has for each link those against its weight. Every joint that carries the
+   link carries them: the side of the ground exerts them through it on the other side, about the joint's origin p as
+   N - p x f. Sum over the links behind a joint, with qdd_k and qd_k, for what it carries in all.
+   Reads q, qd (count, JOINTS);
+   writes acceleration, velocity (count, G, 6), gravity (count, LINKS, 6). */
+void puma560_reactions(size_t count, const double *q, const double *qd,
     double *acceleration, double *velocity, double *gravity);
 
 /* All quantities but c0 of one link, for one sample. Each function reads q, qd, qdd (JOINTS). */
@@ -348,6 +359,17 @@ void puma560_regressorf(size_t count, const float *q, const float *qd, const flo
    Reads q, qd (count, JOINTS);
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS, 10), gravity (count, JOINTS, LINKS, 10). */
 void puma560_coefficient_regressorsf(size_t count, const float *q, const float *qd,
+    float *acceleration, float *velocity, float *gravity);
+
+/* Reactions: the whole wrenches that joints carry of each link, by cause, of which c2(i, j, k), c1(i, j, k) and g(i, j) are the
+   parts along the joints' axes. Where tau(k, j) stands in a row of tau, acceleration has six numbers, N_x, N_y, N_z, f_x, f_y
+   and f_z: the moment about the world's origin and the force, in the world's axes, that link j needs for each unit of qdd_k,
+   and velocity those for each unit of qd_k; gravity has for each link those against its weight. Every joint that carries the
+   link carries them: the side of the ground exerts them through it on the other side, about the joint's origin p as
+   N - p x f. Sum over the links behind a joint, with qdd_k and qd_k, for what it carries in all.
+   Reads q, qd (count, JOINTS);
+   writes acceleration, velocity (count, G, 6), gravity (count, LINKS, 6). */
+void puma560_reactionsf(size_t count, const float *q, const float *qd,
     float *acceleration, float *velocity, float *gravity);
 
 /* All quantities but c0 of one link, for one sample. Each function reads q, qd, qdd (JOINTS). */

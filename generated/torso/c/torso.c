@@ -505,7 +505,7 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 
 #include "linkwise/calls.h"
 
-/* ---- In loops over links and joints: regressors of rows; of one sample, frames and the mass matrix ---- */
+/* ---- In loops over links and joints: regressors and reactions of rows; of one sample, frames and the mass matrix ---- */
 #undef W
 #undef SIZED
 #undef LINK_FUNCTION
@@ -516,6 +516,7 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 #endif
 #if PART(REGRESSORS)
 #include "linkwise/regressors.h"
+#include "linkwise/reactions.h"
 #endif
 #if PART(CONTROL)
 #include "linkwise/frames.h"

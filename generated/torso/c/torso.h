@@ -52,7 +52,7 @@
 
    For microcontrollers, -DLINKWISE_SMALL has samples computed one by one: less stack and code, and no function on blocks.
    Then functions take at most 15,620 bytes of stack in double and 8,560 in float, and those of torques,
-   coefficients, gradients and regressors 6,732 and 4,116. */
+   coefficients, gradients, regressors and reactions 6,732 and 4,116. */
 #ifndef LINKWISE_TORSO_H
 #define LINKWISE_TORSO_H
 
@@ -172,6 +172,17 @@ void torso_regressor(size_t count, const double *q, const double *qd, const doub
    Reads q, qd (count, JOINTS);
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS, 10), gravity (count, JOINTS, LINKS, 10). */
 void torso_coefficient_regressors(size_t count, const double *q, const double *qd,
+    double *acceleration, double *velocity, double *gravity);
+
+/* Reactions: the whole wrenches that joints carry of each link, by cause, of which c2(i, j, k), c1(i, j, k) and g(i, j) are the
+   parts along the joints' axes. Where tau(k, j) stands in a row of tau, acceleration has six numbers, N_x, N_y, N_z, f_x, f_y
+   and f_z: the moment about the world's origin and the force, in the world's axes, that link j needs for each unit of qdd_k,
+   and velocity those for each unit of qd_k; gravity has for each link those against its weight. Every joint that carries the
+   link carries them: the side of the ground exerts them through it on the other side, about the joint's origin p as
+   N - p x f. Sum over the links behind a joint, with qdd_k and qd_k, for what it carries in all.
+   Reads q, qd (count, JOINTS);
+   writes acceleration, velocity (count, G, 6), gravity (count, LINKS, 6). */
+void torso_reactions(size_t count, const double *q, const double *qd,
     double *acceleration, double *velocity, double *gravity);
 
 /* All quantities but c0 of one link, for one sample. Each function reads q, qd, qdd (JOINTS). */
@@ -346,6 +357,17 @@ void torso_regressorf(size_t count, const float *q, const float *qd, const float
    Reads q, qd (count, JOINTS);
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS, 10), gravity (count, JOINTS, LINKS, 10). */
 void torso_coefficient_regressorsf(size_t count, const float *q, const float *qd,
+    float *acceleration, float *velocity, float *gravity);
+
+/* Reactions: the whole wrenches that joints carry of each link, by cause, of which c2(i, j, k), c1(i, j, k) and g(i, j) are the
+   parts along the joints' axes. Where tau(k, j) stands in a row of tau, acceleration has six numbers, N_x, N_y, N_z, f_x, f_y
+   and f_z: the moment about the world's origin and the force, in the world's axes, that link j needs for each unit of qdd_k,
+   and velocity those for each unit of qd_k; gravity has for each link those against its weight. Every joint that carries the
+   link carries them: the side of the ground exerts them through it on the other side, about the joint's origin p as
+   N - p x f. Sum over the links behind a joint, with qdd_k and qd_k, for what it carries in all.
+   Reads q, qd (count, JOINTS);
+   writes acceleration, velocity (count, G, 6), gravity (count, LINKS, 6). */
+void torso_reactionsf(size_t count, const float *q, const float *qd,
     float *acceleration, float *velocity, float *gravity);
 
 /* All quantities but c0 of one link, for one sample. Each function reads q, qd, qdd (JOINTS). */

@@ -262,6 +262,9 @@ static void gradient_rows(size_t count, INPUTS, int dense, real *c0)
 
 #if PART(REGRESSORS)
 #include "regressors.h"
+#ifndef TIED
+#include "reactions.h"
+#endif
 #endif
 
 #if PART(CONTROL)

@@ -49,7 +49,12 @@ REGRESSORS = {
 """Functions of robots of rigid links alone whose results include zeros: quantities, and names in the
 header."""
 
-AT_REST = ("coefficients", "coefficient_regressors")
+REACTIONS = {
+    "reactions": (("acceleration", "velocity", "gravity"), ("acceleration", "velocity", "gravity")),
+}
+"""Functions of robots of rigid links that no ties hold: quantities, and names in the header."""
+
+AT_REST = ("coefficients", "coefficient_regressors", "reactions")
 """Functions that take no qdd."""
 
 MOST = 16
@@ -80,11 +85,16 @@ class CFunctions:
         return dense
 
     def check(
-        self, label: str, reference: Reference, regressors: Reference | None, frames: FrameReference | None
+        self,
+        label: str,
+        reference: Reference,
+        regressors: Reference | None,
+        wrenches: Reference | None,
+        frames: FrameReference | None,
     ) -> Iterator[Result]:
         """Yield one result per function; `label` stands before its name.
 
-        Links of energies have no regressors and no frames.
+        Links of energies have no regressors, no wrenches and no frames.
         """
         for function in self.functions:
             symbol = f"{self.manifest.name}_{function.name}"
@@ -97,7 +107,9 @@ class CFunctions:
             single = FLOAT32 if function.real == "float" else {"tolerance": reference.tolerance}
             try:
                 if function.short in REGRESSORS:
-                    calls = self._regressors(function, regressors)
+                    calls = self._of_bodies(function, regressors)
+                elif function.short in REACTIONS:
+                    calls = self._of_bodies(function, wrenches)
                 elif function.short.endswith("partial_impedance"):
                     calls = impedance_calls(self._call, function, self.manifest, reference)
                 elif function.short in CONTROL:
@@ -146,7 +158,7 @@ class CFunctions:
         self, function: Prototype, reference: Reference, expected: Mapping[str, tuple[Array, Array]]
     ) -> Iterator[Entries]:
         """Yield results of a function whose results include zeros."""
-        what, names = (DENSE | REGRESSORS)[function.short]
+        what, names = (DENSE | REGRESSORS | REACTIONS)[function.short]
         shapes = [expected[quantity][0].shape[1:] for quantity in what]
         most = max(1, NUMBERS // max(map(math.prod, shapes)))
         for count, shift in product((count for count in ROWS if count <= most), (0, 1)):
@@ -158,7 +170,7 @@ class CFunctions:
                 values, scales = (source[at] for source in expected[quantity])
                 yield Entries(quantity, found[name].reshape(count, *shape), values, scales)
 
-    def _regressors(self, function: Prototype, reference: Reference | None) -> Iterator[Entries]:
+    def _of_bodies(self, function: Prototype, reference: Reference | None) -> Iterator[Entries]:
         if reference is not None:
             expected = {what: (value, reference.scales[what]) for what, value in reference.values.items()}
             yield from self._dense(function, reference, expected)
@@ -194,6 +206,7 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
     inputs = ("q", "qd", "qdd", *(["p"] if manifest.parameters else []))
     every = tuple(what for what in OUTPUTS if len(rows.of(what)))
     rigid = REGRESSORS if manifest.tree is not None else {}
+    rigid = rigid | REACTIONS if rigid and not manifest.tied else rigid
     functions = [
         ("decomposition", "count", every),
         ("decomposition_blocks", "blocks", every),

@@ -1,13 +1,14 @@
 """Checks of what joints carry, by cause, against the forces and moments of the recursion."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.rule.joint_tree import JointTree
 
-from linkwise.arrays import Array
+from linkwise.arrays import Array, Index
 from linkwise.check.compare import Entries, Result, compare
 from linkwise.check.model_calls import FLOAT32
 from linkwise.oracle.magnitudes import Magnitudes
@@ -29,12 +30,35 @@ def chosen_joints(tree: JointTree) -> list[int]:
 
 def reaction_reference(manifest: Manifest, tree: JointTree, states: States) -> Reference:
     """Return the shares of some joints' wrenches in the world's axes, at the first few states."""
-    joints, n = chosen_joints(tree), len(manifest.joints)
-    numbers = 12 * n * len(manifest.links) * len(joints)
+    found = _shares(manifest, tree, states, chosen_joints(tree))
+    values, scales = dict(found.values), dict(found.scales)
+    for what, motion in (("acceleration", found.states.qdd), ("velocity", found.states.qd)):
+        by_cause = motion[:, None, None, :, None]
+        values[what], scales[what] = values[what] * by_cause, scales[what] * np.abs(by_cause)
+    return replace(found, values=values, scales=scales)
+
+
+def link_reference(manifest: Manifest, tree: JointTree, rows: Index, states: States) -> Reference:
+    """Return the wrenches of links about the base's origin, as C has them.
+
+    rows: joint and link of each entry of tau, (count, 2); those by a joint's motion stand where its tau does
+    """
+    found = _shares(manifest, tree, states, [None])
+    k, j = rows.T
+
+    def packed(source: Mapping[str, Array]) -> dict[str, Array]:
+        motions = {what: source[what][:, 0, j, k] for what in SHARES[:2]}
+        return {**motions, "gravity": source["gravity"][:, 0]}
+
+    return replace(found, values=packed(found.values), scales=packed(found.scales))
+
+
+def _shares(manifest: Manifest, tree: JointTree, states: States, joints: Sequence[int | None]) -> Reference:
+    """Return wrenches per acceleration and per velocity, (samples, joints, N, n, 6), and of gravity."""
+    numbers = 12 * len(manifest.joints) * len(manifest.links) * len(joints)
     few = states.at(slice(max(1, min(MOST, NUMBERS // numbers))))
     wrenches, bounds = NewtonEuler(manifest, tree).wrenches, Magnitudes(manifest, tree).wrenches
-    q, qd, qdd = few.motion
-    rest = 0.0 * q
+    q, rest = few.q, 0.0 * few.q
 
     def moving(q: Array, qd: Array) -> Array:
         return bounds(joints, q, qd, 0.0 * q, gravity=False)
@@ -55,9 +79,6 @@ def reaction_reference(manifest: Manifest, tree: JointTree, states: States) -> R
         ),
         "gravity": bounds(joints, most.q, rest, rest),
     }
-    for what, motion in (("acceleration", qdd), ("velocity", qd)):
-        by_cause = motion[:, None, None, :, None]
-        values[what], scales[what] = values[what] * by_cause, scales[what] * np.abs(by_cause)
     return Reference("Newton-Euler recursion", TOLERANCE, few, values, scales)
 
 

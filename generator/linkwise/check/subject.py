@@ -20,7 +20,7 @@ from linkwise.check.compiled_c import CompiledPackage
 from linkwise.check.constraint_checks import HeldContacts
 from linkwise.check.frame_checks import FrameReference, frame_reference
 from linkwise.check.parametric_tree import tree_with
-from linkwise.check.reaction_checks import reaction_reference
+from linkwise.check.reaction_checks import link_reference, reaction_reference
 from linkwise.check.regressor_checks import regressor_reference
 from linkwise.check.simulated_terms import simulated_terms
 from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion
@@ -161,6 +161,13 @@ class Subject:
         if self.tree is None:
             return None
         return reaction_reference(self.manifest, self.tree, self.reference.states)
+
+    @cached_property
+    def link_wrenches(self) -> Reference | None:
+        """Reference for the wrenches of links that C has; None for energies and for joints that are tied."""
+        if self.tree is None or self.tied:
+            return None
+        return link_reference(self.manifest, self.tree, self.rows.tau, self.reference.states)
 
     @cached_property
     def frames(self) -> FrameReference | None:

@@ -67,8 +67,10 @@ class Magnitudes:
                     tau[:, k, j, x] += column
         return tau
 
-    def wrenches(self, joints: Sequence[int], q: Array, qd: Array, qdd: Array, gravity: bool = True) -> Array:
-        """Return bounds of what joints of the tree carry of each link, (samples, joints, N, 6)."""
+    def wrenches(
+        self, joints: Sequence[int | None], q: Array, qd: Array, qdd: Array, gravity: bool = True
+    ) -> Array:
+        """Return bounds of `NewtonEuler.wrenches`, (samples, joints, N, 6)."""
         frames = self._frames(q, qd, qdd, self.gravity if gravity else 0.0)
         found = np.zeros((len(q), len(joints), len(self.links), 6))
         for j, link in enumerate(self.links):
@@ -76,8 +78,9 @@ class Magnitudes:
             force, moment = _needed(frame, link)
             growth = rounding_growth(len(path)) * frame.lost
             for at, joint in enumerate(joints):
-                if joint in path:
-                    found[:, at, j, :3] = ((moment + frames[joint].reach * force) * growth)[:, None]
+                if joint is None or joint in path:
+                    reach = 0.0 if joint is None else frames[joint].reach
+                    found[:, at, j, :3] = ((moment + reach * force) * growth)[:, None]
                     found[:, at, j, 3:] = (force * growth)[:, None]
         return found
 

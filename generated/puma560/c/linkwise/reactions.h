@@ -1,0 +1,55 @@
+/* What joints carry of each link, by cause: its wrenches before an axis projects them. The same in every package of linkwise.
+
+   For each coordinate k of a link's path the link needs the wrenches (N, f) of rule.h, for each unit of qdd_k and of qd_k, and
+   one against its weight. There f is that of a unit of mass and N about the centre of mass c; here they are
+       f = m f        N = N + c x f
+   about the base's origin, and so the same for every joint that carries the link. About a joint's own origin p it is
+   N - p x f. */
+
+#include "blocks.h"
+
+enum { WRENCH = 6 };
+
+#include "link_wrenches.h"
+
+/* Rows, a block at a time; for any qdd, as nothing depends on it. */
+static void reactions_of_rows(size_t count, INPUTS, real *acceleration, real *velocity, real *gravity)
+{
+    NUMBERS(x);
+    ALIGNED motion m[BLOCK_PARTS];
+    ALIGNED real c2[WRENCH * LONGEST * BLOCK], c1[WRENCH * LONGEST * BLOCK], g[WRENCH * BLOCK];
+    const size_t row = (size_t)G * WRENCH, weights = (size_t)LINKS * WRENCH;
+    for (size_t s = 0; s < count; s += BLOCK) {
+        const size_t samples = count - s < BLOCK ? count - s : BLOCK;
+        rows_moved(x, samples, q + s * N, qd + s * N, qdd + s * N, m);
+        for (int j = 0; j < LINKS; ++j) {
+            const size_t first = (size_t)(path_start[j] * WRENCH), own = (size_t)(path_start[j + 1] * WRENCH) - first;
+            for (int part = 0; part < BLOCK_PARTS; ++part)
+                SIZED(link_wrenches)(x, &m[part], j, c2 + part * LANES, c1 + part * LANES, g + part * LANES);
+            scatter(samples, own, row, c2, acceleration + s * row + first);
+            scatter(samples, own, row, c1, velocity + s * row + first);
+            scatter(samples, WRENCH, weights, g, gravity + s * weights + (size_t)(j * WRENCH));
+        }
+    }
+}
+
+#ifndef LINKWISE_SMALL
+#include "one_motion.h"
+
+#include "link_wrenches.h"
+#endif
+
+void API(reactions)(size_t count, AT_REST, real *acceleration, real *velocity, real *gravity)
+{
+    if (count != 1) {
+        reactions_of_rows(count, PASSED_AT_REST, acceleration, velocity, gravity);
+        return;
+    }
+    NUMBERS(x);
+    motion m;
+    moved_one(x, q, qd, qd, NULL, &m);
+    for (int j = 0; j < LINKS; ++j) {
+        const size_t first = (size_t)(path_start[j] * WRENCH);
+        link_wrenches_one(x, &m, j, acceleration + first, velocity + first, gravity + (size_t)(j * WRENCH));
+    }
+}
