@@ -98,6 +98,15 @@ def test_no_header_but_of_freestanding_c_and_math_is_included(directory_of: Call
             assert found <= {"math.h", "stddef.h", "float.h"}, path
 
 
+def wrenches(model: Any, q: Any, qd: Any) -> tuple[Any, ...]:
+    """Return the wrenches of links as C packs them, by what Python says of the last joint behind each."""
+    k, j = model.layout.torque.T
+    last = np.array([link.joint for link in model.backend.tree.links])
+    found = model.reactions(q, qd, 0.0 * q + 1.0, axes="world")
+    velocity = found.velocity[:, last[j], j, k] / qd[:, k, None]
+    return found.acceleration[:, last[j], j, k], velocity, found.gravity[:, last, np.arange(model.N)]
+
+
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "parameters"])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_one_by_one_it_says_what_numpy_says(
@@ -132,8 +141,10 @@ def test_one_by_one_it_says_what_numpy_says(
         if kind != "energies":
             dense["regressor"] = (model.regressor(*exact),)
             dense["coefficient_regressors"] = model.coefficient_regressors(*exact[:2])
+        if kind not in ("energies", "tied"):
+            dense["reactions"] = wrenches(model, *exact[:2])
         for call, fields in dense.items():
-            given = states[:2] if call.startswith("coefficient") else states
+            given = states[:2] if call.startswith(("coefficient", "reactions")) else states
             found = library.dense(call, given, [field.shape[1:] for field in fields])
             for one, other in zip(found, fields, strict=True):
                 assert relative_error(one, other) <= near, (call, count)
@@ -145,7 +156,7 @@ def told(header: str) -> tuple[list[int], list[int]]:
     number = r"([\d,]+)"
     found = re.search(
         rf"at most {number} bytes of stack in double and {number} in float, and those of torques, "
-        rf"coefficients, gradients and regressors {number} and {number}\.",
+        rf"coefficients, gradients, regressors and reactions {number} and {number}\.",
         text,
     )
     assert found

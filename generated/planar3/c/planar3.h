@@ -162,10 +162,10 @@ void planar3_coefficient_regressors(size_t count, const double *q, const double 
 
 /* Reactions: the whole wrenches that joints carry of each link, by cause, of which c2(i, j, k), c1(i, j, k) and g(i, j) are the
    parts along the joints' axes. Where tau(k, j) stands in a row of tau, acceleration has six numbers, N_x, N_y, N_z, f_x, f_y
-   and f_z: the moment about the world's origin and the force, in the world's axes, that link j needs for each unit of qdd_k,
-   and velocity those for each unit of qd_k; gravity has for each link those against its weight. Every joint that carries the
-   link carries them: the side of the ground exerts them through it on the other side, about the joint's origin p as
-   N - p x f. Sum over the links behind a joint, with qdd_k and qd_k, for what it carries in all.
+   and f_z, in the world's axes: the force that link j needs for each unit of qdd_k, and the moment about the origin p of the joint
+   that moves the link; velocity has those for each unit of qd_k, gravity for each link those against its weight. Every joint
+   that carries the link carries them, as what the side of the ground exerts through it on the other side, about its own
+   origin p' as N + (p - p') x f. Sum over the links behind a joint, with qdd_k and qd_k, for what it carries in all.
    Reads q, qd (count, JOINTS);
    writes acceleration, velocity (count, G, 6), gravity (count, LINKS, 6). */
 void planar3_reactions(size_t count, const double *q, const double *qd,
@@ -339,10 +339,10 @@ void planar3_coefficient_regressorsf(size_t count, const float *q, const float *
 
 /* Reactions: the whole wrenches that joints carry of each link, by cause, of which c2(i, j, k), c1(i, j, k) and g(i, j) are the
    parts along the joints' axes. Where tau(k, j) stands in a row of tau, acceleration has six numbers, N_x, N_y, N_z, f_x, f_y
-   and f_z: the moment about the world's origin and the force, in the world's axes, that link j needs for each unit of qdd_k,
-   and velocity those for each unit of qd_k; gravity has for each link those against its weight. Every joint that carries the
-   link carries them: the side of the ground exerts them through it on the other side, about the joint's origin p as
-   N - p x f. Sum over the links behind a joint, with qdd_k and qd_k, for what it carries in all.
+   and f_z, in the world's axes: the force that link j needs for each unit of qdd_k, and the moment about the origin p of the joint
+   that moves the link; velocity has those for each unit of qd_k, gravity for each link those against its weight. Every joint
+   that carries the link carries them, as what the side of the ground exerts through it on the other side, about its own
+   origin p' as N + (p - p') x f. Sum over the links behind a joint, with qdd_k and qd_k, for what it carries in all.
    Reads q, qd (count, JOINTS);
    writes acceleration, velocity (count, G, 6), gravity (count, LINKS, 6). */
 void planar3_reactionsf(size_t count, const float *q, const float *qd,

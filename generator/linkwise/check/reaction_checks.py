@@ -39,7 +39,7 @@ def reaction_reference(manifest: Manifest, tree: JointTree, states: States) -> R
 
 
 def link_reference(manifest: Manifest, tree: JointTree, rows: Index, states: States) -> Reference:
-    """Return the wrenches of links about the base's origin, as C has them.
+    """Return the wrenches of links about the joints that move them, as C has them.
 
     rows: joint and link of each entry of tau, (count, 2); those by a joint's motion stand where its tau does
     """

@@ -78,9 +78,9 @@ class Magnitudes:
             force, moment = _needed(frame, link)
             growth = rounding_growth(len(path)) * frame.lost
             for at, joint in enumerate(joints):
-                if joint is None or joint in path:
-                    reach = 0.0 if joint is None else frames[joint].reach
-                    found[:, at, j, :3] = ((moment + reach * force) * growth)[:, None]
+                own = link.joint if joint is None else joint
+                if own in path:
+                    found[:, at, j, :3] = ((moment + frames[own].reach * force) * growth)[:, None]
                     found[:, at, j, 3:] = (force * growth)[:, None]
         return found
 

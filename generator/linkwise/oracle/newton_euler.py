@@ -91,17 +91,16 @@ class NewtonEuler:
         """Return what joints of the tree carry of each link, (samples, joints, N, 6), in the world's axes.
 
         It is the moment about the joint's origin, then the force; zero for links that a joint does not carry.
-        For None in place of a joint it is what every joint carries that moves the link, about the base's
-        origin.
+        None in place of a joint stands for that which moves the link.
         """
         motions = self._motions(q, qd, qdd, self.gravity if gravity else 0.0 * self.gravity)
         found = np.zeros((len(q), len(joints), len(self.links), 6), np.result_type(q, qd, qdd))
         for j, (link, path) in enumerate(zip(self.links, self.paths, strict=True)):
             force, moment, com = (part[:, 0] for part in self._wrenches([link], motions[link.joint].frame))
             for at, joint in enumerate(joints):
-                if joint is None or joint in path.joints:
-                    origin = 0.0 if joint is None else motions[joint].frame.origin
-                    found[:, at, j, :3] = moment + _cross(com - origin, force)
+                own = link.joint if joint is None else joint
+                if own in path.joints:
+                    found[:, at, j, :3] = moment + _cross(com - motions[own].frame.origin, force)
                     found[:, at, j, 3:] = force
         return found
 

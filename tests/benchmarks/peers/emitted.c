@@ -1,7 +1,8 @@
-/* Times the C of a robot of rigid links without run-time parameters: nanoseconds a sample of the full decomposition.
+/* Times the C of a robot of rigid links without run-time parameters: nanoseconds a sample of the full decomposition, in rows
+   and in blocks, and of the reactions, in rows.
    Compiled with -DROBOT=name -DUPPER=NAME -DREAL=double -DSUFFIX= (or float, f) and the header by -include.
    Each figure is the least of many short spells, so that other work on the machine falls between them.
-   Arguments: seconds for a figure, then batch sizes. Prints "layout batch threads nanoseconds" lines. */
+   Arguments: seconds for a figure, then batch sizes. Prints "call layout batch threads nanoseconds" lines. */
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,12 +14,13 @@
 #define GLUE(a, b, c) JOIN3(a, b, c)
 #define CALL(function) GLUE(ROBOT, function, SUFFIX)
 #define SIZE(what) GLUE(UPPER, what, )
-enum { N = SIZE(_JOINTS), C2 = SIZE(_C2), C1 = SIZE(_C1), G = SIZE(_G) };
+enum { N = SIZE(_JOINTS), LINKS = SIZE(_LINKS), C2 = SIZE(_C2), C1 = SIZE(_C1), G = SIZE(_G) };
+enum kind { ROWS, BLOCKS, REACTIONS, KINDS };
 enum { W = GLUE(UPPER, _BLOCK, WIDTH), THREADS = 2 };
 typedef REAL real;
 
 struct work {
-    int blocks;
+    enum kind kind;
     size_t count;
     long rounds, repeats;
     double start, end;
@@ -49,7 +51,9 @@ static real *room(size_t values)
 
 static void call(const struct work *w)
 {
-    if (w->blocks)
+    if (w->kind == REACTIONS)
+        CALL(_reactions)(w->count, w->q, w->qd, w->c2, w->c1, w->g);
+    else if (w->kind == BLOCKS)
         CALL(_decomposition_blocks)(w->count / W, w->q, w->qd, w->qdd, w->c2, w->c1, w->g, w->tau);
     else
         CALL(_decomposition)(w->count, w->q, w->qd, w->qdd, w->c2, w->c1, w->g, w->tau);
@@ -84,7 +88,9 @@ static double best(struct work whole, int threads)
         w->count = share;
         w->gate = &gate;
         w->q += from * N, w->qd += from * N, w->qdd += from * N;
-        w->c2 += from * C2, w->c1 += from * C1, w->g += from * G, w->tau += from * G;
+        const int reacts = w->kind == REACTIONS;
+        w->c2 += from * (reacts ? 6 * G : C2), w->c1 += from * (reacts ? 6 * G : C1);
+        w->g += from * (reacts ? 6 * LINKS : G), w->tau += from * G;
         pthread_create(&id[t], NULL, loop, w);
     }
     for (long repeat = 0; repeat < whole.repeats; ++repeat) {
@@ -113,8 +119,8 @@ int main(int count, char **arguments)
         largest = batch > largest ? batch : largest;
     }
     struct work w = {.q = room(largest * N), .qd = room(largest * N), .qdd = room(largest * N)};
-    w.c2 = room(largest * C2), w.c1 = room(largest * C1);
-    w.g = room(largest * G), w.tau = room(largest * G);
+    w.c2 = room(largest * (C2 > 6 * G ? C2 : 6 * G)), w.c1 = room(largest * (C1 > 6 * G ? C1 : 6 * G));
+    w.g = room(largest * (G > 6 * LINKS ? G : 6 * LINKS)), w.tau = room(largest * G);
     unsigned state = 1;
     for (size_t e = 0; e < largest * N; ++e) {
         state = state * 1664525u + 1013904223u;
@@ -123,10 +129,11 @@ int main(int count, char **arguments)
         w.qdd[e] = (real)(3.0 * ((state ^ 0x85ebca6bu) / 4294967296.0 - 0.5));
     }
     for (int a = 2; a < count; ++a)
-        for (w.blocks = 0; w.blocks < 2; ++w.blocks)
+        for (int kind = 0; kind < KINDS; ++kind)
             for (int threads = 1; threads <= THREADS; ++threads) {
+                w.kind = (enum kind)kind;
                 w.count = strtoul(arguments[a], NULL, 10);
-                if (w.count < (size_t)threads * (w.blocks ? W : 1))
+                if (w.count < (size_t)threads * (kind == BLOCKS ? W : 1))
                     continue;
                 call(&w);
                 const double start = now();
@@ -134,8 +141,8 @@ int main(int count, char **arguments)
                 const double took = now() - start;
                 w.rounds = (long)(spell / took) + 1;
                 w.repeats = (long)(budget / ((double)w.rounds * took)) + 15;
-                printf("%s %zu %d %.5g\n", w.blocks ? "blocks" : "rows", w.count, threads,
-                    best(w, threads) / (double)w.count);
+                printf("%s %s %zu %d %.5g\n", kind == REACTIONS ? "reactions" : "packed",
+                    kind == BLOCKS ? "blocks" : "rows", w.count, threads, best(w, threads) / (double)w.count);
             }
     return 0;
 }

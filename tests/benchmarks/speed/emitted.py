@@ -56,11 +56,13 @@ def programs(package: Package, work: Path) -> dict[str, Path]:
 
 
 def measure(package: Package, made: dict[str, Path], largest: int, seconds: float) -> list[Figure]:
-    """Time both layouts in both number types, alone and with two threads."""
+    """Time both layouts, and the reactions, in both number types, alone and with two threads."""
     figures = []
     for dtype, program in made.items():
         sizes = [str(b) for b in batches(package, TYPES[dtype][2], largest)]
         for line in run([str(program), str(seconds), *sizes]).splitlines():
-            layout, batch, threads, ns = line.split()
-            figures.append(Figure(package.name, "C", dtype, layout, int(batch), int(threads), float(ns)))
+            call, layout, batch, threads, ns = line.split()
+            figures.append(
+                Figure(package.name, "C", dtype, layout, int(batch), int(threads), float(ns), call)
+            )
     return figures

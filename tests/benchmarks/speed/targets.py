@@ -50,6 +50,15 @@ def in_c(results: Results) -> Iterator[Target]:
     yield Target("Panda, CasADi's C / batch 1,024", ratio(casadi.ns if casadi else None, many), 20, False)
     yield Target("Panda, Pinocchio's full decomposition / one sample", ratio(whole, one), 30, False)
     yield Target("Panda, one sample / one rnea", ratio(one, pin.rnea if pin else None), 1)
+    packed, borne = (
+        results.find("panda", "C", "float64", "rows", call=call) for call in ("packed", "reactions")
+    )
+    for batch in (1, 1024):
+        yield Target(
+            f"Panda, reactions / decomposition, batch {batch:,}",
+            ratio(borne.get(batch), packed.get(batch)),
+            1.5,
+        )
     for batch in sorted(b for b in both if b >= 1024) or [1024]:
         shared = ratio(alone.get(batch), both.get(batch))
         yield Target(f"Panda, one thread / two, batch {batch:,}", shared, 1.8, False)

@@ -2,9 +2,8 @@
 
    For each coordinate k of a link's path the link needs the wrenches (N, f) of rule.h, for each unit of qdd_k and of qd_k, and
    one against its weight. There f is that of a unit of mass and N about the centre of mass c; here they are
-       f = m f        N = N + c x f
-   about the base's origin, and so the same for every joint that carries the link. About a joint's own origin p it is
-   N - p x f. */
+       f = m f        N = N + (c - p) x f
+   about the origin p of the joint that moves the link. About that of a joint before it, at p', it is N + (p - p') x f. */
 
 #include "blocks.h"
 

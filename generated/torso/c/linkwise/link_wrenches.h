@@ -1,10 +1,10 @@
 /* What a link needs by cause, for SIZED's number of samples, whose entries are W apart. The same in every package of
    linkwise. reactions.h says what is in it, and includes this once for each number of samples. */
 
-/* A wrench, entry by entry, from that of a unit of mass about the centre of mass. */
-INLINE void SIZED(put_wrench)(const moving_link *l, vector moment, vector unit, real *entries)
+/* A wrench, entry by entry, from that of a unit of mass about the centre of mass, which is at `arm` from the joint. */
+INLINE void SIZED(put_wrench)(number mass, vector arm, vector moment, vector unit, real *entries)
 {
-    const vector force = scale(l->mass, unit), about = add_cross(moment, l->com, force);
+    const vector force = scale(mass, unit), about = add_cross(moment, arm, force);
     PUT(entries + 0 * W, about.x);
     PUT(entries + 1 * W, about.y);
     PUT(entries + 2 * W, about.z);
@@ -18,11 +18,12 @@ static inline void SIZED(link_wrenches)(const struct numbers *x, const motion *m
 {
     const int length = path_start[j + 1] - path_start[j];
     const moving_link l = SIZED(link_at)(m, links[j].frame, &x->bodies[j], x->gravity);
+    const vector arm = subtract(l.com, m->place[links[j].frame]);
     wrenches w;
     SIZED(columns)(m, &l, columns + path_start[j], length, &w);
     for (int k = 0; k < length; ++k) {
-        SIZED(put_wrench)(&l, w.c2[k].z, w.c2[k].s, c2 + k * WRENCH * W);
-        SIZED(put_wrench)(&l, w.c1[k].z, w.c1[k].s, c1 + k * WRENCH * W);
+        SIZED(put_wrench)(l.mass, arm, w.c2[k].z, w.c2[k].s, c2 + k * WRENCH * W);
+        SIZED(put_wrench)(l.mass, arm, w.c1[k].z, w.c1[k].s, c1 + k * WRENCH * W);
     }
-    SIZED(put_wrench)(&l, m->place[0], l.weight, g);
+    SIZED(put_wrench)(l.mass, arm, m->place[0], l.weight, g);
 }

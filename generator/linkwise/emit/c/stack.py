@@ -35,7 +35,7 @@ MOST_INT = 2**31 - 1
 class SmallStack:
     """Bytes that functions take at most with LINKWISE_SMALL, calls among them included, as text.
 
-    motion: those of torques, coefficients, gradients and regressors, in double and in float
+    motion: those of torques, coefficients, gradients, regressors and reactions, in double and in float
     control: those of all functions
     """
 
@@ -58,7 +58,7 @@ def _small(values: int) -> tuple[str, str]:
 
 
 def _motion_values(system: System, links: tuple[Span, ...], kept: int) -> int:
-    """Return how many numbers torques, coefficients, gradients and regressors of one sample keep."""
+    """Return how many numbers functions other than those for control keep for one sample."""
     n, one = len(system.coordinates), most_counts([link.size for link in links])
     values = 7 * n + one.total + kept
     if not isinstance(system, RigidSystem):
