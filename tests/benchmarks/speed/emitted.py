@@ -41,7 +41,7 @@ def programs(package: Package, work: Path) -> dict[str, Path]:
     """Programs that time both layouts, by number type."""
     made = {}
     for dtype, (real, suffix, _) in TYPES.items():
-        library = package.libraries[real]
+        library, reactions = package.libraries[real], package.of_reactions[real]
         made[dtype] = work / f"{package.name}_{dtype}"
         run(
             [
@@ -49,6 +49,7 @@ def programs(package: Package, work: Path) -> dict[str, Path]:
                 f"-DUPPER={package.name.upper()}", f"-DREAL={real}", f"-DSUFFIX={suffix}",
                 f"-DWIDTH={suffix.upper()}", "-include", str(package.directory / "c" / f"{package.name}.h"),
                 str(PEERS / "emitted.c"), str(library), f"-Wl,-rpath,{library.parent}",
+                str(reactions), f"-Wl,-rpath,{reactions.parent}",
                 "-lpthread", "-lm", "-o", str(made[dtype]),
             ]
         )  # fmt: skip

@@ -27,6 +27,8 @@ class Package:
     directory: Path
     manifest: dict[str, Any]
     libraries: dict[str, Path]
+    of_reactions: dict[str, Path]
+    """Libraries that have the reactions."""
     sizes: dict[str, int]
     generate_seconds: float
     compile_seconds: dict[str, float]
@@ -65,16 +67,17 @@ def prepare(case: Case, work: Path, kernel: str | None = None) -> Package:
     build = importlib.import_module("linkwise_runtime.native.build")
     directory = work / case.name
     sources = build.Sources(case.name, directory / "c")
-    libraries, compiled = {}, {}
+    libraries, of_reactions, compiled = {}, {}, {}
     for real in ("double", "float"):
         start = time.perf_counter()
         libraries[real] = build.library(sources, real)
         compiled[real] = time.perf_counter() - start
+        of_reactions[real] = build.library(sources, real, "regressors")
     header = (directory / "c" / f"{case.name}.h").read_text(encoding="utf-8")
     sizes = {key: int(value) for key, value in re.findall(rf"{case.name.upper()}_(\w+) = (\d+)", header)}
     manifest = json.loads((directory / "manifest.json").read_text(encoding="utf-8"))
     size = code_size(libraries["double"])
-    return Package(case.name, directory, manifest, libraries, sizes, generated, compiled, size)
+    return Package(case.name, directory, manifest, libraries, of_reactions, sizes, generated, compiled, size)
 
 
 def code_size(library: Path) -> int:

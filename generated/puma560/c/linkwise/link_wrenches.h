@@ -19,11 +19,15 @@ static inline void SIZED(link_wrenches)(const struct numbers *x, const motion *m
     const int length = path_start[j + 1] - path_start[j];
     const moving_link l = SIZED(link_at)(m, links[j].frame, &x->bodies[j], x->gravity);
     const vector arm = subtract(l.com, m->place[links[j].frame]);
-    wrenches w;
-    SIZED(columns)(m, &l, columns + path_start[j], length, &w);
     for (int k = 0; k < length; ++k) {
-        SIZED(put_wrench)(l.mass, arm, w.c2[k].z, w.c2[k].s, c2 + k * WRENCH * W);
-        SIZED(put_wrench)(l.mass, arm, w.c1[k].z, w.c1[k].s, c1 + k * WRENCH * W);
+        const screw axis = m->axis[columns[path_start[j] + k]], change = m->change[columns[path_start[j] + k]];
+        vector of_c2, of_c1;
+        SIZED(moments)(l.inertia.x, l.turning.x, axis.z, change.z, &of_c2.x, &of_c1.x);
+        SIZED(moments)(l.inertia.y, l.turning.y, axis.z, change.z, &of_c2.y, &of_c1.y);
+        SIZED(moments)(l.inertia.z, l.turning.z, axis.z, change.z, &of_c2.z, &of_c1.z);
+        SIZED(put_wrench)(l.mass, arm, of_c2, SIZED(arm)(&l, &axis), c2 + k * WRENCH * W);
+        SIZED(put_wrench)(l.mass, arm, of_c1,
+            subtract_cross(subtract_cross(change.s, l.velocity, axis.z), l.com, change.z), c1 + k * WRENCH * W);
     }
     SIZED(put_wrench)(l.mass, arm, m->place[0], l.weight, g);
 }

@@ -11,24 +11,32 @@ enum { WRENCH = 6 };
 
 #include "link_wrenches.h"
 
-/* Rows, a block at a time; for any qdd, as nothing depends on it. */
+/* Rows, a block at a time; for any qdd, as nothing depends on it. Links wait until there is no room for the next one. */
 static void reactions_of_rows(size_t count, INPUTS, real *acceleration, real *velocity, real *gravity)
 {
+    enum { ROOM = WRENCH * LONGEST * (BLOCK > 1 ? 2 : 1) };
     NUMBERS(x);
     ALIGNED motion m[BLOCK_PARTS];
-    ALIGNED real c2[WRENCH * LONGEST * BLOCK], c1[WRENCH * LONGEST * BLOCK], g[WRENCH * BLOCK];
+    ALIGNED real c2[ROOM * BLOCK], c1[ROOM * BLOCK], g[LINKS * WRENCH * BLOCK];
     const size_t row = (size_t)G * WRENCH, weights = (size_t)LINKS * WRENCH;
     for (size_t s = 0; s < count; s += BLOCK) {
         const size_t samples = count - s < BLOCK ? count - s : BLOCK;
+        size_t first = 0, waiting = 0;
         rows_moved(x, samples, q + s * N, qd + s * N, qdd + s * N, m);
         for (int j = 0; j < LINKS; ++j) {
-            const size_t first = (size_t)(path_start[j] * WRENCH), own = (size_t)(path_start[j + 1] * WRENCH) - first;
+            const size_t at = waiting * BLOCK;
             for (int part = 0; part < BLOCK_PARTS; ++part)
-                SIZED(link_wrenches)(x, &m[part], j, c2 + part * LANES, c1 + part * LANES, g + part * LANES);
-            scatter(samples, own, row, c2, acceleration + s * row + first);
-            scatter(samples, own, row, c1, velocity + s * row + first);
-            scatter(samples, WRENCH, weights, g, gravity + s * weights + (size_t)(j * WRENCH));
+                SIZED(link_wrenches)(x, &m[part], j, c2 + at + part * LANES, c1 + at + part * LANES,
+                    g + j * WRENCH * BLOCK + part * LANES);
+            waiting += (size_t)((path_start[j + 1] - path_start[j]) * WRENCH);
+            if (j + 1 < LINKS && waiting + (size_t)((path_start[j + 2] - path_start[j + 1]) * WRENCH) <= ROOM)
+                continue;
+            scatter(samples, waiting, row, c2, acceleration + s * row + first);
+            scatter(samples, waiting, row, c1, velocity + s * row + first);
+            first += waiting;
+            waiting = 0;
         }
+        scatter(samples, weights, weights, g, gravity + s * weights);
     }
 }
 
