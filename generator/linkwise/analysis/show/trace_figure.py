@@ -31,7 +31,7 @@ def trace_panels(result: AnalysisResult, number: int) -> SourcedPanels:
         panels.insert(0, ("asked by velocities", result.robot.torque_units[joint]))
         quantities.insert(0, ("tau_from", {"joint": joint}))
     return SourcedPanels(
-        f"Where the velocities came from that load {name}, and its own",
+        f"What velocities ask of {name}, by origin",
         panels,
         _sources(result, joint, quantities),
         (f"parts of velocities that one source gave since the start, in joint coordinates{weight}",),
