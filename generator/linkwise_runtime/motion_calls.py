@@ -159,7 +159,8 @@ class MotionCalls(RobotCalls):
         restarts: instants at which the trace begins anew: all velocities are those of the start there
         by_link: whether gravity is a source for each link
         weight: "apart", as a source: it and the torques that hold it then give velocities that grow with time
-        and cancel each other; or "borne": torques are those beyond what holds the weight, which is no source
+        and cancel each other; or "borne": torques are those beyond what holds the weight, which is a source
+        for a floating base alone, that no torque holds
 
         Between samples velocities go by cubics that have the accelerations of the samples. Raises ValueError
         for a gap in time, for instants outside the motion, for kinetic energies of degree three or more in

@@ -139,7 +139,7 @@ class Outputs:
         None, "Cut the sources of --trace into windows of this length, s", metavar="S"
     )
     trace_weight: Weight = option(
-        "apart", "Weight as a source of --trace, or borne by torques: these then are what is beyond"
+        "apart", "Weight as a source of --trace, or borne by torques: these are what is beyond"
     )
     trace_restart: tuple[str, ...] = option(
         (),

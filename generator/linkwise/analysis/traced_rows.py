@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 from linkwise_runtime.arrays.backend import ArrayBackend
+from linkwise_runtime.constraints.independent_joints import loose_base
 from linkwise_runtime.motion.between_samples import SampledMotion, sample_slopes
 from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD, TraceEquations
 from linkwise_runtime.motion.tracer import Tracer, TraceState
@@ -90,6 +91,9 @@ class TracedRows:
             return cast(ArrayBackend, at.backend)
 
         carried = tuple(part.model.backend for part in model.parts) if isinstance(model, PayloadModel) else ()
+        loose = () if robot.tree is None else loose_base(robot.tree)
+        if robot.contacts is not None:
+            loose = robot.contacts.unactuated
         equations = TraceEquations(
             model.backend,
             ties,
@@ -97,6 +101,7 @@ class TracedRows:
             torques_given=False,
             given=tuple(given),
             is_borne=asked.is_borne,
+            loose=loose,
             carried=carried,
             backend_at=cast(Any, backend_at) if robot.time_name or robot.inputs else None,
         )

@@ -64,7 +64,9 @@ class TraceEquations:
     by_link: bool = False
     """True if gravity, or each share with a name, is a source for each link."""
     is_borne: bool = False
-    """True if weight is no source, and torques are those beyond what holds it."""
+    """True if torques are those beyond what holds the weight, which is a source for `loose` alone."""
+    loose: tuple[int, ...] = ()
+    """Coordinates that nothing drives, such as those of a floating base: no torque holds their weight."""
     carried: tuple[ArrayBackend, ...] = ()
     """Back ends of the same joints with nothing but payloads, which are carried beside the robot's links."""
     backend_at: Callable[[Numbers], ArrayBackend] | None = None
@@ -84,7 +86,7 @@ class TraceEquations:
         joints = structure.joint_names if self.torques_given else self.coordinates
         shares = [
             f"{share}{BETWEEN}{link}" if self.by_link else share
-            for share in (() if self.is_borne else structure.share_names)
+            for share in (() if self.is_borne and not self.loose else structure.share_names)
             for link in (structure.link_names if self.by_link else ("",))
         ]
         own = [
@@ -139,7 +141,7 @@ class TraceEquations:
             needed = _times(found.mT, needed)
         tau = motion.given[..., 0] if self.torques_given else None
         if tau is not None and self.is_borne:
-            tau = tau - g.sum(-1)
+            tau = tau - g.sum(-1) * (1.0 - self._loose(backend, q))
         columns = self._with_actuators(backend, place, needed, forces, tau)
         return TraceAt(qd, LinearEquations(mass, coriolis, columns), place)
 
@@ -171,13 +173,19 @@ class TraceEquations:
         # (..., n, N, M) in the order of the names: by share, then by link.
         by_link = xp.swapaxes(shares, -1, -2)
         kinds = [-by_link.reshape(*q.shape, -1) if self.by_link else -shares.sum(-2)]
-        kinds = [] if self.is_borne else kinds
+        if self.is_borne:
+            kinds = [self._loose(backend, q)[:, None] * kinds[0]] if self.loose else []
         if self._passive:
             own = backend.answers.passive_torque(q, qd, 0.0 * q)[:3]
             identity = np.eye(structure.n)
             for torque, joints in zip(own, self._passive.values(), strict=True):
                 kinds.append(-backend.constant(identity[:, joints], q) * torque[..., None])
         return xp.concat([*kinds, given], -1)
+
+    def _loose(self, backend: ArrayBackend, q: Numbers) -> Numbers:
+        """Return a one for each coordinate that nothing drives, and zeros, (n,)."""
+        ones = np.isin(np.arange(q.shape[-1]), self.loose).astype(float)
+        return backend.constant(ones, q)
 
     def _with_actuators(
         self,

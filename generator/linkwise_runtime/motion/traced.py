@@ -9,6 +9,7 @@ import numpy as np
 from ..arguments import as_array, check_numbers, rising_instants
 from ..arrays.backend import ArrayBackend
 from ..chosen_names import short
+from ..constraints.independent_joints import loose_base
 from ..interface import Numbers, namespace
 from ..motion_quantities import TracedMotion
 from .between_samples import SampledMotion, sample_slopes
@@ -63,6 +64,7 @@ def read_trace(robot: DrivenRobot, asked: Traced) -> ReadTrace:
     times = _instants(asked.time, motion["q"])
     _check_traceable(backend, motion["q"])
     names = tuple(f"{LOAD}{BETWEEN}{name}" for name in loads.names(backend))
+    loose = () if backend.tree is None else loose_base(backend.tree)
     equations = TraceEquations(
         backend,
         constraints,
@@ -71,6 +73,7 @@ def read_trace(robot: DrivenRobot, asked: Traced) -> ReadTrace:
         names,
         asked.by_link,
         _borne(asked, backend),
+        loose,
     )
     vectors = numbers[len(named) :]
     return ReadTrace(times, _sampled(backend, loads, times, motion, vectors), equations, loads, vectors)
