@@ -60,7 +60,7 @@ def labelled(
     about |= {"convention": answer.convention} if hasattr(answer, "convention") else {}
     axes = _axes(robot, ties, key, arguments)
     if key == "trace":
-        windows = tuple(f"{begin:g}..{end:g} s" for begin, end in answer.windows)
+        windows = tuple(f"{begin:.10g}..{end:.10g} s" for begin, end in answer.windows)
         axes |= {"origin": NamedAxis("origin", answer.sources), "window": NamedAxis("window", windows)}
     return alone(dataset(parts, axes, *before, about))
 

@@ -113,7 +113,7 @@ class TracedRows:
         sources, windows = self.tracer.equations.sources, self.asked.windows
         if len(windows) == 1:
             return sources
-        return tuple(f"{source} {begin:g}..{end:g} s" for source in sources for begin, end in windows)
+        return tuple(f"{source} {begin:.10g}..{end:.10g} s" for source in sources for begin, end in windows)
 
     def places(self, velocity: Sequence[Place]) -> list[Place]:
         """Return the places of its rows; velocity: those of the torques by velocity.

@@ -39,10 +39,6 @@ class TraceAt(NamedTuple):
     """Equations of the independent coordinates, whose columns are the sources."""
     place: ClosedPlace | None
 
-    def velocity(self, own: Numbers) -> Numbers:
-        """Return the velocities (..., n, X) of all joints for those of the independent ones, (..., m, X)."""
-        return own if self.place is None else self.place.found.map @ own
-
     @property
     def own_velocity(self) -> Numbers:
         """Velocities of the independent joints, (..., m)."""
