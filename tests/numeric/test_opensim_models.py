@@ -30,7 +30,7 @@ pytest.importorskip(
 
 import opensim
 
-from numeric.opensim_beside import Beside
+from numeric.opensim_beside import Beside, bare
 from numeric.opensim_model import numbers
 
 LIMIT = 1e-12
@@ -183,3 +183,28 @@ def test_which_coordinates_files_have_in_degrees_is_opensims_choice(
     coordinate = read_robot(file).coordinates[0]
     assert kind in (1, 2, 3), "rotational, translational or coupled"
     assert (coordinate.unit, coordinate.coupled) == ("m" if kind == 2 else "rad", kind == 3)
+
+
+@pytest.mark.parametrize("kinds", [["PinJoint", KNEE, "PinJoint"], ["UniversalJoint", ROLLING, KNEE]])
+def test_what_joints_bear_is_what_opensim_calls_their_reactions(
+    kinds: Sequence[Kind], tmp_path: Path
+) -> None:
+    both = beside(tmp_path, chain(kinds))
+    model, locked = bare(both.file, ())
+    state, (q, qd, _) = model.initSystem(), both.motion
+    moved = both._moved(model, state, locked, q, qd, 0.0 * qd)
+    model.realizeAcceleration(state)  # nothing but gravity drives it
+    rates = numbers(state.getUDot()) - moved.turning @ moved.rate - moved.turn @ moved.jerk
+    qdd = np.linalg.lstsq(moved.turn @ moved.columns, rates, rcond=None)[0]
+    links = {
+        both.robot.backend.tree.joints[link.joint].link: link.joint for link in both.robot.backend.tree.links
+    }
+    for k in range(model.getJointSet().getSize()):
+        joint = model.getJointSet().get(k)
+        child = joint.getChildFrame()
+        at, force = child.getPositionInGround(state), joint.calcReactionOnChildExpressedInGround(state)
+        expected = np.array([[part.get(row) for row in range(3)] for part in (force.get(0), force.get(1))])
+        given = {"axes": "world", "point": [at.get(row) for row in range(3)]}
+        own = links[child.findBaseFrame().getName()]
+        found = both.robot.reactions(q, qd, qdd, joints=own, **given).total[0]
+        assert np.abs(found - expected.ravel()).max() <= LIMIT * np.abs(expected).max()
