@@ -234,6 +234,7 @@ def in_python(package: ModuleType, robot: Any) -> dict[str, Callable[[], Any]]:
         "dense_position_gradient": lambda: robot.position_gradient(q, q, q),
         "regressor": lambda: robot.regressor(q, q, q),
         "coefficient_regressors": lambda: robot.coefficient_regressors(q, q),
+        "reactions": lambda: robot.reactions(q, q, q, constraints=False),
         "pose": lambda: robot.kinematics.pose(q, frame),
         "jacobian": lambda: robot.kinematics.jacobian(q, frame),
         "jacobian_rate": lambda: robot.kinematics.jacobian_rate(q, q, frame),
@@ -268,7 +269,8 @@ def test_c_offers_nothing_that_python_refuses(kind: str, kinds: dict[str, Path])
     tied = "tied" in kind or kind == "coupled"
     assert FREE & calls.keys() <= refused if tied else not {"forward_dynamics", "partial_impedance"} & refused
     if robot.backend.tree is not None:  # of energies C has less
-        assert offered == calls.keys() - refused - (set() if robot.structure.passive else OF_PASSIVE)
+        lacking = (set() if robot.structure.passive else OF_PASSIVE) | ({"reactions"} if tied else set())
+        assert offered == calls.keys() - refused - lacking
     told = [
         f"There is no {name}_forward_dynamics",
         "robot.constraints",
