@@ -554,7 +554,7 @@ def test_what_energies_give_at_rest_is_called_gravity_only_where_it_is(
     page = json.loads(page_data(analysis))
     said = {name: _texts(analysis.figure(name)) for name in ("causes", "shares", "induced")} | {
         "page": [page["potential"]],
-        "page, induced": [curve["label"] for curve in page["induced"][0]["curves"]],
+        "page, induced": [curve["label"] for curve in page["sourced"][0]["curves"]],
         "notebook": [analysis._repr_html_().replace("<td>", " ")],
         "graph": [part_label(graph, at) for at in range(len(graph.parts))],
         "terms": [terms_markdown(terms_report(symbolic, query, 10**6, False, silent))],
