@@ -38,6 +38,8 @@ def labelled(
     arguments: dict[str, object] = dict(inspect.signature(function).bind(*given, **named).arguments)
     if arguments.pop("out", None) is not None:
         raise TypeError("labelled makes arrays of its own; leave out away")
+    if "time" in arguments:  # along which no joints stand
+        arguments["time"] = np.asarray(arguments["time"])
     key = rows[0].name
     asked = arguments.get("constraints")
     is_kept = key in (*OVER_TIME, "reactions") and asked is not False and robot.backend.ties_joints
@@ -60,7 +62,7 @@ def labelled(
     about |= {"convention": answer.convention} if hasattr(answer, "convention") else {}
     axes = _axes(robot, ties, key, arguments)
     if key == "trace":
-        windows = tuple(f"{begin:.10g}..{end:.10g} s" for begin, end in answer.windows)
+        windows = tuple(f"{begin:.15g}..{end:.15g} s" for begin, end in answer.windows)
         axes |= {"origin": NamedAxis("origin", answer.sources), "window": NamedAxis("window", windows)}
     return alone(dataset(parts, axes, *before, about))
 

@@ -12,7 +12,8 @@ class TracedMotion(NamedTuple, Generic[Array]):
     Source s is one of X, by its name, and w one of W windows of time in which it acted:
 
         torque:JOINT             the actuator of a joint, by its torque
-        gravity                  weight; by link gravity:LINK. Links written by hand have their shares' names
+        gravity                  weight; by link gravity:LINK
+        share:NAME               in place of it, what links written by hand have beside motion, by its name
         spring:JOINT, damping:JOINT, friction:JOINT
         load:NAME                a load from outside
         residual                 what the motion needs and no source gives, where torques are given
@@ -75,10 +76,12 @@ class TracedMotion(NamedTuple, Generic[Array]):
 
         Raises ValueError for a source that is not there.
         """
-        found = [s for s, name in enumerate(self.sources) if name == source or name.startswith(f"{source}:")]
+        if source in self.sources:
+            return [self.sources.index(source)]
+        found = [s for s, name in enumerate(self.sources) if name.startswith(f"{source}:")]
         if not found:
             raise ValueError(
-                f"no source {short(source)} moves this robot; its sources are "
+                f"no source {short(source)} moves this robot; choose a source: "
                 f"{choice(str(source), self.sources, 'sources')}"
             )
         return found

@@ -155,8 +155,8 @@ def test_work_is_the_integral_of_each_power_over_the_movement_and_its_phases(swi
         given = np.trapezoid(np.maximum(power, 0.0), swing.time, axis=0)
         assert relative_error(swing.work_by_source[name].given, given) <= 1e-11
     on = (swing.time >= 0.2) & (swing.time <= 0.3) | (swing.time >= 0.5) & (swing.time <= 0.6)
-    step = swing.time[1] - swing.time[0]
-    own = (np.maximum(-flow, 0.0) * on[:, None]).sum(axis=0) * step
+    taken, step = np.maximum(-flow, 0.0), swing.time[1] - swing.time[0]
+    own = (0.5 * (taken[1:] + taken[:-1]) * (on[1:] & on[:-1])[:, None]).sum(axis=0) * step
     assert relative_error(swing.work_in_phases[1]["flow"].taken, own) <= 1e-9
     record = swing.record()["work"]
     assert record["in_phases"][1]["phase"] == "once: from 0.2 to 0.3 s or from 0.5 to 0.6 s"

@@ -62,7 +62,7 @@ def test_columns_are_those_of_the_package_and_sum_to_what_velocities_ask(tmp_pat
     for s, source in enumerate(expected.sources):
         own = source.replace(f"load:{load.body}", "load:push")
         for w, (begin, end) in enumerate(expected.windows):
-            name = f"{own} {begin:.10g}..{end:.10g} s"
+            name = f"{own} {begin:.15g}..{end:.15g} s"
             if f"qd_from/{names[1]}/{name}" not in found.table:
                 assert not expected.velocity[..., s, w].any()
                 continue

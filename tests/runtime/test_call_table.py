@@ -128,7 +128,7 @@ def given(load: Load, row: Call, batch: tuple[int, ...] = (), which: str = "tied
         "time": INSTANTS,
         "torque": torque if row.chosen.get("by_link") else torque[..., 0],
         "tau": motion["tau"],
-        "without": "gravity",
+        "without": "share:gravity" if which in SIZES else "gravity",
         "loads": [] if which in SIZES else [AppliedLoad("hand", **hand)],
     }
     left = () if row.options.get("frame") else ("frame", "point")

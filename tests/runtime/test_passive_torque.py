@@ -170,7 +170,7 @@ def test_calls_that_move_the_robot_count_what_joints_have_unless_told_otherwise(
     assert found == dict.fromkeys(
         (
             *("forward_dynamics", "induced_accelerations", "induced_reactions", "simulate"),
-            *("induced_power", "induced_flow"),
+            *("induced_power", "induced_flow", "reactions", "trace", "counterfactual"),
             *("partial_impedance", "cancel", "constraints.forward_dynamics"),
         ),
         True,

@@ -183,7 +183,7 @@ def test_what_cannot_be_traced_is_refused(package_of: Packages) -> None:
             *motion, TIME, restarts=[0.3, 0.301]
         ),
         "weight is 'held'; give apart or borne": lambda: robot.trace(*motion, TIME, weight="held"),
-        r"no source 'elbow' moves this robot; its sources are": lambda: robot.trace(*motion, TIME).of(
+        r"no source 'elbow' moves this robot; choose a source": lambda: robot.trace(*motion, TIME).of(
             "elbow"
         ),
     }.items():

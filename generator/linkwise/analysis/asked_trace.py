@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from linkwise_runtime.motion.traced import trace_parts, window_ends
@@ -38,7 +38,7 @@ class AskedTrace:
         names: Sequence[str],
         windows: float | None,
         restarts: Sequence[float],
-        is_borne: bool,
+        weight: Weight,
         robot: OpenedRobot,
         time: Array,
     ) -> "AskedTrace":
@@ -47,6 +47,9 @@ class AskedTrace:
         Raises LinkwiseError for a joint that is not there, for times outside the movement, and for weight
         that is borne of links that were written by hand.
         """
+        if weight not in get_args(Weight):
+            raise LinkwiseError(f"--trace-weight {weight}: give {' or '.join(get_args(Weight))}")
+        is_borne = weight == "borne"
         if is_borne and robot.is_written:
             raise LinkwiseError(
                 f"--trace-weight borne: the links of {robot.name} were written by hand, and it is not said"

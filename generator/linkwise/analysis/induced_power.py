@@ -161,6 +161,7 @@ class PowerShares:
         power = np.einsum("sn,snx->sx", qd, forces)
         gains = self._momenta(terms, qd) @ moved
         self._give_back(gains, power, q, qd)
+        fed = self._fed(gains, rows, reactions, qd)
         gains, whole = gains @ self._merged, self._whole(terms, motion)
         blocks = [np.concatenate([np.asarray(e) for e in opened(self.robot).energy(q, qd)], axis=1)]
         blocks.append(_flat(whole[..., None], gains))
@@ -168,7 +169,7 @@ class PowerShares:
         if self._has_flow:
             behind = self._behind
             given = power @ self._merged[: power.shape[1]]
-            fed = behind.contacts @ self._fed(rows, reactions, qd) @ self._merged
+            fed = behind.contacts @ fed @ self._merged
             through = behind.holders @ gains - behind.given * given[:, None] - fed
             flow, before = (
                 whole @ held.T.astype(float) - given @ other.T - fed.sum(axis=2)
@@ -216,14 +217,33 @@ class PowerShares:
             whole += self._power_beside(q, qd)
         return whole
 
-    def _fed(self, rows: Array | None, reactions: Array, qd: Array) -> Array:
-        """Return the power that contacts feed in as they slip, (S, contacts, X), by what they answer."""
+    def _fed(self, gains: Array, rows: Array | None, reactions: Array, qd: Array) -> Array:
+        """Return the power that contacts feed in as they slip, (S, contacts, X), each in its own column.
+
+        It is taken out of the gains of what a contact answers, so that these sum to what a source gives.
+        """
         ground = self.robot.contacts
         if rows is None or ground is None:
             return np.zeros((len(qd), 0, len(self.every)))
         power = np.einsum("scn,sn->sc", rows, qd)[..., None] * reactions
-        each = range(len(ground.names))
-        return np.stack([power[:, ground.owners == c].sum(axis=1) for c in each], axis=1)
+        own = np.zeros((len(qd), len(ground.names), len(self.every)))
+        for c, link in enumerate(self._pressed):
+            fed = power[:, ground.owners == c].sum(axis=1)
+            own[:, c, self.every.index(("acc_contact", (c,)))] = fed.sum(axis=1)
+            gains[:, link] += own[:, c] - fed
+        return own
+
+    @cached_property
+    def _pressed(self) -> list[int]:
+        """Links that contacts hold; of a frame without mass the link before it."""
+        tree, found = self.robot.tree, []
+        assert tree is not None
+        for contact in self.robot.ground.contacts:
+            joint = self.robot.joint_of(contact.frame)
+            while joint is not None and tree.joints[joint].link not in self.robot.links:
+                joint = tree.joints[joint].parent
+            found.append(0 if joint is None else self.robot.links.index(tree.joints[joint].link))
+        return found
 
     def _power_beside(self, q: Array, qd: Array) -> Array:
         """Return R (S, N), the power that links of energies get otherwise than from joints."""

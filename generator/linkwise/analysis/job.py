@@ -150,6 +150,7 @@ class Outputs:
     def __post_init__(self) -> None:
         for flag, given, needed, there in (
             ("--induced-sto", self.storage, "--induced", self.induced),
+            ("--induced-whole", self.induced_whole, "--induced", self.induced),
             ("--trace-windows", self.trace_windows, "--trace", self.trace),
             ("--trace-restart", self.trace_restart, "--trace", self.trace),
             ("--trace-weight borne", self.trace_weight == "borne", "--trace", self.trace),
@@ -297,7 +298,7 @@ def prepared(
     if outputs.trace:
         q = samples.q[start:stop]
         restarts = restart_times(outputs.trace_restart, phases, robot, times, motion, q)
-        cut = outputs.trace_windows, restarts, outputs.trace_weight == "borne"
+        cut = outputs.trace_windows, restarts, outputs.trace_weight
         made = AskedTrace.of(outputs.trace, *cut, robot, motion)
         traced = TracedRows.of(made, robot, borne, samples)
     planned = InducedPlan(points, outputs.induced_whole)

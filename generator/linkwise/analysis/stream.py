@@ -68,8 +68,7 @@ class MovementSums:
     """Totals, work and errors of a movement, added up block by block.
 
     Samples are evenly spaced, and work is summed by the trapezoidal rule: with Δt between them
-    ∫ P dt = Δt (Σ_s P_s - (P_first + P_last)/2), so that blocks join without knowing of each other. A phase
-    has the terms of this sum whose samples are in it, so that a phase and the rest are the whole.
+    ∫ P dt = Δt Σ_s (P_s + P_(s+1))/2. A phase has the steps both of whose samples are in it.
     """
 
     def __init__(self, rows: ResultRows, robot: OpenedRobot, phases: Sequence[PlacedPhase] = ()) -> None:
@@ -78,8 +77,7 @@ class MovementSums:
         self._total, self._peak = np.zeros((2, len(rows)))
         self._power = rows.numbers(*POWER_OF.values(), *WORK_BY_SOURCE)
         self._energy = np.zeros((1 + len(phases), 2, len(self._power)))
-        self._first: Array | None = None
-        self._last = self._energy
+        self._last: tuple[Array, Array] | None = None
 
     def add(self, block: Array, closure: Closure) -> bool:
         """Add a block (rows, samples) and its errors; return whether all of its values are finite."""
@@ -94,10 +92,11 @@ class MovementSums:
         power = block[self._power]
         parts = np.stack([np.maximum(power, 0.0), np.maximum(-power, 0.0)])
         on = np.stack([np.ones(block.shape[1]), *self._on(block)])
-        self._energy += np.einsum("wps,fs->fwp", parts, on)
-        if self._first is None:
-            self._first = on[:, 0, None, None] * parts[..., 0]
-        self._last = on[:, -1, None, None] * parts[..., -1]
+        if self._last is not None:  # the step from the last block to this one
+            parts, on = (np.concatenate(two, axis=-1) for two in zip(self._last, (parts, on), strict=True))
+        steps = on[:, 1:] * on[:, :-1]
+        self._energy += 0.5 * np.einsum("wps,fs->fwp", parts[..., 1:] + parts[..., :-1], steps)
+        self._last = parts[..., -1:].copy(), on[:, -1:].copy()
         return True
 
     def _on(self, block: Array) -> Iterator[Array]:
@@ -109,9 +108,8 @@ class MovementSums:
 
     def movement(self, step: float) -> WholeMovement:
         """Return what the whole movement comes to; samples are `step` s apart."""
-        first = self._last if self._first is None else self._first
         energy = np.zeros((1 + len(self._phases), 2, len(self._rows), 1))
-        energy[:, :, self._power, 0] = step * (self._energy - 0.5 * (first + self._last))
+        energy[:, :, self._power, 0] = step * self._energy
         kept = [*POWER_OF.values(), *(name for name in WORK_BY_SOURCE if name in self._rows)]
         whole, *phases = (
             {power: Work(*(self._rows.dense(power, way)[0] for way in part)) for power in kept}

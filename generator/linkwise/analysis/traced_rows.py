@@ -16,6 +16,7 @@ from linkwise_runtime.arrays.backend import ArrayBackend
 from linkwise_runtime.constraints.independent_joints import loose_base
 from linkwise_runtime.motion.between_samples import SampledMotion, sample_slopes
 from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD, TraceEquations
+from linkwise_runtime.motion.traced import check_traceable
 from linkwise_runtime.motion.tracer import Tracer, TraceState
 
 from linkwise.analysis.asked_trace import AskedTrace
@@ -91,6 +92,10 @@ class TracedRows:
             return cast(ArrayBackend, at.backend)
 
         carried = tuple(part.model.backend for part in model.parts) if isinstance(model, PayloadModel) else ()
+        try:
+            check_traceable(robot.structure)
+        except ValueError as error:
+            raise LinkwiseError(f"--trace: {error}") from None
         loose = () if robot.tree is None else loose_base(robot.tree)
         if robot.contacts is not None:
             loose = robot.contacts.unactuated
@@ -113,7 +118,7 @@ class TracedRows:
         sources, windows = self.tracer.equations.sources, self.asked.windows
         if len(windows) == 1:
             return sources
-        return tuple(f"{source} {begin:.10g}..{end:.10g} s" for source in sources for begin, end in windows)
+        return tuple(f"{source} {begin:.15g}..{end:.15g} s" for source in sources for begin, end in windows)
 
     def places(self, velocity: Sequence[Place]) -> list[Place]:
         """Return the places of its rows; velocity: those of the torques by velocity.
@@ -162,7 +167,8 @@ class TracedRows:
         """
         time, (q, qd, qdd) = out[0], (out[rows[name].rows].T for name in ("q", "qd", "qdd"))
         given = self._given(rows, out, standing, time, q)
-        motion = SampledMotion(time, q, qd, qdd, given, sample_slopes(time, given))
+        steps = np.diff(time, append=time[-1])
+        motion = SampledMotion(time, steps, q, qd, qdd, given, sample_slopes(steps[:-1], given))
         samples = range(len(time))[block.with_next]
         part = motion.some(samples.start, samples.stop)
         try:

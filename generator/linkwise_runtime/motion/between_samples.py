@@ -15,6 +15,9 @@ class SampledMotion(NamedTuple):
 
     time: Numbers
     """Instants (T,), in s."""
+    steps: Numbers
+    """Time from each sample to the next, (T,), in s, which single precision would lose in the difference of
+    late instants; anything for the last one."""
     q: Numbers
     """(T, ..., n)"""
     qd: Numbers
@@ -31,7 +34,7 @@ class SampledMotion(NamedTuple):
     @property
     def lengths(self) -> Numbers:
         """Lengths of the steps, (T - 1,), in s."""
-        return self.time[1:] - self.time[:-1]
+        return self.steps[:-1]
 
     def within_steps(self, part: float) -> "SampledMotion":
         """Return motion and forces at a part of each step's length, T - 1 samples."""
@@ -40,13 +43,17 @@ class SampledMotion(NamedTuple):
         q, _ = cubic(part, own, self.q, self.qd)
         qd, qdd = cubic(part, own, self.qd, self.qdd)
         given, slopes = cubic(part, wide, self.given, self.slopes)
-        return SampledMotion(self.time[:-1] + part * self.lengths, q, qd, qdd, given, slopes)
+        time = self.time[:-1] + part * self.lengths
+        return SampledMotion(time, self.lengths, q, qd, qdd, given, slopes)
 
 
-def sample_slopes(time: Numbers, values: Numbers) -> Numbers:
-    """Return slopes (T, ...) of the parabolas through each sample and those beside it; of lines for two."""
+def sample_slopes(lengths: Numbers, values: Numbers) -> Numbers:
+    """Return slopes (T, ...) of the parabolas through each sample and those beside it; of lines for two.
+
+    lengths: time from each sample to the next, (T - 1,), in s
+    """
     xp = namespace(values)
-    h = (time[1:] - time[:-1]).reshape(-1, *[1] * (values.ndim - 1))
+    h = lengths.reshape(-1, *[1] * (values.ndim - 1))
     steep = (values[1:] - values[:-1]) / h
     if len(steep) == 1:
         return xp.concat([steep, steep], 0)

@@ -114,7 +114,8 @@ class DrivenAgain:
         if kind in (TORQUE, RESIDUAL, START):
             return 0.0 * q
         equations = self.read.equations
-        backend, sources = equations.backend, equations.sources
+        backend = equations.at_instants(equations.backend.weights("time", [t], q), q)
+        sources = equations.sources
         vectors = [0.0 * q[..., :1] + self._at(t, vector) for vector in self.read.vectors]
         pulls = [-pull for pull in self.read.loads.torques(backend, q, vectors)]
         loads = namespace(q).stack(pulls, -1) if pulls else q[..., None][..., :0]
@@ -142,7 +143,8 @@ class DrivenAgain:
         k = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2))
         near = slice(max(0, k - 1), k + 3)
         length = times[k + 1] - times[k]
-        slopes = sample_slopes(self.read.samples.time[near], values[near])
+        lengths = self.read.samples.steps[near.start : near.start + len(values[near]) - 1]
+        slopes = sample_slopes(lengths, values[near])
         own = slice(k - near.start, k - near.start + 2)
         steps = self.read.samples.lengths[k : k + 1].reshape(-1, *[1] * (values.ndim - 1))
         return cubic((t - times[k]) / length, steps, values[near][own], slopes[own])[0][0]

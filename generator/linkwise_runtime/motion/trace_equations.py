@@ -24,7 +24,7 @@ from ..interface import Numbers, namespace
 from .between_samples import SampledMotion
 from .collocation import LinearEquations
 
-TORQUE, LOAD, RESIDUAL, START = "torque", "load", "residual", "start"
+TORQUE, SHARE, LOAD, RESIDUAL, START = "torque", "share", "load", "residual", "start"
 """Kinds of sources, which the names of sources begin with."""
 BETWEEN = ":"
 """Sign between the kind of a source and the name of its joint, link or load."""
@@ -80,9 +80,11 @@ class TraceEquations:
         """Names of the sources, in the order of the columns; the last one is the motion at the start."""
         structure = self.backend.structure
         joints = structure.joint_names if self.torques_given else self.coordinates
+        # Of links that were written by hand a share may be called anything, such as start.
+        named = [f"{SHARE}{BETWEEN}{name}" if structure.shares else name for name in structure.share_names]
         shares = [
             f"{share}{BETWEEN}{link}" if self.by_link else share
-            for share in (() if self.is_borne and not self.loose else structure.share_names)
+            for share in (() if self.is_borne and not self.loose else named)
             for link in (structure.link_names if self.by_link else ("",))
         ]
         own = [
@@ -116,7 +118,7 @@ class TraceEquations:
         is_sample: whether they are samples of a log, where constraints have to hold; between these, dependent
         joints are closed first
         """
-        backend = self._at(motion)
+        backend = self.at_instants(motion.time, motion.q)
         q, qd, qdd = motion.q, motion.qd, motion.qdd
         place = None if self.constraints is None else self._place(backend, q, is_sample)
         if place is not None:
@@ -141,14 +143,14 @@ class TraceEquations:
         columns = self._with_actuators(backend, place, needed, forces, tau)
         return TraceAt(qd, LinearEquations(mass, coriolis, columns), place)
 
-    def _at(self, motion: SampledMotion) -> ArrayBackend:
-        """Return the back end at these instants, where the robot depends on time or inputs."""
+    def at_instants(self, time: Numbers, q: Numbers) -> ArrayBackend:
+        """Return the back end at instants (T,) beside q (T, ..., n), for what depends on time or inputs."""
         if self.backend_at is not None:
-            return self.backend_at(motion.time)
+            return self.backend_at(time)
         if not self.backend.structure.time:
             return self.backend
         backend = self.backend.separate()
-        times = motion.time.reshape(-1, *[1] * (motion.q.ndim - 2))
+        times = time.reshape(-1, *[1] * (q.ndim - 2))
         backend.set_parameters({self.backend.structure.time: times})
         return backend
 

@@ -6,12 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import as_array, check_numbers, rising_instants
+from ..arguments import as_array, check_numbers, rising_instants, shape_of
 from ..arrays.backend import ArrayBackend
 from ..chosen_names import short
 from ..constraints.independent_joints import loose_base
 from ..interface import Numbers, namespace
 from ..motion_quantities import TracedMotion
+from ..structure import Structure
 from .between_samples import SampledMotion, sample_slopes
 from .induced_accelerations import DrivenRobot, constraints_of
 from .source_forces import AppliedLoads, loads_of
@@ -62,7 +63,8 @@ def read_trace(robot: DrivenRobot, asked: Traced) -> ReadTrace:
     motion = dict(zip(named, numbers[: len(named)], strict=True))
     check_numbers(motion, robot.joint_names)
     times = _instants(asked.time, motion["q"])
-    _check_traceable(backend, motion["q"])
+    check_traceable(backend.structure)
+    _check_parameters(backend, motion["q"])
     names = tuple(f"{LOAD}{BETWEEN}{name}" for name in loads.names(backend))
     loose = () if backend.tree is None else loose_base(backend.tree)
     equations = TraceEquations(
@@ -76,6 +78,7 @@ def read_trace(robot: DrivenRobot, asked: Traced) -> ReadTrace:
         loose,
     )
     vectors = numbers[len(named) :]
+    _check_loads(loads, motion["q"])
     return ReadTrace(times, _sampled(backend, loads, times, motion, vectors), equations, loads, vectors)
 
 
@@ -99,12 +102,12 @@ def _sampled(
     """Return the motion with the forces that are given: of actuators, where they are, then of loads."""
     q, qd, qdd, *tau = motion.values()
     columns = [*tau, *(-torque for torque in loads.torques(backend, q, vectors))]
-    time = backend.weights("time", times, q)
+    time, steps = (backend.weights("time", a, q) for a in (times, np.diff(times, append=times[-1])))
     if not columns:
         nothing = backend.zeros(q, 0)[..., None, :] + 0.0 * q[..., None]
-        return SampledMotion(time, q, qd, qdd, nothing, nothing)
+        return SampledMotion(time, steps, q, qd, qdd, nothing, nothing)
     given = namespace(q).stack(columns, -1)
-    return SampledMotion(time, q, qd, qdd, given, sample_slopes(time, given))
+    return SampledMotion(time, steps, q, qd, qdd, given, sample_slopes(steps[:-1], given))
 
 
 def _instants(time: object, q: Numbers) -> list[float]:
@@ -140,15 +143,29 @@ def _borne(asked: Traced, backend: ArrayBackend) -> bool:
     return asked.weight == "borne"
 
 
-def _check_traceable(backend: ArrayBackend, q: Numbers) -> None:
-    """Raise ValueError for a robot whose motion has no such parts, or has parameters for each instant."""
-    structure = backend.structure
+def _check_loads(loads: AppliedLoads, q: Numbers) -> None:
+    """Raise ValueError for vectors (T, 3) beside many motions, whose axis is then not that of time."""
+    for name, vector in loads.beside.items():
+        samples = shape_of(vector.value)[:-1]
+        if 0 < len(samples) < q.ndim - 1:
+            raise ValueError(
+                f"{name} has shape {shape_of(vector.value)}, beside motion (T, ..., n) of shape "
+                f"{tuple(q.shape)}; give as many axes, of length 1 where all motions share it"
+            )
+
+
+def check_traceable(structure: Structure) -> None:
+    """Raise ValueError for a robot whose motions have no such parts."""
     for link, degree in zip(structure.link_names, structure.degrees, strict=False):
         if degree > 2:
             raise ValueError(
-                f"the kinetic energy of {link} has velocities of degree {degree}: forces then give no parts "
-                "of a velocity that sum up"
+                f"the kinetic energy of {link} has velocities of degree {degree}, so that the mass matrix "
+                "depends on them, and no part of a velocity has an energy of its own"
             )
+
+
+def _check_parameters(backend: ArrayBackend, q: Numbers) -> None:
+    """Raise ValueError for a robot that has parameters for each instant."""
     if len(backend.samples) >= q.ndim - 1:
         raise ValueError(
             f"parameters have samples of shape {backend.samples}, beside motion (T, ..., n) of shape "
@@ -182,6 +199,8 @@ def _window_begins(name: str, windows: object, times: Sequence[float]) -> object
     if isinstance(windows, bool) or not isinstance(windows, Real):
         return windows
     length = float(windows)
+    if not np.isfinite(length):
+        raise ValueError(f"{name} is {short(windows)} s; give a length in s")
     if not length >= min(np.diff(times)):
         raise ValueError(
             f"{name} is {short(windows)} s; give a length of at least a step between samples, "

@@ -1,6 +1,7 @@
 """Steps of a trace, block by block: from one sample to the next, and what is told at each."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -76,7 +77,11 @@ class Tracer:
         parts = []
         for begin, end in pairwise([first, *ends]):
             known = None if begin in restarts else state
-            part, state = self._part(motion.some(begin - first, end - first + 1), begin, known)
+            some = motion.some(begin - first, end - first + 1)
+            try:
+                part, state = self._part(some, begin, known)
+            except ValueError as error:
+                raise ValueError(_timed(str(error), some.time)) from error
             # Its last sample is the first of the next part, which may begin anew there.
             parts.append(part if end == last else part.without_last())
         xp = namespace(motion.q)
@@ -132,3 +137,12 @@ class Tracer:
         power = (wide * w * equations.forces[:, None]).sum(-2)
         velocity, energy, power, work = (xp.moveaxis(a, 1, -1) for a in (velocity, energy, power, work))
         return TraceBlock(motion.time, velocity, energy, power, work, equations.coriolis)
+
+
+def _timed(text: str, time: Numbers) -> str:
+    """Return the text of an error with an instant next to it in place of a sample's number among some."""
+    found = re.search(r" at sample (\d+)", text)
+    if found is None:
+        return text
+    instant = float(time[min(int(found[1]), len(time) - 1)])
+    return text.replace(found[0], f" next to {instant:.6g} s", 1)

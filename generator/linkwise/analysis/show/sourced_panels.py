@@ -20,7 +20,7 @@ from linkwise.analysis.show.drawn_curves import (
     zero_line,
 )
 from linkwise.arrays import Array, Index
-from linkwise.plotstyle import BROWN, COLOURS, GRAVITY, INK, colour, dash, drawn
+from linkwise.plotstyle import BROWN, COLOURS, DASHES, GRAVITY, INK, colour, dash, drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,7 +62,8 @@ class SourceCurve:
             case "others":
                 return {"color": BROWN, "linewidth": 1.0}
             case "load":
-                return {"color": colour(joints + self.number), "linewidth": 1.4, "linestyle": "dashdot"}
+                again = dash((self.window + DASHES.index("dashdot")) * len(COLOURS))
+                return {"color": colour(joints + self.number), "linewidth": 1.4, "linestyle": again}
             case "named" if self.number:  # the first is grey
                 shade = colour(joints + loads + self.number - 1)
                 return {"color": shade, "linewidth": 1.4, "linestyle": "solid"}

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD, START, TORQUE
+from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD, SHARE, START, TORQUE
 
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_rows import OVER_TIME
@@ -42,15 +42,21 @@ def _sources(
     result: AnalysisResult, joint: int, quantities: list[tuple[str, dict[str, Any]]]
 ) -> list[SourceCurve]:
     """Return the sum, and the sources with the largest mean magnitudes."""
-    origins = result.rows.axes["origin"].names
+    assert result.traced is not None
+    windows, count = result.traced["windows"], len(result.rows.axes["origin"].names)
 
     def rows(*which: int) -> tuple[Index, ...]:
         return tuple(result.rows.numbers(name, **at, origin=list(which)) for name, at in quantities)
 
     wholes = {"tau_from": "tau_qd", "qd_from": "qd"}
     whole = tuple(result.rows.numbers(wholes[name], joint=joint) for name, _ in quantities)
-    windows = len(result.traced["windows"]) if result.traced else 1
-    every = [replace(_named(result, name, rows(o)), window=o % windows) for o, name in enumerate(origins)]
+    every = []
+    for o in range(count):
+        source, w = divmod(o, len(windows))
+        begin, end = windows[w]
+        when = f" {begin:.6g}..{end:.6g} s" if len(windows) > 1 else ""
+        named = _named(result, result.traced["sources"][source], rows(o))
+        every.append(replace(named, label=named.label + when, window=w))
     alone, rest = largest_alone(result, every, MOST)
     found = [SourceCurve("sum", "all together", 0, whole), *(every[o] for o in alone)]
     if rest:
@@ -58,23 +64,22 @@ def _sources(
     return found
 
 
-def _named(result: AnalysisResult, origin: str, rows: tuple[Index, ...]) -> SourceCurve:
+def _named(result: AnalysisResult, source: str, rows: tuple[Index, ...]) -> SourceCurve:
     """Return the curve of a source, named in words."""
     robot = result.robot
-    kind, _, rest = origin.partition(BETWEEN)
-    named = [joint for joint in robot.joints if rest == joint or rest.startswith(f"{joint} ")]
-    joint = max(named, key=len, default="")
-    shown = robot.plot_joints[robot.joints.index(joint)] + rest[len(joint) :] if joint else rest
-    if kind == TORQUE:
-        return SourceCurve("joint", f"torque of {shown}", robot.driven.index(robot.joints.index(joint)), rows)
-    if kind in PASSIVE:
-        return SourceCurve("passive", f"{kind} of {shown}", 0, rows)
+    kind, _, rest = source.partition(BETWEEN)
+    if kind in (TORQUE, *PASSIVE) and rest in robot.joints:
+        joint = robot.joints.index(rest)
+        label = f"{kind} of {robot.plot_joints[joint]}"
+        if kind == TORQUE:
+            return SourceCurve("joint", label, robot.driven.index(joint), rows)
+        return SourceCurve("passive", label, 0, rows)
     if kind == LOAD:
-        number = next(e for e, load in enumerate(result.loads) if rest.startswith(load.name))
-        return SourceCurve("load", f"load {rest}", number, rows)
+        number = [load.name for load in result.loads].index(rest)
+        return SourceCurve("load", result.load_labels[number], number, rows)
     if kind == CONTACT:
         return SourceCurve("contact", f"ground at {rest}", 0, rows)
-    if origin.startswith(START):
-        return SourceCurve("start", origin.replace(START, "motion at the start", 1), 0, rows)
-    shares = [m for m, name in enumerate(robot.share_names) if origin.startswith(name)]
-    return SourceCurve("named", origin, max(shares, default=0), rows)
+    if source == START:
+        return SourceCurve("start", "motion at the start", 0, rows)
+    name = rest if kind == SHARE else source
+    return SourceCurve("named", name, list(robot.share_names).index(name), rows)
