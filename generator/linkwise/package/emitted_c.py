@@ -53,7 +53,7 @@ OF_LINK = re.compile(r"links?_\d+(?:_\w+)?|at_p_\w+")
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include\b[ \t]*([<"]?)([^>"\n]*)[>"]?', re.MULTILINE)
 HEADERS = frozenset(("float.h", "math.h", "stddef.h"))
 ARGUMENTS = "INPUTS|PASSED|PASSED_ROW|AT_REST|PASSED_AT_REST|RESULTS|RESULTS_ROW|AT_POSITION|UNDER_TORQUE"
-MARKS = r"LINKWISE_\w+|WANT_\w+|CURVED|PASSIVE"
+MARKS = r"LINKWISE_\w+|WANT_\w+|CURVED|PASSIVE|TIED"
 STRUCTURES = "|".join(
     rf"{macro}\({x}\) const struct {what} (?:{made} = {what}_of\(p\), )?\*const {x} = &(?:{made}|own_{what})"
     for macro, x, what, made in (("NUMBERS", "x", "numbers", "of_p"), ("OFFSETS", "o", "offsets", "o_of_p"))
