@@ -78,6 +78,7 @@ class MovementSums:
         self._power = rows.numbers(*POWER_OF.values(), *WORK_BY_SOURCE)
         self._energy = np.zeros((1 + len(phases), 2, len(self._power)))
         self._last: tuple[Array, Array] | None = None
+        self._steps = np.zeros(1 + len(phases))
 
     def add(self, block: Array, closure: Closure) -> bool:
         """Add a block (rows, samples) and its errors; return whether all of its values are finite."""
@@ -95,6 +96,7 @@ class MovementSums:
         if self._last is not None:  # the step from the last block to this one
             parts, on = (np.concatenate(two, axis=-1) for two in zip(self._last, (parts, on), strict=True))
         steps = on[:, 1:] * on[:, :-1]
+        self._steps += steps.sum(axis=1)
         self._energy += 0.5 * np.einsum("wps,fs->fwp", parts[..., 1:] + parts[..., :-1], steps)
         self._last = parts[..., -1:].copy(), on[:, -1:].copy()
         return True
@@ -107,7 +109,16 @@ class MovementSums:
             yield phase.on(self._robot, block[0], q, contacts).astype(float)
 
     def movement(self, step: float) -> WholeMovement:
-        """Return what the whole movement comes to; samples are `step` s apart."""
+        """Return what the whole movement comes to; samples are `step` s apart.
+
+        Raises LinkwiseError for a phase that is over before any work is, where its work is told.
+        """
+        told = any(name in self._rows for name in WORK_BY_SOURCE)
+        for phase, steps in zip(self._phases, self._steps[1:].tolist(), strict=True):
+            if told and not steps:
+                raise LinkwiseError(
+                    f"--phase {phase.name}: no two samples follow each other in it, so that it has no work"
+                )
         energy = np.zeros((1 + len(self._phases), 2, len(self._rows), 1))
         energy[:, :, self._power, 0] = step * self._energy
         kept = [*POWER_OF.values(), *(name for name in WORK_BY_SOURCE if name in self._rows)]

@@ -210,7 +210,7 @@ def _times(tool: Element, analysis: Element) -> dict[str, float]:
 def _filter(tool: Element) -> dict[str, float | int]:
     """Return the options of the filter; OpenSim filters coordinates, and not states."""
     (cutoff,) = numbers_of(tool, "lowpass_cutoff_frequency_for_coordinates", "-1", f"<{TOOL}>", 1)
-    is_filtered = cutoff > 0 and not _told(tool, "states_file")
+    is_filtered = not cutoff <= 0.0 and not _told(tool, "states_file")
     return {"cutoff": cutoff, "filter_order": ORDER} if is_filtered else {}
 
 
@@ -241,7 +241,7 @@ def _points(analysis: Element, model: Element) -> list[str]:
         elif name != "ground":
             at = numbers_of(bodies[name], "mass_center", "0 0 0", f"body {name!r}", 3)
             points.append(f"{name},{','.join(map(repr, at))}" if any(at) else name)
-    return points
+    return points if CENTRE in points else [*points, CENTRE]  # of which OpenSim always writes a file
 
 
 def _listed(analysis: Element, tag: str, usual: str, there: list[str]) -> list[str]:

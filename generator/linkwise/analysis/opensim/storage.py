@@ -17,12 +17,15 @@ from linkwise.analysis.result_quantities import LOSSES
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.settings import Units
 from linkwise.arrays import Array
+from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names
 from linkwise.extras import extra
 
 CENTRE = "center_of_mass"
 """Name that OpenSim gives to the centre of mass."""
 TOTAL, GRAVITY, VELOCITY = "total", "gravity", "velocity"
+SUMMED = ("acc", "acc_gravity", "acc_weight")
+"""Quantities that have one column each, whatever link or joint they are of."""
 OF_VELOCITY = ("acc_velocity", "acc_qd", "acc_kinematic", "acc_constraint")
 ENDS = {
     "x": "_X",
@@ -104,10 +107,18 @@ def _of_point(point: InducedPoint, sources: Mapping[str, dict[str, list[int]]]) 
 def _sources(rows: ResultRows, point: int, component: str) -> dict[str, list[int]]:
     """Return the rows of each source of a component's acceleration, in OpenSim's order."""
     found: dict[str, list[int]] = {TOTAL: []}
+    owners: dict[str, tuple[object, ...]] = {}
     own = rows.axes["component"].names.index(component)
     for row, (quantity, at) in enumerate(rows.places):
         if quantity.startswith("acc") and at[:2] == (point, own):
-            found.setdefault(_source(rows, quantity, at[2:]), []).append(row)
+            name = _source(rows, quantity, at[2:])
+            owner = (name,) if quantity in (*SUMMED, *OF_VELOCITY) else (quantity, *at[2:])
+            if owners.setdefault(name, owner) != owner:
+                raise LinkwiseError(
+                    f"--induced-sto: two sources of accelerations would be called {name!r} there; name the"
+                    " joint, load or contact otherwise"
+                )
+            found.setdefault(name, []).append(row)
     last = [source for source in (GRAVITY, VELOCITY) if source in found]
     contacts = [source for source in found if source.startswith("contact_")]
     first = [source for source in found if source not in (*last, *contacts)]
