@@ -122,8 +122,8 @@ def test_nothing_flows_from_the_ground_into_a_base_whose_feet_slip(tmp_path: Pat
     assert np.abs(slip).max() > 0.1 * np.abs(gain).max()
     assert np.abs(found["flow_before/pelvis_tx"]).max() <= 1e-11 * np.abs(gain).max()
     # What a torque gives all links is its own power: slip has columns of its own.
-    for i, joint in enumerate(found.robot.joints):
-        given = sum(found[f"gain_tau/{name}/{joint}"] for name in found.robot.links)
+    for i, driven in enumerate(found.robot.joints):
+        given = sum(found[f"gain_tau/{name}/{driven}"] for name in found.robot.links)
         assert np.abs(given - found.torque[:, i] * found.qd[:, i]).max() <= 1e-11 * np.abs(gain).max()
     every = [c.name for c in found.columns if c.quantity.startswith("flow_") and "/ankle_angle_r/" in c.name]
     assert relative_error(sum(found[name] for name in every), found["flow/ankle_angle_r"]) <= 1e-11
