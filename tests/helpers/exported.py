@@ -19,6 +19,8 @@ MASK = torch.tensor([[1.0], [0.0], [1.0]])
 FIXED: dict[str, Callable[[Any], dict[str, Any]]] = {
     "masked": lambda robot: {"mask": MASK.expand(3, robot.n)},
     "simulate": lambda robot: {"time": [0.0, 0.01], "tau": None},
+    "trace": lambda robot: {"time": [0.0, 0.01, 0.02], "tau": None},
+    "counterfactual": lambda robot: {"time": [0.0, 0.01, 0.02], "without": "gravity", "tau": None},
     "kinematics.load_torque": lambda robot: {"frame": robot.N - 1, "force": FORCE},
 }
 """Arguments of calls besides positions, velocities, accelerations and torques."""
@@ -41,7 +43,7 @@ def motion(robot: Any, count: int, samples: int, seed: int = 0) -> tuple[Any, ..
 
 def results(answer: Any) -> list[Any]:
     """Tensors of an answer, one or several by name."""
-    return [answer] if torch.is_tensor(answer) else list(answer.values())
+    return [answer] if torch.is_tensor(answer) else [a for a in answer.values() if torch.is_tensor(a)]
 
 
 def error(found: Any, expected: Any) -> float:

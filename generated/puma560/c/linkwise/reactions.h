@@ -14,10 +14,10 @@ enum { WRENCH = 6 };
 /* Rows, a block at a time; for any qdd, as nothing depends on it. Links wait until there is no room for the next one. */
 static void reactions_of_rows(size_t count, INPUTS, real *acceleration, real *velocity, real *gravity)
 {
-    enum { ROOM = WRENCH * LONGEST * (BLOCK > 1 ? 2 : 1) };
+    enum { WAITING_ROOM = WRENCH * LONGEST * (BLOCK > 1 ? 2 : 1) };
     NUMBERS(x);
     ALIGNED motion m[BLOCK_PARTS];
-    ALIGNED real c2[ROOM * BLOCK], c1[ROOM * BLOCK], g[LINKS * WRENCH * BLOCK];
+    ALIGNED real c2[WAITING_ROOM * BLOCK], c1[WAITING_ROOM * BLOCK], g[LINKS * WRENCH * BLOCK];
     const size_t row = (size_t)G * WRENCH, weights = (size_t)LINKS * WRENCH;
     for (size_t s = 0; s < count; s += BLOCK) {
         const size_t samples = count - s < BLOCK ? count - s : BLOCK;
@@ -29,7 +29,7 @@ static void reactions_of_rows(size_t count, INPUTS, real *acceleration, real *ve
                 SIZED(link_wrenches)(x, &m[part], j, c2 + at + part * LANES, c1 + at + part * LANES,
                     g + j * WRENCH * BLOCK + part * LANES);
             waiting += (size_t)((path_start[j + 1] - path_start[j]) * WRENCH);
-            if (j + 1 < LINKS && waiting + (size_t)((path_start[j + 2] - path_start[j + 1]) * WRENCH) <= ROOM)
+            if (j + 1 < LINKS && waiting + (size_t)((path_start[j + 2] - path_start[j + 1]) * WRENCH) <= WAITING_ROOM)
                 continue;
             scatter(samples, waiting, row, c2, acceleration + s * row + first);
             scatter(samples, waiting, row, c1, velocity + s * row + first);
