@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..chosen_names import choice, short
+from ..constraints.closed_places import times
 from ..interface import Numbers, namespace
 from ..motion_quantities import Counterfactual
 from ..quantities import AppliedLoad
@@ -95,9 +96,9 @@ class DrivenAgain:
         forces = equations.at(read.samples, True).equations.forces
         if equations.torques_given:
             given = read.samples.given[..., 0]
-            left = _times(unit, forces[..., equations.sources.index(RESIDUAL)])
+            left = times(unit, forces[..., equations.sources.index(RESIDUAL)])
         else:
-            given, left = _times(unit, forces[..., : len(own)].sum(-1)), 0.0 * q
+            given, left = times(unit, forces[..., : len(own)].sum(-1)), 0.0 * q
         kind, _, joint = source.partition(BETWEEN)
         there = [float(kind == TORQUE and joint == name) for name in equations.backend.structure.joint_names]
         part = given * equations.backend.constant(there, q) + left * float(source == RESIDUAL)
@@ -139,16 +140,12 @@ class DrivenAgain:
 
     def _at(self, t: float, values: Numbers) -> Numbers:
         """Return what values of the samples, (T, ...), are at an instant, (...)."""
-        times = self.read.times
-        k = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2))
+        instants = self.read.times
+        k = int(np.clip(np.searchsorted(instants, t, side="right") - 1, 0, len(instants) - 2))
         near = slice(max(0, k - 1), k + 3)
-        length = times[k + 1] - times[k]
+        length = instants[k + 1] - instants[k]
         lengths = self.read.samples.steps[near.start : near.start + len(values[near]) - 1]
         slopes = sample_slopes(lengths, values[near])
         own = slice(k - near.start, k - near.start + 2)
         steps = self.read.samples.lengths[k : k + 1].reshape(-1, *[1] * (values.ndim - 1))
-        return cubic((t - times[k]) / length, steps, values[near][own], slopes[own])[0][0]
-
-
-def _times(matrix: Numbers, vector: Numbers) -> Numbers:
-    return (matrix @ vector[..., None])[..., 0]
+        return cubic((t - instants[k]) / length, steps, values[near][own], slopes[own])[0][0]

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays.backend import ArrayBackend
-from ..constraints.closed_places import ClosedPlace
+from ..constraints.closed_places import ClosedPlace, times
 from ..constraints.robot_constraints import Constraints
 from ..interface import Numbers, namespace
 from .between_samples import SampledMotion
@@ -131,12 +131,12 @@ class TraceEquations:
             mass = mass + backend.constant(np.diag(backend.structure.passive_sums.armature), q)
         given = motion.given[..., 1:] if self.torques_given else motion.given
         forces = self.forces(backend, q, qd, g, given)
-        needed = _times(mass, qdd) + _times(coriolis, qd) - forces.sum(-1)
+        needed = times(mass, qdd) + times(coriolis, qd) - forces.sum(-1)
         if place is not None:
             found, rate = place.found.map, place.map_rate(qd)
             coriolis = found.mT @ (mass @ rate + coriolis @ found)
             mass, forces = found.mT @ mass @ found, found.mT @ forces
-            needed = _times(found.mT, needed)
+            needed = times(found.mT, needed)
         tau = motion.given[..., 0] if self.torques_given else None
         if tau is not None and self.is_borne:
             tau = tau - g.sum(-1) * (1.0 - self._loose(backend, q))
@@ -150,8 +150,8 @@ class TraceEquations:
         if not self.backend.structure.time:
             return self.backend
         backend = self.backend.separate()
-        times = time.reshape(-1, *[1] * (q.ndim - 2))
-        backend.set_parameters({self.backend.structure.time: times})
+        instants = time.reshape(-1, *[1] * (q.ndim - 2))
+        backend.set_parameters({self.backend.structure.time: instants})
         return backend
 
     def _place(self, backend: ArrayBackend, q: Numbers, is_sample: bool) -> ClosedPlace:
@@ -206,7 +206,3 @@ class TraceEquations:
             own = place.found.map.mT @ own
         left = needed - own.sum(-1)
         return xp.concat([own, forces, left[..., None], start], -1)
-
-
-def _times(matrix: Numbers, vector: Numbers) -> Numbers:
-    return (matrix @ vector[..., None])[..., 0]
