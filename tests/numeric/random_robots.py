@@ -39,7 +39,8 @@ def largest_error(robot: RobotData, folder: Path) -> float:
     """
     path = folder / f"robot.{robot.form}"
     path.write_text(robot.text, encoding="utf-8")
-    write_package(generate(read_system(path, REDUNDANT), ["numpy"], "robot"), folder / "robot")
+    package = generate(read_system(path, REDUNDANT), ["numpy"], "robot", kernel="straight")
+    write_package(package, folder / "robot")
     package = import_package(folder / "robot")
     oracle = RandomOracle(robot, package.joint_names)
     states = q, qd, qdd = random_states(len(package.joint_names), STATES)
