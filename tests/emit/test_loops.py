@@ -175,6 +175,36 @@ def test_large_blocks_go_past_the_cache_where_lines_are_whole(
 
 
 @needs_compiler
+@pytest.mark.parametrize("behind", [0, 16], ids=["on a line", "off a line"])
+def test_reactions_of_many_rows_go_past_the_cache(
+    behind: int, directory_of: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """The numbers are those of few rows at a time, the last ones' too, which do not fill a block."""
+    compiler = ("gcc", "-std=c99", "-O1", "-mavx", "-DLARGE=(size_t)16384", *counting(tmp_path, 32))
+    compile_library(directory_of("puma560 loops"), tmp_path / "library.so", compiler)
+    library = ctypes.CDLL(str(tmp_path / "library.so"))
+    sizes, few, many = (126, 126, 36), 6, 12 * 8 + 3
+    motion = random_states(6, many)[:2]
+
+    def borne(first: int, count: int) -> list[np.ndarray]:
+        results = [aligned(count * size, np.float64, behind).reshape(count, size) for size in sizes]
+        given = [rows[first : first + count].copy() for rows in motion]
+        arrays = [ctypes.c_void_p(a.ctypes.data) for a in (*given, *results)]
+        library.puma560_reactions(ctypes.c_size_t(count), *arrays)
+        return results
+
+    pieces = [borne(first, min(few, many - first)) for first in range(0, many, few)]
+    streamed, unfenced = (ctypes.c_long.in_dll(library, name) for name in ("streamed", "unfenced"))
+    assert streamed.value == 0
+    results = borne(0, many)
+    torn = 64 if behind else 0  # bytes of the first and the last line of each block of each array
+    assert streamed.value == (many // 8) * (8 * 8 * sum(sizes) - 3 * torn)
+    assert unfenced.value == 0
+    for field, whole in enumerate(results):
+        assert (whole == np.concatenate([piece[field] for piece in pieces])).all()
+
+
+@needs_compiler
 def test_its_code_does_not_grow_with_the_robot(directory_of: Callable[[str], Path], tmp_path: Path) -> None:
     def instructions(robot: str) -> int:
         source, made = directory_of(f"{robot} loops") / "c" / f"{robot}.c", tmp_path / "robot.o"

@@ -340,17 +340,10 @@ void API(decomposition)(size_t count, const real *q, const real *qd, const real 
         links_1_to_6(blocks, m, r);
         for (size_t t = 0; t < blocks; ++t) {
             const size_t at = s + t * BLOCK, samples = samples_of(count - s, t);
-            if (large && samples == BLOCK) {
-                stream_rows(C2, r[t].c2, c2 + at * C2, scratch);
-                stream_rows(C1, r[t].c1, c1 + at * C1, scratch);
-                stream_rows(G, r[t].g, g + at * G, scratch);
-                stream_rows(G, r[t].tau, tau + at * G, scratch);
-                continue;
-            }
-            scatter(samples, 56, C2, r[t].c2, c2 + at * C2);
-            scatter(samples, 91, C1, r[t].c1, c1 + at * C1);
-            scatter(samples, 21, G, r[t].g, g + at * G);
-            scatter(samples, 21, G, r[t].tau, tau + at * G);
+            put_rows(samples, C2, large, r[t].c2, c2 + at * C2, scratch);
+            put_rows(samples, C1, large, r[t].c1, c1 + at * C1, scratch);
+            put_rows(samples, G, large, r[t].g, g + at * G, scratch);
+            put_rows(samples, G, large, r[t].tau, tau + at * G, scratch);
         }
     }
     if (large)

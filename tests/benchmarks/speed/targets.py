@@ -53,7 +53,7 @@ def in_c(results: Results) -> Iterator[Target]:
     packed, borne = (
         results.find("panda", "C", "float64", "rows", call=call) for call in ("packed", "reactions")
     )
-    for batch in (1, 1024):
+    for batch in sorted({1, 1024, *borne}):
         yield Target(
             f"Panda, reactions / decomposition, batch {batch:,}",
             ratio(borne.get(batch), packed.get(batch)),

@@ -49,10 +49,7 @@ static inline void to_cubes(int first, int last, int half, const real *c, const 
 {
     if (last - first == LINKS && WHOLE) {
         place_block(first, last, half, c, by, LINKS, 0, wait->block);
-        if (wait->large && samples == BLOCK)
-            stream_rows(CUBE, wait->block, cubes, wait->rows);
-        else
-            scatter(samples, CUBE, CUBE, wait->block, cubes);
+        put_rows(samples, CUBE, wait->large, wait->block, cubes, wait->rows);
         return;
     }
     if (BY_ITSELF) {

@@ -6,19 +6,29 @@
    about the origin p of the joint that moves the link. About that of a joint before it, at p', it is N + (p - p') x f. */
 
 #include "blocks.h"
+#include "stream.h"
 
 enum { WRENCH = 6 };
 
 #include "link_wrenches.h"
 
-/* Rows, a block at a time; for any qdd, as nothing depends on it. Links wait until there is no room for the next one. */
+/* Results that wait in a block: a whole row where it is short, which may then go past the cache, or as many links as there is
+   room for. */
+enum {
+    ROW = G * WRENCH,
+    WEIGHTS = LINKS * WRENCH,
+    WHOLE_ROW = BLOCK > 1 && ROW <= 512,
+    WAITING_ROOM = WHOLE_ROW ? ROW : WRENCH * LONGEST * (BLOCK > 1 ? 2 : 1)
+};
+
+/* Rows, a block at a time; for any qdd, as nothing depends on it. */
 static void reactions_of_rows(size_t count, INPUTS, real *acceleration, real *velocity, real *gravity)
 {
-    enum { WAITING_ROOM = WRENCH * LONGEST * (BLOCK > 1 ? 2 : 1) };
     NUMBERS(x);
     ALIGNED motion m[BLOCK_PARTS];
-    ALIGNED real c2[WAITING_ROOM * BLOCK], c1[WAITING_ROOM * BLOCK], g[LINKS * WRENCH * BLOCK];
-    const size_t row = (size_t)G * WRENCH, weights = (size_t)LINKS * WRENCH;
+    ALIGNED real c2[WAITING_ROOM * BLOCK], c1[WAITING_ROOM * BLOCK], g[WEIGHTS * BLOCK];
+    ALIGNED real scratch[WHOLE_ROW ? (ROW > WEIGHTS ? ROW : WEIGHTS) * BLOCK : 1];
+    const int large = WHOLE_ROW && count > LARGE / ((2 * ROW + WEIGHTS) * sizeof(real));
     for (size_t s = 0; s < count; s += BLOCK) {
         const size_t samples = count - s < BLOCK ? count - s : BLOCK;
         size_t first = 0, waiting = 0;
@@ -29,15 +39,23 @@ static void reactions_of_rows(size_t count, INPUTS, real *acceleration, real *ve
                 SIZED(link_wrenches)(x, &m[part], j, c2 + at + part * LANES, c1 + at + part * LANES,
                     g + j * WRENCH * BLOCK + part * LANES);
             waiting += (size_t)((path_start[j + 1] - path_start[j]) * WRENCH);
+            if (WHOLE_ROW)
+                continue;
             if (j + 1 < LINKS && waiting + (size_t)((path_start[j + 2] - path_start[j + 1]) * WRENCH) <= WAITING_ROOM)
                 continue;
-            scatter(samples, waiting, row, c2, acceleration + s * row + first);
-            scatter(samples, waiting, row, c1, velocity + s * row + first);
+            scatter(samples, waiting, ROW, c2, acceleration + s * ROW + first);
+            scatter(samples, waiting, ROW, c1, velocity + s * ROW + first);
             first += waiting;
             waiting = 0;
         }
-        scatter(samples, weights, weights, g, gravity + s * weights);
+        if (WHOLE_ROW) {
+            put_rows(samples, ROW, large, c2, acceleration + s * ROW, scratch);
+            put_rows(samples, ROW, large, c1, velocity + s * ROW, scratch);
+        }
+        put_rows(samples, WEIGHTS, large, g, gravity + s * WEIGHTS, scratch);
     }
+    if (large)
+        stream_end();
 }
 
 #ifndef LINKWISE_SMALL

@@ -1,5 +1,8 @@
 /* Results that no cache holds go past it: memory is then written without being read first. The same in every package
    of linkwise. It needs rows.h. */
+#ifndef LINKWISE_STREAM_H
+#define LINKWISE_STREAM_H
+
 #include "arrays.h"
 
 /* Above this many bytes, results are better not kept in the cache: where they are read back at once, writing and reading
@@ -53,9 +56,14 @@ static void stream(size_t count, const real *from, real *to)
 #endif
 }
 
-/* A whole block to consecutive rows, put together in the cache and then written at one go. */
-static inline void stream_rows(size_t entries, const real *block, real *rows, real *scratch)
+/* A block to consecutive rows; where they are `large` and the block is full, put together in the cache and then written at
+   one go. */
+static inline void put_rows(size_t samples, size_t entries, int large, const real *block, real *rows, real *scratch)
 {
+    if (!large || samples != BLOCK) {
+        scatter(samples, entries, entries, block, rows);
+        return;
+    }
     scatter(BLOCK, entries, entries, block, scratch);
     stream(entries * BLOCK, scratch, rows);
 }
@@ -68,3 +76,5 @@ static inline void stream_end(void)
     STREAM_END();
 #endif
 }
+
+#endif

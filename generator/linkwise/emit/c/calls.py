@@ -35,7 +35,7 @@ class Moves:
     """Calls that take values of some links in one array from block t of a tile; their place in block `at`."""
 
     scatter: str
-    stream_rows: str
+    put_rows: str
     stream: str
     place: str
 
@@ -164,7 +164,7 @@ def _moves(array: str, links: Span) -> Moves:
     waiting = "c0_block" if array == "c0" else f"r[t].{array}"
     return Moves(
         f"scatter(samples, {count}, {every}, {waiting}, {rows})",
-        f"stream_rows({every}, {waiting}, {rows}, scratch)",
+        f"put_rows(samples, {every}, large, {waiting}, {rows}, scratch)",
         f"stream({count} * BLOCK, {waiting}, {place})",
         place,
     )
