@@ -9,7 +9,7 @@ import pytest
 from conftest import DATA
 from helpers.motion_logs import LEG, smooth, write_csv
 from linkwise import LinkwiseError, Load, Options, Payload, generate, read_system, write_package
-from linkwise.analysis import Contacts, analyze
+from linkwise.analysis import Contacts, Processing, analyze
 from linkwise.cli.analyze import app
 from linkwise.package.load import import_package
 from linkwise_runtime.quantities import Contact
@@ -128,6 +128,38 @@ def test_the_force_of_each_contact_is_a_source(tmp_path: Path) -> None:
     assert np.abs(found[f"qd_from/{names[-1]}/contact:foot"]).max() > 0.1
 
 
+def test_measured_torques_are_sources_and_what_they_leave_is_the_residual(tmp_path: Path) -> None:
+    """One joint's torque is measured at half of what its motion needs, one not at all; in N mm.
+
+    Between samples, measured torques go by cubics, which is less than 1e-6 off at 200 Hz.
+    """
+    robot, system = package(LEG, tmp_path)
+    names = [coordinate.name for coordinate in system.coordinates]
+    table = smooth(300, len(names), 200.0)
+    given = write_csv(tmp_path / "log.csv", table, names)
+    whole = analyze(given, robot)
+    gains = dict.fromkeys(names[1:], 1000.0) | {names[1]: 500.0}
+    columns = {f"motor {joint}": joint for joint in gains}
+    read = [gain * whole[f"tau/{joint}"] for joint, gain in gains.items()]
+    both = write_csv(tmp_path / "both.csv", np.column_stack([table, *read]), [*names, *columns])
+    asked: Any = {"processing": Processing(start=0.3), "trace": ["all"], "trace_windows": 0.5}
+    needed = analyze(given, robot, **asked)
+    found = analyze(both, robot, **asked, trace_torque=columns, trace_torque_factor=1e-3)
+    check_closes(found, 1e-7)
+    ends = f"qd_from/{names[0]}/gravity"
+    for window in [c.name.removeprefix(ends) for c in found.columns if c.name.startswith(ends)]:
+
+        def part(of: Any, source: str, at: str = window) -> Any:
+            return of[f"qd_from/{names[0]}/{source}{at}"]
+
+        half = 0.5 * part(needed, f"torque:{names[1]}")
+        np.testing.assert_allclose(part(found, f"torque:{names[1]}"), half, atol=1e-6)
+        left = half + part(needed, f"torque:{names[0]}")
+        np.testing.assert_allclose(part(found, "residual"), left, atol=1e-6)
+        assert f"qd_from/{names[0]}/torque:{names[0]}{window}" not in found.table
+    assert found.traced["measured"] == {joint: column for column, joint in columns.items()}
+
+
 @pytest.mark.parametrize(
     ("flags", "told"),
     [
@@ -137,6 +169,13 @@ def test_the_force_of_each_contact_is_a_source(tmp_path: Path) -> None:
         (["--trace", "all", "--trace-restart", "99"], "which is not within the motion, from 0 to"),
         (["--trace", "all", "--trace-restart", "soon"], "--trace-restart soon: give a time in s, or phases"),
         (["--trace", "all", "--trace-restart", "phases"], "there are none; give some with --phase"),
+        (["--trace-torque", "motor=joint1"], "--trace-torque goes with --trace; add it"),
+        (["--trace", "all", "--trace-torque", "motor"], "--trace-torque motor: write it as COLUMN=JOINT"),
+        (
+            ["--trace", "all", "--trace-torque", "motor=joint1"],
+            "log.csv: --trace-torque motor=joint1: there is no such column; there are 'joint",
+        ),
+        (["--trace", "all", "--trace-torque-factor", "2"], "--trace-torque-factor goes with --trace-torque"),
     ],
 )
 def test_what_cannot_be_traced_is_told_in_one_line(flags: list[str], told: str, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from linkwise import Fitting, Options
 from linkwise.analysis import Lowpass, Processing, Reading
+from linkwise.analysis.asked_trace import TraceChoices
 from linkwise.analysis.choices import AnalysisChoices
 from linkwise.analysis.job import Outputs
 from linkwise.analysis.phases import Phase
@@ -56,6 +57,8 @@ ANALYSIS: dict[str, Any] = {
     "trace_windows": 0.2,
     "trace_weight": "borne",
     "trace_restart": ("phases",),
+    "trace_torque": ("m1=knee",),
+    "trace_torque_factor": 0.001,
     "induced_whole": True,
 }
 FLAGS = {"from_time": "--from", "to_time": "--to"}
@@ -92,10 +95,7 @@ WRITTEN = AnalysisChoices(
         induced_whole=True,
         induced_power=True,
         reactions=("knee,world",),
-        trace=("knee",),
-        trace_windows=0.2,
-        trace_weight="borne",
-        trace_restart=("phases",),
+        trace=TraceChoices(("knee",), 0.2, "borne", ("phases",), (("m1", "knee"),), 0.001),
     ),
     payload=("hand=2",),
     load=("hand=1,2,3",),

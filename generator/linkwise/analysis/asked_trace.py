@@ -1,7 +1,8 @@
 """Traces that are asked for: joints, windows of time, and where a trace begins anew."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -11,15 +12,82 @@ from linkwise_runtime.motion.tracer import TraceParts
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.phases import PlacedPhase
+from linkwise.analysis.settings import pairs
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
+from linkwise.option import option
 
 EVERY, PHASES = "all", "phases"
 """Words for all joints, and for begins and ends of phases."""
 Weight = Literal["apart", "borne"]
 AT_ONCE = 4096
 """Samples that are looked at for phases at once."""
+
+
+@dataclass(frozen=True)
+class TraceChoices:
+    """Choices of a trace, as they are written.
+
+    `torques` holds (column, joint) pairs, or is a dict of them. Raises LinkwiseError for choices without a
+    joint that is traced.
+    """
+
+    joints: tuple[str, ...] = option(
+        (),
+        "Tell which sources the velocity of a joint, and what velocities ask of it, came from; all for every"
+        " joint; may be repeated",
+        "--trace",
+        metavar="JOINT",
+    )
+    windows: float | None = option(
+        None, "Cut the sources of --trace into windows of this length, s", "--trace-windows", metavar="S"
+    )
+    weight: Weight = option(
+        "apart",
+        "Weight as a source of --trace, or borne by torques: these are what is beyond",
+        "--trace-weight",
+    )
+    restart: tuple[str, ...] = option(
+        (),
+        "Begin the trace anew at a time, s, or wherever a phase begins or ends; may be repeated",
+        "--trace-restart",
+        metavar="S|phases",
+    )
+    torques: tuple[tuple[str, str], ...] | Mapping[str, str] = option(
+        (),
+        "Column of the torque that a joint's actuator gave, as a source of --trace; what such torques leave"
+        " of the motion is the source residual; may be repeated",
+        "--trace-torque",
+        metavar="COLUMN=JOINT",
+        read=partial(pairs, "--trace-torque"),
+    )
+    torque_factor: float = option(
+        1.0, "What brings these torques to N m and forces to N: 0.001 for N mm", "--trace-torque-factor"
+    )
+
+    def __post_init__(self) -> None:
+        for flag, given in (
+            ("--trace-windows", self.windows),
+            ("--trace-restart", self.restart),
+            ("--trace-weight borne", self.weight == "borne"),
+            ("--trace-torque", self.torques),
+        ):
+            if given and not self.joints:
+                raise LinkwiseError(f"{flag} goes with --trace; add it")
+        if not all(isinstance(pair, (tuple, list)) and len(pair) == 2 for pair in self.pairs):
+            raise LinkwiseError(
+                f"--trace-torque {self.torques!r}: give pairs of a column and a joint, or a dict"
+            )
+        if self.torque_factor != 1.0 and not self.torques:
+            raise LinkwiseError("--trace-torque-factor goes with --trace-torque; add it")
+        if not (self.torque_factor and np.isfinite(self.torque_factor)):
+            raise LinkwiseError(f"--trace-torque-factor {self.torque_factor:g}: give a number that is not 0")
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Columns of torques and their joints."""
+        return tuple(self.torques.items() if isinstance(self.torques, Mapping) else self.torques)
 
 
 @dataclass(frozen=True)
@@ -34,19 +102,14 @@ class AskedTrace:
 
     @classmethod
     def of(
-        cls,
-        names: Sequence[str],
-        windows: float | None,
-        restarts: Sequence[float],
-        weight: Weight,
-        robot: OpenedRobot,
-        time: Array,
+        cls, choices: TraceChoices, restarts: Sequence[float], robot: OpenedRobot, time: Array
     ) -> "AskedTrace":
         """Return the trace of a movement at these times, in s.
 
         Raises LinkwiseError for a joint that is not there, for times outside the movement, and for weight
         that is borne of links that were written by hand.
         """
+        windows, weight = choices.windows, choices.weight
         if weight not in get_args(Weight):
             raise LinkwiseError(f"--trace-weight {weight}: give {' or '.join(get_args(Weight))}")
         is_borne = weight == "borne"
@@ -55,7 +118,7 @@ class AskedTrace:
                 f"--trace-weight borne: the links of {robot.name} were written by hand, and it is not said"
                 " which of their shares torques bear; leave it out"
             )
-        joints = [k for name in names for k in _joints(name, robot)]
+        joints = [k for name in choices.joints for k in _joints(name, robot)]
         try:
             flags = "--trace-windows", "--trace-restart"
             parts = trace_parts(() if windows is None else windows, sorted(restarts), time.tolist(), flags)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from linkwise.analysis.asked_trace import AskedTrace, Weight, restart_times
+from linkwise.analysis.asked_trace import AskedTrace, TraceChoices, restart_times
 from linkwise.analysis.borne_joints import borne_joints
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples, slip_warnings
 from linkwise.analysis.column_matching import with_columns
@@ -17,6 +17,7 @@ from linkwise.analysis.induced_points import InducedPlan, induced_points
 from linkwise.analysis.loads import Loads
 from linkwise.analysis.loads.read import placed_loads
 from linkwise.analysis.logs import Log, open_log
+from linkwise.analysis.measured_torques import measured_torques, torque_columns
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.outputs import Format, named_result, record, result_table
 from linkwise.analysis.phases import Phase, PlacedPhase, phase_columns, placed_phases
@@ -129,31 +130,12 @@ class Outputs:
         "--reaction",
         metavar="JOINT[,AXES]",
     )
-    trace: tuple[str, ...] = option(
-        (),
-        "Tell which sources the velocity of a joint, and what velocities ask of it, came from; all for every"
-        " joint; may be repeated",
-        metavar="JOINT",
-    )
-    trace_windows: float | None = option(
-        None, "Cut the sources of --trace into windows of this length, s", metavar="S"
-    )
-    trace_weight: Weight = option(
-        "apart", "Weight as a source of --trace, or borne by torques: these are what is beyond"
-    )
-    trace_restart: tuple[str, ...] = option(
-        (),
-        "Begin the trace anew at a time, s, or wherever a phase begins or ends; may be repeated",
-        metavar="S|phases",
-    )
+    trace: TraceChoices = field(default_factory=TraceChoices)
 
     def __post_init__(self) -> None:
         for flag, given, needed, there in (
             ("--induced-sto", self.storage, "--induced", self.induced),
             ("--induced-whole", self.induced_whole, "--induced", self.induced),
-            ("--trace-windows", self.trace_windows, "--trace", self.trace),
-            ("--trace-restart", self.trace_restart, "--trace", self.trace),
-            ("--trace-weight borne", self.trace_weight == "borne", "--trace", self.trace),
         ):
             if given and not there:
                 raise LinkwiseError(f"{flag} goes with {needed}; add it")
@@ -281,8 +263,10 @@ def prepared(
     reading, processing, outputs = asked.reading, asked.processing, asked.outputs
     points, bearings = induced_points(outputs.induced, robot), borne_joints(outputs.reactions, robot)
     opened = open_log(log, reading, robot.joints, robot.file_joints, robot.qpos)
-    switches = (*switch_columns(asked.contacts, opened), *phase_columns(outputs.phases, opened))
-    samples, closed = _samples(opened, robot, reading, switches, progress, buffer)
+    with within(str(log)):
+        torques = torque_columns("--trace-torque", opened.columns, robot, outputs.trace.pairs)
+    beside = (*switch_columns(asked.contacts, opened), *phase_columns(outputs.phases, opened))
+    samples, closed = _samples(opened, robot, reading, (*beside, *torques.values()), progress, buffer)
     with within(str(log)):
         start, stop = span_of(samples, processing)
         if processing.lowpass is not None:
@@ -295,12 +279,13 @@ def prepared(
     every = (*borne, *(() if times is None else times.loads))
     phases = placed_phases(outputs.phases, opened, robot, every, reading, progress)
     traced = None
-    if outputs.trace:
+    if outputs.trace.joints:
         q = samples.q[start:stop]
-        restarts = restart_times(outputs.trace_restart, phases, robot, times, motion, q)
-        cut = outputs.trace_windows, restarts, outputs.trace_weight
-        made = AskedTrace.of(outputs.trace, *cut, robot, motion)
-        traced = TracedRows.of(made, robot, borne, samples)
+        restarts = restart_times(outputs.trace.restart, phases, robot, times, motion, q)
+        made = AskedTrace.of(outputs.trace, restarts, robot, motion)
+        how = reading, outputs.trace.torque_factor, processing.lowpass, progress, buffer
+        measured = measured_torques(opened, torques, robot, *how)
+        traced = TracedRows.of(made, robot, borne, samples, measured and measured.some(start, stop))
     planned = InducedPlan(points, outputs.induced_whole)
     told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced)
     decomposer = Decomposer.of(robot, processing.convention, borne, times, told)
@@ -311,7 +296,7 @@ def _samples(
     log: Log,
     robot: OpenedRobot,
     reading: Reading,
-    switches: Sequence[str],
+    beside: Sequence[str],
     progress: Progress,
     buffer: Path | None,
 ) -> tuple[Samples, ClosedLog | None]:
@@ -319,7 +304,7 @@ def _samples(
 
     Dependent joints are moved to where the ties close.
 
-    switches: columns of the log that say when contacts are on
+    beside: columns of the log that are read elsewhere: those that say when contacts are on, torques
     """
     with within(str(log.path)):
         every = with_columns(log.columns, (*robot.joints, *robot.inputs), robot.dependent_joints, reading)
@@ -327,6 +312,6 @@ def _samples(
     names = (*(robot.joints[k] for k in there), *robot.inputs)
     units = (*(robot.units_in_logs[k] for k in there), *("" for _ in robot.inputs))
     reach = [*(robot.reach[k] for k in there), *(math.inf for _ in robot.inputs)]
-    samples = read_samples(log, names, units, reading, progress, buffer, switches, reach, robot.followers)
+    samples = read_samples(log, names, units, reading, progress, buffer, beside, reach, robot.followers)
     with within(str(log.path)):
         return closed_samples(samples, there, robot.constrained, reading.loop_tolerance, progress, buffer)

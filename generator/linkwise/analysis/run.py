@@ -1,13 +1,13 @@
 """`analyze`: from a log and a robot to arrays in memory, or to a directory of files."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
 from linkwise_runtime.quantities import Contact
 
-from linkwise.analysis.asked_trace import EVERY, Weight
+from linkwise.analysis.asked_trace import EVERY, TraceChoices, Weight
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.standing import with_contacts
 from linkwise.analysis.disk_rows import EverySample
@@ -53,6 +53,8 @@ def analyze(
     trace_windows: float | None = None,
     trace_weight: Weight = "apart",
     trace_restart: Sequence[str] = (),
+    trace_torque: Mapping[str, str] | Sequence[tuple[str, str]] = (),
+    trace_torque_factor: float = 1.0,
 ) -> Analysis:
     """Analyse a motion log with a generated robot, all samples in memory.
 
@@ -70,6 +72,8 @@ def analyze(
     trace_windows: length in s of the windows of time into which these sources are cut
     trace_weight: "apart", weight as a source, or "borne", torques as what is beyond what holds it
     trace_restart: times in s at which the trace begins anew, written as numbers, or "phases"
+    trace_torque: columns of torques that actuators gave, by joint; what these leave is a source "residual"
+    trace_torque_factor: what brings these to N m and N
 
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
@@ -82,10 +86,14 @@ def analyze(
         induced_power=induced_power,
         reactions=tuple(reactions),
         phases=tuple(map(Phase.of, phases)),
-        trace=tuple(trace),
-        trace_windows=trace_windows,
-        trace_weight=trace_weight,
-        trace_restart=tuple(map(str, trace_restart)),
+        trace=TraceChoices(
+            tuple(trace),
+            trace_windows,
+            trace_weight,
+            tuple(map(str, trace_restart)),
+            trace_torque if isinstance(trace_torque, Mapping) else tuple(trace_torque),
+            trace_torque_factor,
+        ),
     )
     asked = Request(reading or Reading(), processing or Processing(), outputs, borne, held)
     job = prepared(Path(log), loaded, asked, progress)
@@ -104,7 +112,7 @@ def analyze_to(
     """
     robot, outputs = with_contacts(robot, asked.contacts), asked.outputs
     phases = [phase.name for phase in outputs.phases]
-    traced = robot.joints if EVERY in outputs.trace else outputs.trace
+    traced = robot.joints if EVERY in outputs.trace.joints else outputs.trace.joints
     told = figure_names(outputs.induced, outputs.reactions, outputs.induced_power, phases, traced)
     for name in outputs.figures:
         check_figure(name, robot, told)

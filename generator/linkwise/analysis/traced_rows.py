@@ -15,7 +15,7 @@ import numpy as np
 from linkwise_runtime.arrays.backend import ArrayBackend
 from linkwise_runtime.constraints.independent_joints import loose_base
 from linkwise_runtime.motion.between_samples import SampledMotion, sample_slopes
-from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD, TraceEquations
+from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD, TORQUE, TraceEquations
 from linkwise_runtime.motion.traced import check_traceable
 from linkwise_runtime.motion.tracer import Tracer, TraceState
 
@@ -23,6 +23,7 @@ from linkwise.analysis.asked_trace import AskedTrace
 from linkwise.analysis.contacts.ground import Standing
 from linkwise.analysis.induced_sources import opened, timed
 from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.measured_torques import MeasuredTorques
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.payload import PayloadModel
 from linkwise.analysis.result_rows import Place, ResultRows
@@ -70,6 +71,8 @@ class TracedRows:
     robot: OpenedRobot
     loads: tuple[PlacedLoad, ...]
     tracer: Tracer
+    measured: MeasuredTorques | None
+    """Torques that actuators gave; else they give what the motion needs."""
 
     @classmethod
     def of(
@@ -78,6 +81,7 @@ class TracedRows:
         robot: OpenedRobot,
         loads: Sequence[PlacedLoad],
         samples: Samples,
+        measured: MeasuredTorques | None,
     ) -> "TracedRows":
         """Return the rows of a robot's trace; samples have the inputs that it depends on, if any."""
         ties = None if robot.constrained is None else robot.constrained.constraints
@@ -103,14 +107,14 @@ class TracedRows:
             model.backend,
             ties,
             passive=True,
-            torques_given=False,
+            torques_given=measured is not None,
             given=tuple(given),
             is_borne=asked.is_borne,
             loose=loose,
             carried=carried,
             backend_at=cast(Any, backend_at) if robot.time_name or robot.inputs else None,
         )
-        return cls(asked, robot, tuple(loads), Tracer(equations, asked.parts))
+        return cls(asked, robot, tuple(loads), Tracer(equations, asked.parts), measured)
 
     @property
     def origins(self) -> tuple[str, ...]:
@@ -128,7 +132,12 @@ class TracedRows:
         windows, parts = len(self.asked.windows), self.asked.parts
         begun = np.searchsorted(parts.cuts, parts.restarts, side="right") - 1
         start = len(self.origins) - windows
-        every = [*range(start), *(start + w for w in sorted({int(w) for w in begun}))]
+        silent = set[str]()
+        if self.measured is not None:  # what has no measured torque gives none
+            with_torque = {self.robot.joints[i] for i in self.measured.joints}
+            silent = {f"{TORQUE}{BETWEEN}{joint}" for joint in {*self.robot.joints} - with_torque}
+        every = [o for o in range(start) if self.tracer.equations.sources[o // windows] not in silent]
+        every += [start + w for w in sorted({int(w) for w in begun})]
         found: list[Place] = []
         for i in self.asked.joints:
             causes = sorted({at[2] for _, at in velocity if at[0] == i})
@@ -149,6 +158,12 @@ class TracedRows:
             "joints": [self.robot.joints[i] for i in self.asked.joints],
             "sources": list(self.tracer.equations.sources),
             "weight": "borne" if self.asked.is_borne else "apart",
+            "measured": {}
+            if self.measured is None
+            else {
+                self.robot.joints[i]: column
+                for i, column in zip(self.measured.joints, self.measured.columns, strict=True)
+            },
             "windows": [list(window) for window in self.asked.windows],
             "begins_at_samples": list(self.asked.parts.restarts),
         }
@@ -166,7 +181,7 @@ class TracedRows:
         state: that at the block's first sample, None at the movement's; returned is that behind the block
         """
         time, (q, qd, qdd) = out[0], (out[rows[name].rows].T for name in ("q", "qd", "qdd"))
-        given = self._given(rows, out, standing, time, q)
+        given = self._given(rows, out, block, standing, q)
         steps = np.diff(time, append=time[-1])
         motion = SampledMotion(time, steps, q, qd, qdd, given, sample_slopes(steps[:-1], given))
         samples = range(len(time))[block.with_next]
@@ -187,10 +202,15 @@ class TracedRows:
         absolute, relative = worst_of([(left, float(parts))])
         return Closure(trace_absolute=absolute, trace_relative=relative), state
 
-    def _given(self, rows: ResultRows, out: Array, standing: Standing | None, time: Array, q: Array) -> Array:
-        """Return the forces (S, n, Y) of loads, then of contacts, on all joints."""
-        model = opened(self.robot)
-        forces = [-borne.torque(model, time, q) for borne in self.loads]
+    def _given(
+        self, rows: ResultRows, out: Array, block: ExtendedBlock, standing: Standing | None, q: Array
+    ) -> Array:
+        """Return the forces (S, n, Y) of actuators, where measured, of loads, then of contacts, on joints."""
+        model, time = opened(self.robot), out[0]
+        forces = []
+        if self.measured is not None:
+            forces.append(self.measured.some(block.first, block.first + len(q)).dense(q.shape[1]))
+        forces += [-borne.torque(model, time, q) for borne in self.loads]
         ground = self.robot.contacts
         if standing is not None and ground is not None:
             borne_there = rows.dense("force", out)[:, self.robot.contact_rows]

@@ -1,4 +1,4 @@
-"""Checks of induced accelerations, source by source, against the reference's shares and a solution of M."""
+"""Checks of induced accelerations and power by source, against the reference's shares and a solution of M."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -57,7 +57,8 @@ def induced_calls(
     frames: FrameReference | None,
     load_of: Callable[..., Any],
 ) -> Iterator[Result]:
-    """Yield checks of the coordinates' shares, also for a motion's torques, and of a point under a load."""
+    """Yield checks of the coordinates' shares, also for a motion's torques, of links' power, and of a point
+    under a load."""
     rows = chosen_rows(len(reference.states.q))
     rows, at = rows[regular(reference)[rows]], np.flatnonzero(regular(reference)[rows])
     if not rows.size:
@@ -66,6 +67,8 @@ def induced_calls(
     told = f"against {reference.name}"
     shares = [*_given(model, joints, reference, rows), *_asked(model, reference, rows)]
     yield compare(f"{name}: induced accelerations {told}", shares, reference.tolerance)
+    power = list(_power(model, joints, reference, rows))
+    yield compare(f"{name}: induced power {told}", power, reference.tolerance)
     if frames is not None:
         seen = _of_a_point(model, reference, rows, frames, at, load_of)
         yield compare(f"{name}: induced accelerations of a point {told}", seen, reference.tolerance)
@@ -103,6 +106,34 @@ def _asked(model: Dynamics, reference: Reference, rows: Index) -> Iterator[Entri
     own = _Sources(states, sources.mass, {"actuators": (diagonal(torque), diagonal(size))})
     found = model.induced_accelerations(states.q, states.qd, qdd=states.qdd, passive=False, constraints=False)
     yield Entries("actuators asked for", found.actuators, *own.accelerations()["actuators"])
+
+
+def _power(
+    model: Dynamics, joints: Sequence[PassiveJoint], reference: Reference, rows: Index
+) -> Iterator[Entries]:
+    """Yield what each source gives each link, then each armature.
+
+    That is qd^T M_j qdd_x, and to link j what its own velocity forces and weight took from it.
+    """
+    sources = _sources(reference, rows, joints)
+    qd, sizes = sources.states.qd, np.abs(sources.states.qd)
+    rotors = passive_reference(joints, States(0.0 * qd, 0.0 * qd, np.ones_like(qd)))[0][3]
+    turning = diagonal(rotors * qd)[:, np.flatnonzero(rotors.any(0))]
+    momenta, bounds = (
+        np.concatenate([np.einsum("sijk,si->sjk", of["c2"][rows], speed), own], 1)
+        for of, speed, own in ((reference.values, qd, turning), (reference.scales, sizes, np.abs(turning)))
+    )
+    found: Any = model.induced_power(*sources.states.motion, constraints=False)
+    for source, (moved, scale) in sources.accelerations().items():
+        gain, size = momenta @ flat(moved), bounds @ (flat(scale) + np.abs(flat(moved)))
+        if source in ("velocity", "gravity"):
+            force, bound = map(flat, sources.forces[source])
+            columns = np.arange(force.shape[2])
+            links = columns // (force.shape[2] // model.N)
+            gain[:, links, columns] -= np.einsum("si,six->sx", qd, force)
+            size[:, links, columns] += np.einsum("si,six->sx", sizes, bound)
+        shape = *gain.shape[:2], *moved.shape[2:]
+        yield Entries(f"power of {source}", getattr(found, source), gain.reshape(shape), size.reshape(shape))
 
 
 def _of_a_point(

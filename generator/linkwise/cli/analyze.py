@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from linkwise_runtime.motion.trace_equations import RESIDUAL
 
 from linkwise.analysis import Analysis
 from linkwise.analysis.choices import AnalysisChoices
@@ -34,7 +35,8 @@ app = typer.Typer(add_completion=False)
     *("log", "robot", "opensim_setup", "out", "units", "time", "topic", "qpos"),
     ...,
     *("induced", "induced_sto", "sto_units", "induced_power", "reaction"),
-    *("trace", "trace_windows", "trace_weight", "trace_restart", "backend", "page", "as_json"),
+    *("trace", "trace_windows", "trace_weight", "trace_restart", "trace_torque"),
+    *("trace_torque_factor", "backend", "page", "as_json"),
     complete=with_setup,
 )
 def analyze(
@@ -88,8 +90,26 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
         f" {recursion}; closure: terms sum to partial torques within {closure.terms_relative:.1e},"
         f" these to joint torques within {closure.links_relative:.1e} (relative){shares}",
         *_of_contacts(analysis),
+        *_of_residual(analysis),
         *map(str, files),
     ]
+
+
+def _of_residual(analysis: Analysis) -> list[str]:
+    """Return a line on how much of traced velocities measured torques leave."""
+    if analysis.traced is None or not analysis.traced["measured"]:
+        return []
+    robot, peak = analysis.robot, analysis.totals.peak
+    names = analysis.rows.axes["origin"].names
+    left = [o for o, name in enumerate(names) if name.partition(" ")[0] == RESIDUAL]
+    told = []
+    for name in analysis.traced["joints"]:
+        i = robot.joints.index(name)
+        parts = peak[analysis.rows.numbers("qd_from", joint=i, origin=left)]
+        whole = float(peak[analysis.rows.numbers("qd", joint=i)].max())
+        left_over = f"{parts.max(initial=0.0):.3g} {robot.units[i]}/s"
+        told.append(f"{left_over} of {name} (which reaches {whole:.3g})")
+    return [f"residual, what measured torques leave, gives up to {listed(told)}"]
 
 
 def _of_contacts(analysis: Analysis) -> list[str]:

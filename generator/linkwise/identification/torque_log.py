@@ -12,6 +12,7 @@ from linkwise.analysis.closed_motion import ClosedLog, closed_samples
 from linkwise.analysis.column_matching import TIMES, with_columns, with_nearest
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.logs import open_log
+from linkwise.analysis.measured_torques import torque_columns
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Lowpass, Processing, Reading
@@ -72,7 +73,7 @@ def read_torque_log(
     measured = _measured(robot, torques, unmeasured)
     log = open_log(path, reading, robot.joints, robot.file_joints, robot.qpos)
     with within(str(path)):
-        columns = _torque_columns(log.columns, robot.joints, [robot.joints[i] for i in measured], torques)
+        columns = _torque_columns(log.columns, robot, [robot.joints[i] for i in measured], torques)
         if not reading.ignore_extra:
             _refuse_more_torques(log.columns, robot, columns, measured)
         moving = with_columns(log.columns, robot.joints, robot.dependent_joints, reading)
@@ -109,12 +110,6 @@ def _measured(
 ) -> tuple[int, ...]:
     """Return the joints that must have a torque, from 0; raise LinkwiseError for impossible choices."""
     joints = robot.driven_joints
-    for joint in (*unmeasured, *(joint for _, joint in torques)):
-        if joint in robot.dependent_joints:
-            raise LinkwiseError(
-                f"{joint} follows {listed(map(repr, joints))} and gives no torque; leave it out, or generate"
-                " the robot with --independent and other joints"
-            )
     for joint in unmeasured:
         if joint not in joints:
             raise LinkwiseError(
@@ -164,23 +159,10 @@ def _settled(start: int, stop: int, rate: float, filtered: Lowpass) -> tuple[int
 
 
 def _torque_columns(
-    columns: Sequence[str], joints: Sequence[str], measured: Sequence[str], torques: Sequence[tuple[str, str]]
+    columns: Sequence[str], robot: OpenedRobot, measured: Sequence[str], torques: Sequence[tuple[str, str]]
 ) -> list[str]:
     """Return the name of the torque column of each measured joint, in order."""
-    given: dict[str, str] = {}
-    for column, joint in torques:
-        if given.setdefault(joint, column) != column:
-            raise LinkwiseError(
-                f"--torque {column}={joint}: column {given[joint]!r} is that joint's already; keep one"
-            )
-    for joint, column in given.items():
-        if joint not in joints or column not in columns:
-            missing_joint = joint not in joints
-            what, wanted, there = ("joint", joint, joints) if missing_joint else ("column", column, columns)
-            raise LinkwiseError(
-                f"--torque {column}={joint}: there is no such {what}; there are "
-                f"{listed(map(repr, nearest_first(wanted, there)))}"
-            )
+    given = torque_columns("--torque", columns, robot, torques)
     found, missing = [], []
     for joint in measured:
         names = [given[joint]] if joint in given else [spelling.format(joint) for spelling in SPELLINGS]
@@ -189,7 +171,7 @@ def _torque_columns(
         missing += [] if there else [joint]
     if missing:
         example = missing[0]
-        others = [column for column in columns if column not in joints and column.lower() not in TIMES]
+        others = [column for column in columns if column not in robot.joints and column.lower() not in TIMES]
         raise LinkwiseError(
             f"no torque column for joint {with_nearest(missing, others)}; call it 'tau/{example}' or "
             f"'{example}_moment', or name it with --torque COLUMN={example}; where nothing measures it, as "

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD, SHARE, START, TORQUE
+from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD, RESIDUAL, SHARE, START, TORQUE
 
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_rows import OVER_TIME
@@ -81,5 +81,7 @@ def _named(result: AnalysisResult, source: str, rows: tuple[Index, ...]) -> Sour
         return SourceCurve("contact", f"ground at {rest}", 0, rows)
     if source == START:
         return SourceCurve("start", "motion at the start", 0, rows)
+    if source == RESIDUAL:
+        return SourceCurve("named", "what measured torques leave", max(1, len(robot.share_names)), rows)
     name = rest if kind == SHARE else source
     return SourceCurve("named", name, list(robot.share_names).index(name), rows)
