@@ -290,14 +290,14 @@ WRONG = {
     "latex": ("formulas.tex", r"\frac{23 \ddot{q}_{2}}", r"\frac{23 \dot{q}_{2}}", "formulas.tex: tau_ij"),
     "last samples of a batch": (
         "c/planar2.c",
-        "scatter(samples, 5, C1, r[t].c1",
-        "scatter(samples, 4, C1, r[t].c1",
+        "put_rows(samples, C1, large, r[t].c1",
+        "put_rows(samples - (samples < BLOCK), C1, large, r[t].c1",
         "c: planar2_d",
     ),
     "large batches": (
         "c/planar2.c",
-        "stream_rows(G, r[t].g, g + at",
-        "stream_rows(G, r[t].g, g + 0 * at",
+        "put_rows(samples, G, large, r[t].g, g + at",
+        "put_rows(samples, G, large, r[t].g, g + 0 * at",
         "c: planar2_d",
     ),
     "large batches with their zeros": (
