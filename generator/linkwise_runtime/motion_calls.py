@@ -308,7 +308,8 @@ class MotionCalls(RobotCalls):
 
         Where several joints are in one place, as of a ball joint, the bodies are the first one's predecessor
         and the last one's successor. In loops a flow contains what ties carry to what hangs on the joint, and
-        so it does where one of several joints of a coordinate is behind another joint.
+        where some of the joints that a coordinate moves are behind another joint, what the coupling feeds in
+        there: it is then not the power of the wrench that `reactions` tells.
 
         Raises as `induced_accelerations` does, and ValueError for links given by energies, which do not say
         what hangs on which joint.

@@ -152,9 +152,9 @@ def test_measured_torques_are_sources_and_what_they_leave_is_the_residual(tmp_pa
         def part(of: Any, source: str, at: str = window) -> Any:
             return of[f"qd_from/{names[0]}/{source}{at}"]
 
-        half = 0.5 * part(needed, f"torque:{names[1]}")
+        half = 0.5 * part(needed, f"residual:{names[1]}")
         np.testing.assert_allclose(part(found, f"torque:{names[1]}"), half, atol=1e-6)
-        left = half + part(needed, f"torque:{names[0]}")
+        left = half + part(needed, f"residual:{names[0]}")
         np.testing.assert_allclose(part(found, "residual"), left, atol=1e-6)
         assert f"qd_from/{names[0]}/torque:{names[0]}{window}" not in found.table
     assert found.traced["measured"] == {joint: column for column, joint in columns.items()}
@@ -165,7 +165,7 @@ def test_measured_torques_are_sources_and_what_they_leave_is_the_residual(tmp_pa
     [
         (["--trace", "elbow"], "--trace elbow: no such joint; there are joint1, joint2, joint3, or all"),
         (["--trace-windows", "0.2"], "--trace-windows goes with --trace; add it"),
-        (["--trace", "all", "--trace-windows", "-1"], "--trace-windows is -1.0 s; give a length of at least"),
+        (["--trace", "all", "--trace-windows", "-1"], "--trace-windows is -1.0 s; give a length from a step"),
         (["--trace", "all", "--trace-restart", "99"], "which is not within the motion, from 0 to"),
         (["--trace", "all", "--trace-restart", "soon"], "--trace-restart soon: give a time in s, or phases"),
         (["--trace", "all", "--trace-restart", "phases"], "there are none; give some with --phase"),
@@ -176,6 +176,11 @@ def test_measured_torques_are_sources_and_what_they_leave_is_the_residual(tmp_pa
             "log.csv: --trace-torque motor=joint1: there is no such column; there are 'joint",
         ),
         (["--trace", "all", "--trace-torque-factor", "2"], "--trace-torque-factor goes with --trace-torque"),
+        (["--trace", "all", "--convention", "gradient"], "--trace goes with --convention closing"),
+        (
+            ["--trace", "all", "--trace-restart", "phases", "--phase", "late=50..60"],
+            "--trace-restart phases: no sample is in the phase late",
+        ),
     ],
 )
 def test_what_cannot_be_traced_is_told_in_one_line(flags: list[str], told: str, tmp_path: Path) -> None:

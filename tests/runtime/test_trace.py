@@ -15,6 +15,7 @@ torch = pytest.importorskip("torch")
 
 Packages = Callable[[str], ModuleType]
 CRANE, LEG = f"{DATA / 'crane.urdf'} loops", f"{DATA / 'leg.toml'} loops"
+FOUR_BAR = str(DATA / "crank_rocker.toml")
 SPRUNG = """schema = 1
 name = "sprung"
 gravity = [0, 0, -9.81]
@@ -137,6 +138,20 @@ def test_weight_that_torques_bear_is_no_source(package_of: Packages) -> None:
     np.testing.assert_allclose(given.of("torque"), borne.of("torque"), rtol=1e-5, atol=1e-5)
 
 
+def test_torques_that_were_given_bear_the_weight_of_tied_joints_too(package_of: Packages) -> None:
+    robot = package_of(FOUR_BAR).load()
+    driven = motion_of(1)
+    q = robot.constraints.closed(driven[0])
+    qd, qdd = (np.pad(a, ((0, 0), (0, robot.n - 1))) for a in driven[1:])
+    motion = q, qd, qdd
+    needed = np.pad(robot.constraints.inverse_dynamics(*motion)[:, :1], ((0, 0), (0, robot.n - 1)))
+    expected = robot.trace(*motion, TIME, weight="borne").of(f"torque:{robot.joint_names[0]}")
+    found = robot.trace(*motion, TIME, tau=needed, weight="borne")
+    parts = [found.of(f"torque:{name}") for name in robot.joint_names]
+    np.testing.assert_allclose(parts[0], expected, rtol=1e-5, atol=1e-5)
+    assert np.abs(parts[1:]).max() <= 1e-12
+
+
 def test_springs_and_losses_are_sources_where_joints_have_them(tmp_path: Path) -> None:
     (tmp_path / "sprung.toml").write_text(SPRUNG)
     write_package(generate(read_system(tmp_path / "sprung.toml"), ["numpy"]), tmp_path / "sprung")
@@ -169,6 +184,9 @@ def test_what_cannot_be_traced_is_refused(package_of: Packages) -> None:
     gap = np.concatenate([TIME[:40], TIME[40:] + 0.3])
     broken = motion[1].copy()
     broken[7, 1] = np.nan
+    wrapped = motion[0].copy()
+    wrapped[40:, 1] += 2.0 * np.pi
+    pull = package_of("planar3").AppliedLoad("link3", broken)
     for told, ask in {
         r"time has 80 instants, but q, qd and qdd have shape \(81, 3\)": lambda: robot.trace(
             *motion, TIME[:80]
@@ -178,7 +196,13 @@ def test_what_cannot_be_traced_is_refused(package_of: Packages) -> None:
         r"windows\[1\] is 0.7 s, which is not within the motion, from 0.2 to 0.6 s": lambda: robot.trace(
             *motion, TIME, windows=[0.3, 0.7]
         ),
-        "windows is 0.001 s; give a length of at least": lambda: robot.trace(*motion, TIME, windows=0.001),
+        "windows is 0.001 s; give a length from a step": lambda: robot.trace(*motion, TIME, windows=0.001),
+        "windows is 5 s; give a length from a step": lambda: robot.trace(*motion, TIME, windows=5),
+        "q of 'joint2' goes by 6.28 in the step next to 0.395 s, where": lambda: robot.trace(
+            wrapped, *motion[1:], TIME
+        ),
+        "q of 'joint1' goes by .* give time in s": lambda: robot.trace(*motion, 1e3 * TIME),
+        "force is nan at sample 7": lambda: robot.trace(*motion, TIME, loads=[pull]),
         r"restarts\[1\] is 0.301 s, next to the sample at 0.3 s, where another one is": lambda: robot.trace(
             *motion, TIME, restarts=[0.3, 0.301]
         ),

@@ -41,7 +41,11 @@ class TraceChoices:
         metavar="JOINT",
     )
     windows: float | None = option(
-        None, "Cut the sources of --trace into windows of this length, s", "--trace-windows", metavar="S"
+        None,
+        "Cut the sources of --trace into windows of this length, s",
+        "--trace-windows",
+        metavar="S",
+        is_key=False,  # columns would have each trial's own times in their names
     )
     weight: Weight = option(
         "apart",
@@ -137,7 +141,8 @@ def restart_times(
 ) -> list[float]:
     """Return the times at which a trace begins anew, from texts of them or the word phases.
 
-    q: positions (S, n) at the times (S,). Raises LinkwiseError for another text, and without any phase.
+    q: positions (S, n) at the times (S,). Raises LinkwiseError for another text, without any phase, and for a
+    phase in which no sample is.
     """
     found: set[float] = set()
     for text in given:
@@ -149,14 +154,19 @@ def restart_times(
             continue
         if not phases:
             raise LinkwiseError(f"--trace-restart {PHASES}: there are none; give some with --phase")
+        ever_on = np.zeros(len(phases), dtype=np.bool_)
         for at in range(0, len(time), AT_ONCE):
             some = slice(at, at + AT_ONCE + 1)
             shares = np.zeros((0, len(time[some])))
             if times is not None:
                 shares = times.shares(robot.model, time[some], q[some]).T
-            for phase in phases:
-                changes = np.flatnonzero(np.diff(phase.on(robot, time[some], q[some], shares)))
-                found |= set(time[some][changes + 1].tolist())
+            for number, phase in enumerate(phases):
+                on = phase.on(robot, time[some], q[some], shares)
+                ever_on[number] |= on.any()
+                found |= set(time[some][np.flatnonzero(np.diff(on)) + 1].tolist())
+        for phase, is_ever_on in zip(phases, ever_on, strict=True):
+            if not is_ever_on:
+                raise LinkwiseError(f"--trace-restart {PHASES}: no sample is in the phase {phase.name}")
     ends = time[0], time[-1]
     return sorted(at for at in found if at not in ends)
 

@@ -30,6 +30,7 @@ from linkwise.analysis.result_quantities import LOSSES, PASSIVE
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.term_rows import TermArrays, mirrored
 from linkwise.arrays import Array
+from linkwise.errors import LinkwiseError
 
 AT_ONCE = 1 << 21
 """Force values of the sources that are computed at once."""
@@ -57,6 +58,8 @@ class InducedSources:
 
         Shares with names of links that are written stay apart.
         """
+        if robot.constrained is not None:
+            refuse_tensors(robot, "what --induced and --induced-power tell of tied joints is")
         found: dict[Source, list[tuple[int, int]]] = {}
         summed = [quantity for quantity in WHOLE if whole and not (robot.is_written and quantity == WEIGHT)]
         for quantity, at, i, place in _parts(robot, rows):
@@ -158,6 +161,15 @@ def opened(robot: OpenedRobot) -> Any:
     """Return the model of links and payloads without ties."""
     model: Any = robot.model
     return model if robot.constrained is None else model.open
+
+
+def refuse_tensors(robot: OpenedRobot, what: str) -> None:
+    """Raise LinkwiseError for a back end that computes in tensors, where arrays are needed."""
+    _, (q,) = opened(robot).backend.read({"q": np.zeros((1, len(robot.joints)))}, len(robot.joints))
+    if not isinstance(q, np.ndarray):
+        raise LinkwiseError(
+            f"--backend {robot.backend} computes in tensors, and {what} in arrays; give numpy or native"
+        )
 
 
 def _parts(robot: OpenedRobot, rows: ResultRows) -> Iterator[tuple[str, tuple[int, ...], int, int]]:

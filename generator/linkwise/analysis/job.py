@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from linkwise_runtime.motion.induced_power import fed_by_couplings
+
 from linkwise.analysis.asked_trace import AskedTrace, TraceChoices, restart_times
 from linkwise.analysis.borne_joints import borne_joints
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples, slip_warnings
@@ -31,6 +33,7 @@ from linkwise.analysis.torques import Decomposer, ToldBeside
 from linkwise.analysis.traced_rows import TracedRows
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
+from linkwise.escape import listed
 from linkwise.extras import extra
 from linkwise.option import option
 from linkwise.progress import Progress
@@ -48,7 +51,7 @@ class Analysis(AnalysisResult):
 
         name: "paper" or "causes", with ":JOINT" for another joint than the first; "shares"; "power";
         "energy", or "energy:PHASE" for work over a phase; "induced", or "induced:POINT" for another point
-        than the first; "reaction" or "reaction:JOINT" likewise; "contacts"
+        than the first; "reaction" or "reaction:JOINT", "trace" or "trace:JOINT" likewise; "contacts"
 
         "paper" has five panels, laid out like the paper's Fig. 5-9. Raises LinkwiseError for another name.
         """
@@ -86,7 +89,7 @@ class Outputs:
     figures: tuple[str, ...] = option(
         (),
         "paper or causes, alone or with :JOINT, shares, power, energy, energy:PHASE, induced, induced:POINT,"
-        " reaction, reaction:JOINT or contacts; may be repeated",
+        " reaction or trace, alone or with :JOINT, or contacts; may be repeated",
         "--figure",
         is_key=False,
     )
@@ -204,7 +207,7 @@ class Job:
         robot = self.decomposer.robot
         analysed = self.samples.within(*span_of(self.samples, self.asked.processing))
         poles = pole_warnings(robot.tree, robot.joints, analysed)
-        warnings = (*self.samples.warnings, *self._twice_borne(), *poles, *self._never_on(done))
+        warnings = (*self.samples.warnings, *self._twice_borne(), *self._fed(), *poles, *self._never_on(done))
         return Analysis(
             **vars(done),
             robot=robot,
@@ -232,6 +235,20 @@ class Job:
         for c, peak in enumerate(peaks):
             if not peak and ground and times:
                 yield f"contact {ground.names[c]!r} is never on: {times.largest(c)}"
+
+    def _fed(self) -> Iterator[str]:
+        """Yield warnings about what flows through joints beside the power of their own wrenches."""
+        robot = self.decomposer.robot
+        if not self.asked.outputs.induced_power or robot.tree is None:
+            return
+        coupled = [robot.joints[i] for i in fed_by_couplings(robot.tree, len(robot.joints))]
+        if coupled:
+            yield (
+                f"the flow through {listed(map(repr, coupled))} contains what joints behind, which follow"
+                " others, are fed by these"
+            )
+        if robot.constrained is not None:
+            yield "flows through joints contain what ties carry to what is behind them"
 
     def _twice_borne(self) -> Iterator[str]:
         """Yield warnings about contacts on bodies that carry loads too.
@@ -280,6 +297,8 @@ def prepared(
     phases = placed_phases(outputs.phases, opened, robot, every, reading, progress)
     traced = None
     if outputs.trace.joints:
+        if processing.convention != "closing":
+            raise LinkwiseError("--trace goes with --convention closing, whose velocity terms sum to torques")
         q = samples.q[start:stop]
         restarts = restart_times(outputs.trace.restart, phases, robot, times, motion, q)
         made = AskedTrace.of(outputs.trace, restarts, robot, motion)

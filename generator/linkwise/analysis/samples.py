@@ -58,6 +58,8 @@ class Samples:
         return replace(self, time=self.time[some], q=self.q[some], inputs=self.inputs[some], first_row=first)
 
 
+WRAPPED = 0.1
+"""Largest part of a turn by which a step from sample to sample differs from a turn, where angles leap."""
 CLOSE = {"rad": 0.01, "m": 0.001}
 """Largest difference between a column and the motion of its joint: logs are rounded, joints have play."""
 
@@ -146,6 +148,30 @@ class FollowerColumns:
                 )
 
 
+class TurnLeaps:
+    """Angles that leap by a turn from one sample to the next, as those do that are wrapped at one.
+
+    joints: names of the joints that turn; radians: factor that brings the log's angles to radians
+    """
+
+    def __init__(self, joints: Sequence[str], radians: float) -> None:
+        self._joints, self._turn = joints, 2.0 * np.pi / radians
+        self._found, self._last = np.zeros(len(joints), dtype=np.intp), np.zeros((0, len(joints)))
+
+    def look(self, angles: Array) -> None:
+        """Count the leaps in a block (S, joints), and to it from the one before."""
+        steps = np.abs(np.diff(np.concatenate([self._last, angles]), axis=0))
+        self._found += (np.abs(steps - self._turn) < WRAPPED * self._turn).sum(axis=0)
+        self._last = angles[-1:].copy()
+
+    def warnings(self) -> Iterator[str]:
+        """Yield a warning for each joint that leaps."""
+        for joint, count in zip(self._joints, self._found.tolist(), strict=True):
+            if count:
+                times = "once" if count == 1 else f"{count} times"
+                yield f"joint {joint!r} leaps by a turn {times}: unwrap its angles, as numpy.unwrap does"
+
+
 def read_samples(
     log: Log,
     joints: tuple[str, ...],
@@ -176,11 +202,13 @@ def read_samples(
     factor = radians_per_unit(log, reading)
     width = 1 + len(joints)
     peaks = np.zeros(width)
+    leaps = TurnLeaps([joints[at - 1] for at in angles], factor)
     following = FollowerColumns(log.columns, selection.ignored, followers, joints, factor)
 
     def in_si() -> Iterator[Array]:
         for whole in finite_blocks(log, selection.columns, progress, following.numbers):
             block = whole[:, :width]
+            leaps.look(block[:, angles])
             np.maximum(peaks, np.abs(block).max(axis=0, initial=0.0), out=peaks)
             block[:, angles] *= factor
             following.look(block[:, 1:], whole[:, width:])
@@ -190,7 +218,13 @@ def read_samples(
     time = first_column(samples)
     with within(str(log.path)):
         rate = even_rate(time, log.first_row, strict=reading.resample is None)
-        warnings = (*log.warnings, *slowness(rate), *following.warnings(), *_thinned(rate, reading.resample))
+        warnings = (
+            *log.warnings,
+            *slowness(rate),
+            *leaps.warnings(),
+            *following.warnings(),
+            *_thinned(rate, reading.resample),
+        )
         if reading.resample is not None:
             rate = reading.resample
             samples = collected(resampled(samples, rate, progress=progress), width, buffer)

@@ -21,7 +21,7 @@ from linkwise_runtime.motion.tracer import Tracer, TraceState
 
 from linkwise.analysis.asked_trace import AskedTrace
 from linkwise.analysis.contacts.ground import Standing
-from linkwise.analysis.induced_sources import opened, timed
+from linkwise.analysis.induced_sources import opened, refuse_tensors, timed
 from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.measured_torques import MeasuredTorques
 from linkwise.analysis.opened_robot import OpenedRobot
@@ -84,6 +84,7 @@ class TracedRows:
         measured: MeasuredTorques | None,
     ) -> "TracedRows":
         """Return the rows of a robot's trace; samples have the inputs that it depends on, if any."""
+        refuse_tensors(robot, "a --trace is")
         ties = None if robot.constrained is None else robot.constrained.constraints
         contacts = () if robot.contacts is None else robot.contacts.names
         given = [f"{LOAD}{BETWEEN}{borne.name}" for borne in loads]
@@ -147,8 +148,7 @@ class TracedRows:
         if len(found) > MOST:
             raise LinkwiseError(
                 f"--trace: {len(self.asked.joints)} joints, {len(every)} sources in windows of"
-                " time come to {len(found):,} columns; name fewer joints, or"
-                " give a greater --trace-windows"
+                f" time come to {len(found):,} columns; name fewer joints, or give a greater --trace-windows"
             )
         return found
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from linkwise_runtime.motion.trace_equations import RESIDUAL
+from linkwise_runtime.motion.trace_equations import BETWEEN, RESIDUAL
 
 from linkwise.analysis import Analysis
 from linkwise.analysis.choices import AnalysisChoices
@@ -97,11 +97,13 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
 
 def _of_residual(analysis: Analysis) -> list[str]:
     """Return a line on how much of traced velocities measured torques leave."""
-    if analysis.traced is None or not analysis.traced["measured"]:
+    if analysis.traced is None:
         return []
     robot, peak = analysis.robot, analysis.totals.peak
     names = analysis.rows.axes["origin"].names
-    left = [o for o, name in enumerate(names) if name.partition(" ")[0] == RESIDUAL]
+    left = [o for o, name in enumerate(names) if name.partition(" ")[0].partition(BETWEEN)[0] == RESIDUAL]
+    if not left:
+        return []
     told = []
     for name in analysis.traced["joints"]:
         i = robot.joints.index(name)
@@ -109,7 +111,12 @@ def _of_residual(analysis: Analysis) -> list[str]:
         whole = float(peak[analysis.rows.numbers("qd", joint=i)].max())
         left_over = f"{parts.max(initial=0.0):.3g} {robot.units[i]}/s"
         told.append(f"{left_over} of {name} (which reaches {whole:.3g})")
-    return [f"residual, what measured torques leave, gives up to {listed(told)}"]
+    what = (
+        "measured torques leave"
+        if analysis.traced["measured"]
+        else "motion asks of joints that nothing drives"
+    )
+    return [f"residual, what {what}, gives up to {listed(told)}"]
 
 
 def _of_contacts(analysis: Analysis) -> list[str]:

@@ -100,7 +100,8 @@ class DrivenAgain:
         else:
             given, left = times(unit, forces[..., : len(own)].sum(-1)), 0.0 * q
         kind, _, joint = source.partition(BETWEEN)
-        there = [float(kind == TORQUE and joint == name) for name in equations.backend.structure.joint_names]
+        driven = kind in (TORQUE, RESIDUAL)
+        there = [float(driven and joint == name) for name in equations.backend.structure.joint_names]
         part = given * equations.backend.constant(there, q) + left * float(source == RESIDUAL)
         return cls(read, source, parts, namespace(q).stack([given + left, part], -1))
 
@@ -121,7 +122,9 @@ class DrivenAgain:
         pulls = [-pull for pull in self.read.loads.torques(backend, q, vectors)]
         loads = namespace(q).stack(pulls, -1) if pulls else q[..., None][..., :0]
         columns = equations.forces(backend, q, qd, backend.answers.coefficients(q, qd)[2], loads)
-        first = next(k for k, name in enumerate(sources) if name.partition(BETWEEN)[0] != TORQUE)
+        first = next(
+            k for k, name in enumerate(sources) if name.partition(BETWEEN)[0] not in (TORQUE, RESIDUAL)
+        )
         return columns[..., sources.index(self.source) - first]
 
     def loads(self, t: float, q: Numbers, qd: Numbers) -> list[list[AppliedLoad]]:

@@ -81,6 +81,24 @@ def joints_behind(tree: JointTree, n: int) -> Mask:
     return np.array([[i != k and all(i in c for c in own[k]) for k in range(n)] for i in range(n)], bool)
 
 
+def fed_by_couplings(tree: JointTree, n: int) -> list[int]:
+    """Return the coordinates whose flow contains what couplings feed in behind them.
+
+    A coordinate that moves several joints couples these; it feeds in where some of them, and not all, are
+    behind the first joint of a coordinate, with a link between.
+    """
+    carried, of = {link.joint for link in tree.links}, [joint.coordinate for joint in tree.joints]
+    found = []
+    for i in range(n):
+        chains = [tree.chain(f) for f in range(len(of))]
+        first = of.index(i)
+        between = [chain[chain.index(first) : -1] if first in chain else () for chain in chains]
+        behind = [bool(carried & {*some}) for some in between]
+        parts = ({there for k, there in zip(of, behind, strict=True) if k == own} for own in range(n))
+        found += [i] if any(len(part) == 2 for part in parts) else []
+    return found
+
+
 def links_behind(structure: Structure) -> Mask:
     """Return which links are behind a coordinate, (n, N)."""
     return np.array([[i in path for path in structure.paths] for i in range(structure.n)], bool)

@@ -25,7 +25,10 @@ from .between_samples import SampledMotion
 from .collocation import LinearEquations
 
 TORQUE, SHARE, LOAD, RESIDUAL, START = "torque", "share", "load", "residual", "start"
-"""Kinds of sources, which the names of sources begin with."""
+"""Kinds of sources, which the names of sources begin with.
+
+The residual is what motion needs and given torques leave, or what it needs of a joint that nothing drives.
+"""
 BETWEEN = ":"
 """Sign between the kind of a source and the name of its joint, link or load."""
 
@@ -93,14 +96,21 @@ class TraceEquations:
             for i in joints
         ]
         residual = [RESIDUAL] if self.torques_given else []
+        # What motion needs where nothing drives it, no actuator gave.
+        undriven = () if self.torques_given else [structure.joint_names[i] for i in self.loose]
         return (
-            *(f"{TORQUE}{BETWEEN}{joint}" for joint in joints),
+            *(f"{RESIDUAL if joint in undriven else TORQUE}{BETWEEN}{joint}" for joint in joints),
             *shares,
             *own,
             *self.given,
             *residual,
             START,
         )
+
+    @cached_property
+    def _own(self) -> tuple[int, ...]:
+        """Indices of the independent joints."""
+        return tuple(map(self.backend.structure.joint_names.index, self.coordinates))
 
     @cached_property
     def _passive(self) -> dict[str, list[int]]:
@@ -138,9 +148,8 @@ class TraceEquations:
             mass, forces = found.mT @ mass @ found, found.mT @ forces
             needed = times(found.mT, needed)
         tau = motion.given[..., 0] if self.torques_given else None
-        if tau is not None and self.is_borne:
-            tau = tau - g.sum(-1) * (1.0 - self._loose(backend, q))
-        columns = self._with_actuators(backend, place, needed, forces, tau)
+        borne = g.sum(-1) * (1.0 - self._loose(backend, q)) if self.is_borne else 0.0 * q
+        columns = self._with_actuators(backend, place, needed, forces, tau, borne)
         return TraceAt(qd, LinearEquations(mass, coriolis, columns), place)
 
     def at_instants(self, time: Numbers, q: Numbers) -> ArrayBackend:
@@ -192,17 +201,22 @@ class TraceEquations:
         needed: Numbers,
         forces: Numbers,
         tau: Numbers | None,
+        borne: Numbers,
     ) -> Numbers:
         """Return the forces (..., m, X) of all sources, with what the actuators give, and the start's zeros.
 
         needed: torques (..., m) that the motion needs of the actuators; tau: those (..., n) that they gave
+        borne: what of these holds the weight, (..., n); under constraints, the independent joints hold it
         """
         xp, start = namespace(forces), 0.0 * needed[..., None]
         if tau is None:
             own = backend.constant(np.eye(needed.shape[-1]), needed) * needed[..., None]
             return xp.concat([own, forces, start], -1)
-        own = backend.constant(np.eye(tau.shape[-1]), tau) * tau[..., None]
+        each = np.eye(tau.shape[-1])
+        own, held = backend.constant(each, tau) * tau[..., None], borne
         if place is not None:
-            own = place.found.map.mT @ own
+            own, held = place.found.map.mT @ own, times(place.found.map.mT, borne)
+            each = each[list(self._own)]
+        own = own - backend.constant(each, tau) * held[..., None]
         left = needed - own.sum(-1)
         return xp.concat([own, forces, left[..., None], start], -1)

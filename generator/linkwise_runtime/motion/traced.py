@@ -61,7 +61,7 @@ def read_trace(robot: DrivenRobot, asked: Traced) -> ReadTrace:
     named |= {} if asked.tau is None else {"tau": asked.tau}
     backend, numbers = robot.door.read(named, beside=loads.beside)
     motion = dict(zip(named, numbers[: len(named)], strict=True))
-    check_numbers(motion, robot.joint_names)
+    check_numbers(motion, robot.joint_names, loads.beside)
     times = _instants(asked.time, motion["q"])
     check_traceable(backend.structure)
     _check_parameters(backend, motion["q"])
@@ -198,13 +198,12 @@ def _window_begins(name: str, windows: object, times: Sequence[float]) -> object
     """Return the instants at which windows begin, where their length is given."""
     if isinstance(windows, bool) or not isinstance(windows, Real):
         return windows
-    length = float(windows)
-    if not np.isfinite(length):
-        raise ValueError(f"{name} is {short(windows)} s; give a length in s")
-    if not length >= min(np.diff(times)):
+    length, least, whole = float(windows), min(np.diff(times)), times[-1] - times[0]
+    # Steps are rounded as times are.
+    if not (1.0 - 1e-6) * least <= length <= (1.0 + 1e-6) * whole:
         raise ValueError(
-            f"{name} is {short(windows)} s; give a length of at least a step between samples, "
-            f"{min(np.diff(times)):.4g} s, or the instants at which sources are cut"
+            f"{name} is {short(windows)} s; give a length from a step between samples, {least:.4g} s, to "
+            f"all of the motion, {whole:.4g} s"
         )
     # One that begins next to the last sample has no step.
     last = times[-1] - 0.5 * (times[-1] - times[-2])

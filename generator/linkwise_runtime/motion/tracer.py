@@ -10,13 +10,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..interface import Numbers, namespace
+from ..interface import Numbers, array_of, namespace
 from .between_samples import SampledMotion
 from .collocation import STAGES, B, linear_steps
 from .trace_equations import TraceAt, TraceEquations
 
 AT_ONCE = 1 << 22
 """Numbers of the steps that are computed at once."""
+LEAP = 1.0
+"""Largest distance, in rad or m, between where a step leads and where the velocities at its ends do."""
 
 
 class TraceParts(NamedTuple):
@@ -102,6 +104,7 @@ class Tracer:
         xp, at = namespace(motion.q), equations.at(motion, True)
         acting = equations.backend.weights("windows", self.parts.acting(first, len(motion.time)), motion.q)
         wide = acting.reshape(*acting.shape, *[1] * motion.q.ndim)
+        _refuse_leaps(motion, at.qd, equations.backend.structure.joint_names)
         begin = begin or self._start(at, wide[0])
         stages = [equations.at(motion.within_steps(part), False).equations for part in STAGES]
         lengths = motion.lengths.reshape(-1, *[1] * (motion.q.ndim - 2))
@@ -137,6 +140,23 @@ class Tracer:
         power = (wide * w * equations.forces[:, None]).sum(-2)
         velocity, energy, power, work = (xp.moveaxis(a, 1, -1) for a in (velocity, energy, power, work))
         return TraceBlock(motion.time, velocity, energy, power, work, equations.coriolis)
+
+
+def _refuse_leaps(motion: SampledMotion, qd: Numbers, joints: Sequence[str]) -> None:
+    """Raise ValueError for positions that go elsewhere than the velocities say.
+
+    Such are angles that are wrapped at a turn, another unit of time, and loops that close the other way.
+    """
+    q, speed, lengths = (array_of(a) for a in (motion.q, qd, motion.lengths))
+    steps = lengths.reshape(-1, *[1] * (q.ndim - 1))
+    gone, told = np.diff(q, axis=0), 0.5 * steps * (speed[:-1] + speed[1:])
+    leaps = np.argwhere(np.abs(gone - told) > LEAP)
+    if len(leaps):
+        at = tuple(leaps[0])
+        raise ValueError(
+            f"q of {joints[at[-1]]!r} goes by {gone[at]:.3g} in the step at sample {at[0]}, where its "
+            f"velocities lead by {told[at]:.3g}: unwrap angles, give time in s, close loops one way"
+        )
 
 
 def _timed(text: str, time: Numbers) -> str:

@@ -253,6 +253,7 @@ def _sourced(result: AnalysisResult, shown: SourcedPanels, pieces: int | None) -
                 "kind": source.kind,
                 "label": printable(source.label),
                 "at": source.number,
+                "window": source.window,
                 "points": {"values": encoded(found.values)}
                 if pieces is None
                 else point_data(result, found, pieces),

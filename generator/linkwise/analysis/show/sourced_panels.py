@@ -45,7 +45,7 @@ class SourceCurve:
     rows: tuple[Index, ...]
     """Rows of the result that the curve sums up, for each panel."""
     window: int = 0
-    """Index of the window of time in which the source acted; each has dashes of its own."""
+    """Index of the window of time in which the source acted; each has dashes of its own, or is fainter."""
 
     def values(self, part: AnalysisResult) -> Array:
         """Return the curve in each panel, (panels, S)."""
@@ -67,8 +67,10 @@ class SourceCurve:
             case "named" if self.number:  # the first is grey
                 shade = colour(joints + loads + self.number - 1)
                 return {"color": shade, "linewidth": 1.4, "linestyle": "solid"}
-        style = STYLES.get(self.kind, dash(self.window * len(COLOURS)))
-        return {"color": GRAVITY, "linewidth": 1.4, "linestyle": style}
+        if self.kind in STYLES:  # whose dashes say the kind
+            faint = max(0.3, 1.0 - 0.25 * self.window)
+            return {"color": GRAVITY, "linewidth": 1.4, "linestyle": STYLES[self.kind], "alpha": faint}
+        return {"color": GRAVITY, "linewidth": 1.4, "linestyle": dash(self.window * len(COLOURS))}
 
 
 @dataclass(frozen=True, eq=False)

@@ -81,7 +81,9 @@ def _named(result: AnalysisResult, source: str, rows: tuple[Index, ...]) -> Sour
         return SourceCurve("contact", f"ground at {rest}", 0, rows)
     if source == START:
         return SourceCurve("start", "motion at the start", 0, rows)
-    if source == RESIDUAL:
-        return SourceCurve("named", "what measured torques leave", max(1, len(robot.share_names)), rows)
+    if kind == RESIDUAL:
+        own = robot.joints.index(rest) + 1 if rest else 0
+        label = f"residual of {robot.plot_joints[own - 1]}" if rest else "what measured torques leave"
+        return SourceCurve("named", label, max(1, len(robot.share_names)) + own, rows)
     name = rest if kind == SHARE else source
     return SourceCurve("named", name, list(robot.share_names).index(name), rows)
