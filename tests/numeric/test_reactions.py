@@ -34,6 +34,33 @@ REAL_ROBOTS = {
 }
 
 
+COMPILED = ("panda", "bolt")
+"""Robots whose C answers too: mimic joints, and a floating base."""
+
+
+def two_arms() -> str:
+    """URDF of a slide that carries two arms with hinges of their own, and of a slide beside them."""
+    lines = ['<robot name="two_arms"><link name="ground"/>']
+    for number, (parent, child, kind, axis) in enumerate(
+        (
+            ("ground", "cart", "prismatic", "0.6 0.8 0"),
+            ("cart", "left", "continuous", "0 0.6 0.8"),
+            ("left", "left_hand", "prismatic", "1 0 0"),
+            ("cart", "right", "continuous", "1 0 0"),
+            ("right", "right_hand", "continuous", "0 0 1"),
+            ("cart", "lift", "prismatic", "0 0 1"),
+        )
+    ):
+        limit = '<limit lower="-9" upper="9" effort="1" velocity="1"/>' if kind == "prismatic" else ""
+        lines.append(
+            f'<link name="{child}"><inertial><origin xyz="0.1 -0.0{number} 0.2"/><mass value="{number + 1}"/>'
+            '<inertia ixx="0.2" iyy="0.3" izz="0.25" ixy="0.01" ixz="-0.02" iyz="0.03"/></inertial></link>'
+            f'<joint name="to_{child}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+            f'<origin xyz="0.3 0.{number} -0.2" rpy="0.{number} 0.2 0"/><axis xyz="{axis}"/>{limit}</joint>'
+        )
+    return "\n".join([*lines, "</robot>"])
+
+
 class JointForces(PinocchioModel):
     """Forces that Pinocchio's joints exert on what hangs on them."""
 
@@ -54,13 +81,28 @@ class JointForces(PinocchioModel):
         return np.array(found)
 
 
-@pytest.mark.parametrize("name", REAL_ROBOTS)
-def test_each_share_is_what_pinocchios_joints_bear_of_that_cause_alone(name: str, tmp_path: Path) -> None:
-    base = REAL_ROBOTS[name]
-    path = next(ROBOTS.rglob(f"{name}.urdf"))
+@pytest.mark.parametrize(
+    ("name", "backend"),
+    [*((name, "numpy") for name in REAL_ROBOTS), *((name, "native") for name in COMPILED)],
+)
+def test_each_share_is_what_pinocchios_joints_bear_of_that_cause_alone(
+    name: str, backend: str, tmp_path: Path
+) -> None:
+    compare_with_pinocchio(next(ROBOTS.rglob(f"{name}.urdf")), REAL_ROBOTS[name], backend, tmp_path)
+
+
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+def test_a_slide_bears_each_share_of_arms_with_hinges_of_their_own(backend: str, tmp_path: Path) -> None:
+    path = tmp_path / "two_arms.urdf"
+    path.write_text(two_arms(), encoding="utf-8")
+    compare_with_pinocchio(path, "", backend, tmp_path)
+
+
+def compare_with_pinocchio(path: Path, base: str, backend: str, folder: Path) -> None:
+    """Compare each share, by link, cause and order, with Pinocchio's joint forces."""
     system = read_system(path, Options(base=base) if base else Options())
-    write_package(generate(system, ["numpy"], "robot", kernel="loops"), tmp_path / "robot")
-    robot = import_package(tmp_path / "robot").load("numpy")
+    write_package(generate(system, [backend], "robot", kernel="loops"), folder / "robot")
+    robot = import_package(folder / "robot").load(backend)
     pinocchio = JointForces(path, system, base == "floating")
     q, qd, qdd = np.random.default_rng(3).uniform(-1.0, 1.0, (3, robot.n))
     found = robot.reactions(q, qd, qdd, axes="world", constraints=False)

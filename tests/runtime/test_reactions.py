@@ -129,6 +129,44 @@ def test_samples_and_chosen_joints_are_parts_of_the_whole(backend: str, package_
         np.testing.assert_allclose(single, share[1, 2], rtol=0, atol=1e-12)
 
 
+@needs_compiler
+@pytest.mark.parametrize(("name", "parameters"), [(CRANE, {}), (LEG, {}), ("planar3 symbolic", {"m_2": 2.0})])
+def test_c_answers_as_the_rule_does_in_both_number_types(
+    name: str, parameters: dict[str, float], package_of: Packages
+) -> None:
+    package = package_of(name)
+    c, rule = (package.load(backend, parameters=parameters) for backend in ("native", "numpy"))
+    exact = rule.reactions(*motion_of(rule, 19))
+    for kind, largest in ((np.float64, 1e-12), (np.float32, 1e-4)):
+        motion = [a.astype(kind) for a in motion_of(rule, 19)]
+        of_arrays, of_tensors = c.reactions(*motion), c.reactions(*map(torch.from_numpy, motion))
+        single = c.reactions(*(a[3] for a in motion))
+        for share, tensor, one, expected in zip(of_arrays, of_tensors, single, exact, strict=True):
+            scale = max(1.0, np.abs(expected).max(initial=0.0))
+            np.testing.assert_allclose(share, expected, rtol=0, atol=largest * scale)
+            np.testing.assert_allclose(tensor.numpy(), share, rtol=0, atol=largest * scale)
+            np.testing.assert_allclose(one, expected[3], rtol=0, atol=largest * scale)
+            assert share.dtype == one.dtype == kind
+
+
+@needs_compiler
+def test_c_leaves_what_needs_a_gradient_or_has_ties_to_the_rule(package_of: Packages) -> None:
+    puma, delta = package_of("puma560"), package_of(DELTA)
+    slopes = []
+    for backend in ("torch", "native"):
+        motion = [a.requires_grad_() for a in motion_of(puma.load("torch"), 2)]
+        puma.load(backend).reactions(*motion, joints=1).total.square().sum().backward()
+        slopes.append([a.grad for a in motion])
+    for own, other in zip(*slopes, strict=True):
+        torch.testing.assert_close(own, other, rtol=1e-12, atol=1e-10)
+    tied = [
+        delta.load(backend).reactions(*motion_of(delta.load("numpy")), constraints=False)
+        for backend in ("numpy", "native")
+    ]
+    for share, other in zip(*tied, strict=True):
+        np.testing.assert_allclose(share, other, rtol=0, atol=1e-12)
+
+
 def test_gradients_flow_through_motion_loads_and_points(package_of: Packages) -> None:
     package = package_of(DELTA)
     robot = package.load("torch")

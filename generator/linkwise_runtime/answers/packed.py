@@ -87,6 +87,10 @@ class PackedBackend(Library):
         """Return the rows of 10 of c2, c1 and g, flat: (..., 10 count) each."""
         raise NotImplementedError
 
+    def product(self, a: Numbers, b: Numbers) -> Numbers:
+        """Return the matrix products (..., l, n) of arrays (..., l, m) and (..., m, n)."""
+        return a @ b
+
     def read_beside_motion(self) -> Iterable[object]:
         """Return the arrays or tensors, beside the motion, that results depend on."""
         raise NotImplementedError

@@ -21,6 +21,7 @@ from ..answers.packed import PackedBackend, TorqueOfOne
 from ..arguments import NOTHING, Beside, as_array, shape_of
 from ..interface import ClosedForms, Numbers
 from ..kinematics.frame_answers import FrameAnswers
+from ..kinematics.link_wrenches import CauseWrenches
 from ..kinematics.wrench_answers import WrenchAnswers
 from ..rule.calls import RigidRule
 from ..rule.joint_tree import Bodies, JointTree
@@ -127,6 +128,13 @@ class ArrayBackend(PackedBackend):
     def wrenches(self) -> WrenchAnswers:
         """Answers of the wrenches that joints bear, for motion that has been read; raises as `frames`."""
         return WrenchAnswers(self.frames)
+
+    def link_wrenches(self, q: Numbers, qd: Numbers) -> CauseWrenches:
+        """Return the wrenches of links by cause, (..., N, X, 6), before they are moved to any joint.
+
+        Raises as `frames`.
+        """
+        return self.wrenches.of_links(q, qd)
 
     def read(
         self, named: Mapping[str, object], n: int, beside: Mapping[str, Beside] = NOTHING

@@ -100,7 +100,7 @@ class TieRows:
     def on_joints(self, asked: JointsAsked, q: Numbers, point: Numbers | None) -> Numbers:
         """Return the wrenches of joints by unit forces of the rows of ties and contacts, (..., joints, C, 6).
 
-        point: (..., 3), as for `WrenchAnswers.by_cause`
+        point: (..., 3), as for `WrenchAnswers.at_joints`
         """
         return self._borne.on_joints(asked, q, point)
 
@@ -147,8 +147,7 @@ class BorneRows:
         others = [0 if one.second is None else one.second for one in self._held]
         apart = np.array([[float(one.second is not None)] for one in self._held])
         second = carried_frames(tree, asked.joints, others) * apart
-        tables = joint_tables(tree, self._frames.backend.structure.n, asked)
-        return BorneTies(tables, self._constants, first[:, rows], second[:, rows])
+        return BorneTies(joint_tables(tree, asked), self._constants, first[:, rows], second[:, rows])
 
 
 class RowsAt:

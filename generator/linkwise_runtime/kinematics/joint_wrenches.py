@@ -1,11 +1,8 @@
-"""Wrenches of links by cause, and of forces on frames, as joints carry them; arrays have samples innermost.
+"""Wrenches of links, and of forces on frames, as joints carry them; arrays have samples innermost.
 
-The wrench (N, f) of link j is that of the rule for rigid links before any axis projects it (`rule.rigid`).
-It is the same for every joint f on the path of j, but for the point x about which moments are taken:
-
-    N_x = N - (x - o) x f        f_x = f
-
-A joint also carries what acts on frames behind it: a wrench (M, F) there takes (-M, -F) off the joint.
+Wrenches (N, f) of links are those of `link_wrenches`, and joints carry them about points and in axes of
+their own. A joint also carries what acts on frames behind it: a wrench (M, F) there takes (-M, -F) off the
+joint.
 """
 
 from typing import NamedTuple
@@ -21,21 +18,13 @@ from ..rule.kinematics import (
     extend_xy,
     gather,
     kinematic_tables,
+    places_from_world,
     poses,
     product,
-    twists,
 )
-from ..rule.rigid import (
-    LinkMoments,
-    LinkTables,
-    inertial_wrench,
-    link_numbers,
-    link_states,
-    turning,
-)
-from ..rule.tables import moving_links
 from ..rule.tree_arrays import TreeArrays
-from .frame_arrays import by_coordinate, coordinate_columns, rotate_vectors
+from .frame_arrays import rotate_vectors
+from .link_wrenches import shift_matrices
 
 WORLD = -1
 """Frame whose axes are the world's."""
@@ -55,17 +44,12 @@ class JointTables(NamedTuple):
 
     frames: KinematicTables
     """Tables of all joints."""
-    from_world: KinematicTables
-    """Tables with places counted from the world's origin instead of the first hinge of a path."""
-    links: LinkTables
-    columns: tuple[Numbers, ...]
-    """Joints of each coordinate, see `FrameTables`."""
-    paths: Numbers
-    """(N, frames, 1): ones where a joint moves a link."""
     joints: Numbers
     """Indices of the joints that are asked for."""
-    carried: Numbers
-    """(joints, N, 1, 1): ones where a joint carries a link."""
+    hinged: Numbers
+    """Index of a joint for each point from which links count places: the first hinges of their paths."""
+    shifts: Numbers
+    """(joints N,): index in (joints, hinged) for each joint and link, behind them where it carries none."""
     unhinged: Numbers
     """(joints, 1, 1): ones for joints without a hinge on their path, themselves included."""
     carriers: Numbers
@@ -81,11 +65,18 @@ class JointTables(NamedTuple):
         return len(self.frames.parents)
 
 
-def joint_tables(tree: JointTree, n: int, asked: JointsAsked) -> JointTables:
+def joint_tables(tree: JointTree, asked: JointsAsked) -> JointTables:
     """Return the tables, in float64."""
-    frames, joints, ground = kinematic_tables(tree), asked.joints, len(tree.joints)
+    joints, ground = asked.joints, len(tree.joints)
     paths = [tree.chain(link.joint) for link in tree.links]
-    hinges = [joint.kind == "revolute" for joint in tree.joints]
+    hinges = [[e for e in tree.chain(f) if tree.joints[e].kind == "revolute"] for f in range(ground)]
+    first = [(hinges[link.joint] or [link.joint])[0] for link in tree.links]
+    every = sorted(set(first))
+    shifts = [
+        at * len(every) + every.index(hinge) if f in path else len(joints) * len(every)
+        for at, f in enumerate(joints)
+        for hinge, path in zip(first, paths, strict=True)
+    ]
     carriers, rotation, origin = list(joints), np.eye(3), None
     if asked.frame is not None:
         carriers = [ground] * len(joints)
@@ -94,14 +85,11 @@ def joint_tables(tree: JointTree, n: int, asked: JointsAsked) -> JointTables:
             carriers = [ground if frame.joint is None else frame.joint] * len(joints)
             rotation, origin = np.array(frame.rotation), np.array([asked.frame])
     return JointTables(
-        frames,
-        frames._replace(behind=np.ones_like(frames.behind)),
-        moving_links(tree),
-        tuple(coordinate_columns([joint.coordinate for joint in tree.joints], n)),
-        np.array([[float(f in path) for f in range(ground + 1)] for path in paths])[..., None],
+        kinematic_tables(tree),
         np.array(joints, dtype=np.intp),
-        np.array([[float(f in path) for path in paths] for f in joints])[..., None, None],
-        np.array([float(not any(hinges[e] for e in tree.chain(f))) for f in joints])[:, None, None],
+        np.array(every, dtype=np.intp),
+        np.array(shifts, dtype=np.intp),
+        np.array([float(not hinges[f]) for f in joints])[:, None, None],
         np.array(carriers, dtype=np.intp),
         rotation[:, :, None, None],
         origin,
@@ -132,7 +120,7 @@ def placed_joints(
     """
     position = gather(q, tables.frames.coordinates)
     found = poses(xp, tables.frames, numbers.translations, position)
-    whole = poses(xp, tables.from_world, numbers.translations, position).places
+    whole = places_from_world(tables.frames, numbers.translations, position, found.axes)
     turned = gather(found.axes, tables.carriers)
     axes, origins = product(turned, tables.rotations), gather(whole, tables.joints)
     if point is None:
@@ -143,46 +131,21 @@ def placed_joints(
     return PlacedJoints(found, whole, origins + offsets, offsets, axes)
 
 
-class CauseWrenches(NamedTuple):
-    """Wrenches of links by cause, about the first hinge of each path, in the base's axes."""
+def shifts_to_joints(xp: Namespace, tables: JointTables, placed: PlacedJoints) -> Numbers:
+    """Return matrices by which wrenches of links become those of joints, (joints hinged + 1, 6, 6, samples).
 
-    acceleration: Numbers
-    """Wrenches per acceleration of coordinate k, (6, N, n, samples)."""
-    velocity: Numbers
-    """Wrenches per velocity of coordinate k, in the closing convention, (6, N, n, samples)."""
-    gravity: Numbers
-    """Wrenches of weights, (6, N, 1, samples)."""
-
-
-def cause_wrenches(
-    xp: Namespace, tables: JointTables, numbers: TreeArrays, placed: PlacedJoints, qd: Numbers
-) -> CauseWrenches:
-    """Return the wrenches of the links at qd (n, samples)."""
-    velocity = gather(qd, tables.frames.coordinates)
-    moved = twists(xp, tables.frames, placed.poses, numbers.gravity, velocity, 0.0 * velocity)
-    own = link_numbers(xp, tables.links.eye, *numbers.bodies)
-    states = link_states(xp, tables.links, own, placed.poses, moved, numbers.gravity)
-    # Links before joints: (..., N, frames, samples).
-    link = LinkMoments(*(a[..., None, :] for a in states.moments))
-    (z, s), (zd, sd) = ((a[:, 0, None], a[:, 1, None]) for a in (moved.screws, moved.rates))
-    both = (
-        inertial_wrench(xp, link, z, s),
-        inertial_wrench(xp, link, zd, sd) + turning(xp, link, z),
-    )
-    c2, c1 = (by_coordinate(tables, tables.paths * wrench) for wrench in both)
-    return CauseWrenches(c2, c1, states.wrenches[:, 1, :, None])
-
-
-def at_joints(xp: Namespace, tables: JointTables, placed: PlacedJoints, wrenches: Numbers) -> Numbers:
-    """Return wrenches (6, N, X, samples) of links as the joints carry them, (joints, N, X, 6, samples)."""
-    places, whole, carriers = placed.poses.places, placed.from_world, tables.links.joints
+    The last one is zero, for links that a joint does not carry.
+    """
+    places, whole = placed.poses.places, placed.from_world
     own = gather(places, tables.joints)[:, :, None]
     # Places count from the first hinge of a path: for joints before it, from where the link's path has it.
-    hinges = gather(whole, carriers) - gather(places, carriers)
+    hinges = gather(whole, tables.hinged) - gather(places, tables.hinged)
     before = gather(whole, tables.joints)[:, :, None] - hinges[:, None]
     arms = own + tables.unhinged * (before - own) + placed.offsets[:, :, None]
-    moved = moved_to(xp, arms[:, :, :, None], wrenches[:, None])
-    return in_axes(xp, placed.axes, tables.carried * moved)
+    axes = xp.broadcast_to(placed.axes[:, :, :, None], (3, *arms.shape))
+    flat = (a.reshape(*a.shape[:-3], a.shape[-3] * a.shape[-2], a.shape[-1]) for a in (axes, arms))
+    found = shift_matrices(xp, *flat)
+    return xp.concat([found, xp.zeros_like(found[:1])], 0)
 
 
 def on_frames(

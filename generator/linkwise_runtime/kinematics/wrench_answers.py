@@ -7,17 +7,18 @@ import numpy as np
 
 from ..interface import Numbers
 from ..rule.joint_tree import JointTree
-from .frame_answers import NONE, FrameAnswers, FrameRequest, Vectors, in_pieces
+from ..rule.kinematics import gather
+from .frame_answers import LINKS, NONE, FrameAnswers, FrameRequest, Vectors, in_pieces
 from .frame_arrays import FrameTables, forward_kinematics, frame_tables, rotate_vectors
 from .joint_wrenches import (
     JointsAsked,
     JointTables,
-    at_joints,
-    cause_wrenches,
     joint_tables,
     on_frames,
     placed_joints,
+    shifts_to_joints,
 )
+from .link_wrenches import CauseTables, CauseWrenches, cause_tables, cause_wrenches, shifts_to_hinges
 
 POINT = "point"
 """Name of the point about which moments are taken, among the vectors beside the motion."""
@@ -62,32 +63,48 @@ class WrenchAnswers:
     """Wrenches of joints; tables are made when first needed, for each dtype and device."""
 
     def __init__(self, frames: FrameAnswers) -> None:
-        self.frames, self.tree, self._n = frames, frames.tree, frames.backend.structure.n
+        self.frames, self.tree = frames, frames.tree
         self._tables: dict[object, JointTables] = {}
         self._loads = LoadedWrenches(self)
+        self._links = WrenchesOfLinks(self)
 
-    def by_cause(
-        self, asked: JointsAsked, q: Numbers, qd: Numbers, point: Numbers | None
-    ) -> tuple[Numbers, Numbers, Numbers]:
-        """Return wrenches of links per acceleration, per velocity, and of gravity, (..., joints, N, X, 6).
+    def of_links(self, q: Numbers, qd: Numbers) -> CauseWrenches:
+        """Return the wrenches of links by cause, about the first hinges of their paths, (..., N, X, 6).
 
-        X counts coordinates, and is 1 for gravity; velocities are those of the closing convention.
-
-        q, qd: (..., n); point: (..., 3), about which moments are taken, in the axes of the answer
+        q, qd: (..., n)
         """
-        n = self._n
-        shape = (len(asked.joints), len(self.tree.links), 2 * n + 1, 6)
+        return self._links.answer(q, qd)
+
+    def of_packed(self, q: Numbers, packed: Sequence[Numbers]) -> CauseWrenches:
+        """Return the answer of `of_links` from the wrenches that C has, about the joints that move the links.
+
+        packed: per acceleration and per velocity, (..., count, 6) in the order of `Layout.torque`, and of
+        weights (..., N, 6)
+        """
+        return self._links.of_packed(q, packed)
+
+    def at_joints(
+        self, asked: JointsAsked, q: Numbers, point: Numbers | None, wrenches: Sequence[Numbers]
+    ) -> list[Numbers]:
+        """Return wrenches of links (..., N, X, 6), as `of_links` has them, as joints carry them.
+
+        (..., joints, N, X, 6) each
+
+        q: (..., n); point: (..., 3), about which moments are taken, in the axes of the answer
+        """
 
         def answer(at: FrameRequest[JointTables]) -> Numbers:
             placed = placed_joints(at.xp, at.tables, at.numbers, at.motion[0], at.vectors.get(POINT))
-            found = cause_wrenches(at.xp, at.tables, at.numbers, placed, at.motion[1])
-            return at_joints(at.xp, at.tables, placed, at.xp.concat(found, 2))
+            return shifts_to_joints(at.xp, at.tables, placed)
 
         vectors = NONE if point is None else {POINT: point}
-        request = self.frames.asked(self._tables, asked, self._listed, [q, qd], vectors)
-        flat = in_pieces(self.frames.backend, [q, qd], request, answer, int(np.prod(shape)))
-        whole = flat.reshape(*q.shape[:-1], *shape)
-        return whole[..., :n, :], whole[..., n : 2 * n, :], whole[..., 2 * n :, :]
+        request = self.frames.asked(self._tables, asked, self._listed, [q], vectors)
+        count, links = len(asked.joints), len(self.tree.links)
+        each = count * len(request.tables.hinged) + 1
+        flat = in_pieces(self.frames.backend, [q], request, answer, 36 * each)
+        found = gather(flat.reshape(*q.shape[:-1], each, 6, 6), request.tables.shifts, -3)
+        shifts = found.reshape(*q.shape[:-1], count, links, 6, 6)
+        return [self.frames.backend.product(wrench[..., None, :, :, :], shifts) for wrench in wrenches]
 
     def of_loads(
         self,
@@ -105,7 +122,52 @@ class WrenchAnswers:
 
     def _listed(self, asked: object) -> JointTables:
         assert isinstance(asked, JointsAsked)
-        return joint_tables(self.tree, self._n, asked)
+        return joint_tables(self.tree, asked)
+
+
+class WrenchesOfLinks:
+    """Wrenches of links by cause, which are the same for all joints that carry a link."""
+
+    def __init__(self, owner: WrenchAnswers) -> None:
+        self._frames, self._structure = owner.frames, owner.frames.backend.structure
+        self._tables: dict[object, CauseTables] = {}
+
+    def answer(self, q: Numbers, qd: Numbers) -> CauseWrenches:
+        """Return the answer of `WrenchAnswers.of_links`."""
+        n, links = self._structure.n, self._structure.N
+
+        def answer(at: FrameRequest[CauseTables]) -> Numbers:
+            found = at.xp.concat(cause_wrenches(at.xp, at.tables, at.numbers, *at.motion), 2)
+            # (6, N, X, samples) -> (N X, 6, samples)
+            return at.xp.swapaxes(found.reshape(6, links * (2 * n + 1), found.shape[3]), 0, 1)
+
+        request = self._frames.asked(self._tables, LINKS, self._listed, [q, qd])
+        shape = (links, 2 * n + 1, 6)
+        flat = in_pieces(self._frames.backend, [q, qd], request, answer, int(np.prod(shape)))
+        whole = flat.reshape(*q.shape[:-1], *shape)
+        return CauseWrenches(whole[..., :n, :], whole[..., n : 2 * n, :], whole[..., 2 * n :, :])
+
+    def of_packed(self, q: Numbers, packed: Sequence[Numbers]) -> CauseWrenches:
+        """Return the answer of `WrenchAnswers.of_packed`."""
+        xp, (c2, c1, g), links = self._frames.backend.xp, packed, self._structure.N
+
+        def answer(at: FrameRequest[CauseTables]) -> Numbers:
+            return shifts_to_hinges(at.xp, at.tables, at.numbers, at.motion[0])
+
+        request = self._frames.asked(self._tables, LINKS, self._listed, [q])
+        flat = in_pieces(self._frames.backend, [q], request, answer, 36 * links)
+        shifts: Numbers = flat.reshape(*q.shape[:-1], links, 6, 6)
+
+        def spread(rows: Numbers) -> Numbers:
+            padded = xp.concat([rows, xp.zeros_like(rows[..., :1, :])], -2)
+            every = gather(padded, request.tables.packed, -2)
+            dense: Numbers = every.reshape(*q.shape[:-1], links, self._structure.n, 6)
+            return dense @ shifts
+
+        return CauseWrenches(spread(c2), spread(c1), g[..., None, :] @ shifts)
+
+    def _listed(self, part: object) -> CauseTables:
+        return cause_tables(self._frames.tree, self._structure.n, self._structure.layout.torque)
 
 
 class LoadedWrenches:
@@ -154,7 +216,7 @@ class LoadedWrenches:
         assert isinstance(part, LoadedJoints)
         tree, n = self._owner.tree, self._frames.backend.structure.n
         return LoadTables(
-            joint_tables(tree, n, part.joints),
+            joint_tables(tree, part.joints),
             frame_tables(tree, n, part.frames),
             carried_frames(tree, part.joints.joints, part.frames),
         )

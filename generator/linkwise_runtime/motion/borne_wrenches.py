@@ -68,15 +68,9 @@ def reactions(robot: DrivenRobot, given: Borne) -> Reactions[Any]:
     at = BorneMotion(backend, asked, point, q, qd, qdd)
     if constraints is not None:
         return _tied(at, constraints, loads, vectors, given.passive)
-    c2, c1, g = backend.wrenches.by_cause(asked, q, qd, point)
-    shares = (
-        c2 * qdd[..., None, None, :, None],
-        c1 * qd[..., None, None, :, None],
-        g[..., 0, :],
-        _of_loads(at, loads, vectors),
-        _none(at, (len(PASSIVE_KINDS), q.shape[-1])),
-    )
-    return Reactions(*map(side_by_side, shares))
+    c2, c1, g = backend.link_wrenches(q, qd)
+    moved = [c2 * qdd[..., None, :, None], c1 * qd[..., None, :, None], g]
+    return Reactions(*map(side_by_side, _of_tree(at, moved, loads, vectors)))
 
 
 def rigid_tree(robot: DrivenRobot) -> JointTree:
@@ -157,7 +151,7 @@ def _tied(
     qd = place.velocity(place.own(at.qd))
     qdd = place.velocity(place.own(at.qdd)) + place.bias(qd)
     at = at._replace(qd=qd, qdd=qdd)
-    tree = _of_tree(at, place, loads, vectors)
+    tree = _of_tree(at, _of_links(at, place), loads, vectors)
     torques = _torques(at, place, loads, vectors, passive)
     forces = tie_forces(place.found, namespace(at.q).concat(torques, -1))
     rows = constraints.ties.rows(at.backend)
@@ -174,18 +168,23 @@ def _tied(
 
 
 def _of_tree(
-    at: BorneMotion, place: ClosedPlace, loads: AppliedLoads, vectors: Sequence[Numbers]
+    at: BorneMotion, moved: Sequence[Numbers], loads: AppliedLoads, vectors: Sequence[Numbers]
 ) -> list[Numbers]:
-    """Return the shares of the tree by the motion of the independent joints, without forces of ties.
+    """Return the shares of the tree, from wrenches of links (..., N, X, 6), of weights the last."""
+    acceleration, velocity, gravity = at.backend.wrenches.at_joints(at.asked, at.q, at.point, moved)
+    passive = _none(at, (len(PASSIVE_KINDS), at.q.shape[-1]))
+    return [acceleration, velocity, gravity[..., 0, :], _of_loads(at, loads, vectors), passive]
+
+
+def _of_links(at: BorneMotion, place: ClosedPlace) -> list[Numbers]:
+    """Return the wrenches of links by the motion of the independent joints, (..., N, X, 6).
 
     With qd = G yd and qdd = G ydd + dG/dt yd: c2 G ydd and (c2 dG/dt + c1 G) yd.
     """
-    c2, c1, g = at.backend.wrenches.by_cause(at.asked, at.q, at.qd, at.point)
-    mapped, rate = (a[..., None, None, :, :] for a in (place.found.map, place.map_rate(at.qd)))
-    ydd, yd = (place.own(a)[..., None, None, None, :] for a in (at.qdd, at.qd))
-    acceleration, velocity = c2.mT @ mapped * ydd, (c2.mT @ rate + c1.mT @ mapped) * yd
-    passive = _none(at, (len(PASSIVE_KINDS), at.q.shape[-1]))
-    return [acceleration.mT, velocity.mT, g[..., 0, :], _of_loads(at, loads, vectors), passive]
+    c2, c1, g = at.backend.link_wrenches(at.q, at.qd)
+    mapped, rate = (a[..., None, :, :].mT for a in (place.found.map, place.map_rate(at.qd)))
+    ydd, yd = (place.own(a)[..., None, :, None] for a in (at.qdd, at.qd))
+    return [mapped @ c2 * ydd, (rate @ c2 + mapped @ c1) * yd, g]
 
 
 def _torques(

@@ -6,6 +6,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, cast
 
+import numpy as np
+
 from ..answers.answers import Answers
 from ..answers.packed import TorqueOfOne
 from ..arguments import NOTHING, Beside, as_given, has_tensors
@@ -15,12 +17,13 @@ from ..call_table import CALLS
 from ..control.frame_impedance import FrameTargets
 from ..control.joint_impedance import JointTargets
 from ..interface import ClosedForms, Numbers
+from ..kinematics.link_wrenches import CauseWrenches
 from ..rule.calls import RigidRule
 from ..structure import Structure
-from .calls import FUNCTIONS, NativeCalls, checked_threads
+from .calls import FUNCTIONS, LINK_WRENCHES, NativeCalls, checked_threads
 from .compiled_calls import QuickCalls
 from .control import ControlCalls, NativeTorque
-from .memory import NumberArray, NumberType
+from .memory import NumberArray, NumberType, memory
 
 if TYPE_CHECKING:
     from .operators import TorchSide
@@ -192,6 +195,18 @@ class NativeBackend(NumpyBackend):
     def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """Return c0 (..., count) in the order of `Layout.velocity`."""
         return self._run("packed_position_gradient", q, qd, qdd)[0]
+
+    def product(self, a: Numbers, b: Numbers) -> Numbers:
+        """Return the matrix products (..., l, n), in memory where large results lie one after another."""
+        batch = np.broadcast_shapes(a.shape[:-2], b.shape[:-2])
+        into = memory((*batch, a.shape[-2], b.shape[-1]), cast(NumberType, a.dtype))
+        return cast(Numbers, np.matmul(cast(NumberArray, a), cast(NumberArray, b), out=into))
+
+    def link_wrenches(self, q: Numbers, qd: Numbers) -> CauseWrenches:
+        """Return the wrenches of links by cause, (..., N, X, 6), by C where no ties hold the joints."""
+        if self.ties_joints:
+            return super().link_wrenches(q, qd)
+        return self.wrenches.of_packed(q, self._run(LINK_WRENCHES, q, qd))
 
     def _run(self, call: str, *motion: Numbers) -> Arrays:
         return self.calls.run(call, cast(Arrays, motion))

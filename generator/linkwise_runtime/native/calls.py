@@ -30,12 +30,15 @@ PER_THREAD = 1 << 20
 
 PACKED_GRADIENT = "packed_position_gradient"
 """Packed derivatives by position; no row of the call table, as no call of Python answers with them."""
+LINK_WRENCHES = "link_wrenches"
+"""Wrenches of links by cause, of which `reactions` are made; they too are no row."""
 FUNCTIONS = {key: row.c for key, row in CALLS.items() if row.c and not row.one} | {
-    PACKED_GRADIENT: "position_gradient"
+    PACKED_GRADIENT: "position_gradient",
+    LINK_WRENCHES: "reactions",
 }
 """Names in C of the calls for many samples."""
 
-AT_REST = ("coefficients", "coefficient_regressors")
+AT_REST = ("coefficients", "coefficient_regressors", LINK_WRENCHES)
 """Calls that take no qdd."""
 
 
@@ -80,7 +83,9 @@ class NativeCalls:
         self.structure, self.parameters = structure, dict(parameters)
         self.sources = loaded(structure, sources)
         self.threads_set, self._cores = threads, os.cpu_count() or 1
-        self.shapes = answer_shapes(structure) | {PACKED_GRADIENT: ((structure.sizes.c1,),)}
+        wrenches = (structure.sizes.tau, 6), (structure.sizes.tau, 6), (structure.N, 6)
+        beside = {PACKED_GRADIENT: ((structure.sizes.c1,),), LINK_WRENCHES: wrenches}
+        self.shapes = answer_shapes(structure) | beside
         self.sizes = {call: [math.prod(shape) for shape in shapes] for call, shapes in self.shapes.items()}
         self._complete = {call: all(sizes) for call, sizes in self.sizes.items()}
         self._widths = {call: sum(sizes) for call, sizes in self.sizes.items()}

@@ -67,7 +67,7 @@ def _library_of(call: str) -> str:
         return "control"
     if call.endswith("position_gradient"):
         return "gradient"
-    return "regressors" if "regressor" in call else "decomposition"
+    return "regressors" if "regressor" in call or call == "reactions" else "decomposition"
 
 
 def start_of(function: "CFunction") -> int:

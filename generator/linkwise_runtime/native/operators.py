@@ -18,9 +18,10 @@ from ..arguments import NOTHING, Beside, too_many_axes
 from ..arrays.torch_backend import TorchBackend
 from ..call_table import CALLS, QDD
 from ..interface import ClosedForms, Numbers
+from ..kinematics.link_wrenches import CauseWrenches
 from ..rule.calls import RigidRule
 from .build import Sources
-from .calls import FUNCTIONS, NativeCalls
+from .calls import FUNCTIONS, LINK_WRENCHES, NativeCalls
 from .compiled_calls import QuickCalls
 from .memory import NumberArray
 
@@ -129,6 +130,13 @@ class TorchSide(TorchBackend):
     def position_gradient(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Numbers:
         """Return c0 (..., count) in the order of `Layout.velocity`."""
         return self._run("position_gradient", q, qd, qdd)[0]
+
+    def link_wrenches(self, q: Numbers, qd: Numbers) -> CauseWrenches:
+        """Return the wrenches of links by cause, (..., N, X, 6), by C where torch need not record them."""
+        motion = cast("tuple[Tensor, Tensor]", (q, qd))
+        if self.ties_joints or self.needs_operators(motion):
+            return super().link_wrenches(q, qd)
+        return self.wrenches.of_packed(q, compute(self.run, LINK_WRENCHES, motion))
 
     def _run(self, call: str, *motion: Numbers) -> tuple[Tensor, ...]:
         q, qd, qdd = cast("tuple[Tensor, Tensor, Tensor]", motion)

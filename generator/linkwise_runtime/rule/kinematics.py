@@ -185,20 +185,39 @@ def poses(xp: Namespace, tables: KinematicTables, translations: Numbers, positio
     translations: of every frame in its parent's axes, (3, frames, samples); position: q of every frame's
     coordinate, (frames, samples)
     """
-    way, slopes = (position, None) if tables.curves is None else curve_displacement(tables.curves, position)
+    way, slopes = _way(tables, position)
     angle = tables.turns * way
     # Stacked, so that a compiler keeps them; else it computes them again for every entry of the axes.
     cosine, sine = xp.stack([xp.cos(angle), xp.sin(angle)], 0)
     axes = tables.still + tables.cosine * cosine + tables.sine * sine
     for parents in tables.steps:
         axes = product(gather(axes, parents), axes)
+    return Poses(axes, _summed(tables, tables.behind * _steps(tables, translations, way, axes)), slopes)
+
+
+def places_from_world(
+    tables: KinematicTables, translations: Numbers, position: Numbers, axes: Numbers
+) -> Numbers:
+    """Return the places of all frames from the world's origin, (3, frames, samples), in m.
+
+    axes: of the frames, as `poses` has them; the others are as there
+    """
+    return _summed(tables, _steps(tables, translations, _way(tables, position)[0], axes))
+
+
+def _way(tables: KinematicTables, position: Numbers) -> tuple[Numbers, Slopes | None]:
+    """Return what each joint's ratio multiplies, and its slopes where joints follow curves."""
+    return (position, None) if tables.curves is None else curve_displacement(tables.curves, position)
+
+
+def _steps(tables: KinematicTables, translations: Numbers, way: Numbers, axes: Numbers) -> Numbers:
+    """Return the place of each frame from that of its parent, (3, frames, samples)."""
     # Each joint is p_f - p_parent = R_parent t from the one before; along a path these add up.
     step = translations
     if tables.slides is not None:
         step = step + tables.axes * (tables.slides * way)
     before = gather(axes, tables.parents)
-    step = before[:, 0] * step[0] + before[:, 1] * step[1] + before[:, 2] * step[2]
-    return Poses(axes, _summed(tables, tables.behind * step), slopes)
+    return before[:, 0] * step[0] + before[:, 1] * step[1] + before[:, 2] * step[2]
 
 
 def joint_screws(xp: Namespace, tables: KinematicTables, poses: Poses) -> Numbers:
