@@ -59,6 +59,13 @@ def test_unlikely_units_are_warned_of(tmp_path, scale, units, warning):
     assert [warning in text for text in warnings] == ([True] if warning else [])
 
 
+def test_angles_that_are_wrapped_at_a_turn_are_warned_of(tmp_path):
+    table = smooth(400, 3)
+    table[:, 1] = np.mod(3.0 * table[:, 0] + np.pi, 2.0 * np.pi) - np.pi
+    (warning,) = read(write_csv(tmp_path / "a.csv", table), Reading(units="rad"), ("rad",) * 3).warnings
+    assert warning == "joint 'joint1' leaps by a turn twice: unwrap its angles, as numpy.unwrap does"
+
+
 def test_angles_past_their_joints_limits_and_columns_in_degrees_want_their_unit_told(tmp_path):
     path = write_csv(tmp_path / "a.csv", smooth(400, 3) * [1, 5, 1, 1])
     limited = {"joint_units": ANGLES, "progress": silent, "reach": (1.2, np.inf, 0.1)}

@@ -10,6 +10,7 @@ from conftest import DATA
 from helpers.motion_logs import LEG, smooth, write_csv
 from linkwise import LinkwiseError, Load, Options, Payload, generate, read_system, write_package
 from linkwise.analysis import Contacts, Processing, analyze
+from linkwise.analysis.load_robot import load_robot
 from linkwise.cli.analyze import app
 from linkwise.package.load import import_package
 from linkwise_runtime.quantities import Contact
@@ -116,6 +117,14 @@ def test_tied_joints_are_traced_in_independent_ones(tmp_path: Path) -> None:
     assert {c.name for c in found.columns if c.name.startswith("kinetic_from")} == {
         f"kinetic_from/{name}" for name in (f"torque:{own[0]}", "gravity", "start")
     }
+
+
+def test_tensors_are_refused_where_arrays_are_needed(tmp_path: Path) -> None:
+    write_package(generate(read_system(DATA / "crank_rocker.toml"), ["numpy", "torch"]), tmp_path / "robot")
+    own, torch = log(tmp_path, ["crank"], size=0.3), load_robot(tmp_path / "robot", "torch")
+    for asked in ({"trace": ["all"]}, {"induced_power": True}, {"induced": ["joints"]}):
+        with pytest.raises(LinkwiseError, match="--backend torch computes in tensors"):
+            analyze(own, torch, **asked)  # type: ignore[arg-type]
 
 
 def test_the_force_of_each_contact_is_a_source(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from conftest import DATA
 from helpers.answers import relative_error
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
+from linkwise_runtime.motion.induced_power import fed_by_couplings
 
 pytest.importorskip("pinocchio")
 
@@ -348,6 +349,19 @@ def test_a_base_that_turns_gives_power_by_its_imposed_motion(package_of: Package
     rate = 0.4 * (u * a + v * b * (2 + x**2) + x * u * v**2)  # of the terms of degree two alone
     assert abs(power.total[0] - rate) <= 1e-12
     assert abs(power.gravity.sum() - (rate - tau @ [u, v])) <= 1e-12
+
+
+@pytest.mark.parametrize(
+    ("robot", "coupled"),
+    [("crane.urdf", ["lift", "pitch"]), ("leg.toml", [])],
+)
+def test_flows_that_contain_what_couplings_feed_in_are_known(
+    robot: str, coupled: list[str], package_of: Packages
+) -> None:
+    """Joints fold, level and counter of the crane follow pitch; only counter is not behind lift."""
+    own = package_of(f"{DATA / robot} loops").load("numpy")
+    found = fed_by_couplings(own.backend.tree, own.n)
+    assert [own.joint_names[i] for i in found] == coupled
 
 
 def test_another_side_is_refused(package_of: Packages) -> None:

@@ -168,7 +168,7 @@ class TurnLeaps:
         """Yield a warning for each joint that leaps."""
         for joint, count in zip(self._joints, self._found.tolist(), strict=True):
             if count:
-                times = "once" if count == 1 else f"{count} times"
+                times = {1: "once", 2: "twice"}.get(count, f"{count} times")
                 yield f"joint {joint!r} leaps by a turn {times}: unwrap its angles, as numpy.unwrap does"
 
 
