@@ -114,6 +114,8 @@ def given(load: Load, row: Call, batch: tuple[int, ...] = (), which: str = "tied
     batch = (len(INSTANTS), *batch) if row.key in OVER_TIME[1:] else batch
     sizes = {"q": n, "qd": n, "qdd": n, "tau": n, "yd": m, "ydd": m}
     motion = {name: draw.uniform(-1.0, 1.0, (*batch, size)) for name, size in sizes.items()}
+    if row.key in OVER_TIME[1:]:
+        motion["q"] = motion["q"][:1] + 0.1 * motion["q"]  # angles do not leap
     if m:
         known = WIRE if which == WIRE else "tied"
         near = [0.4, 0.3] if which == WIRE else [0.9, -1.1, 1.3, 0.2]

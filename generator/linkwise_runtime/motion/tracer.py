@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..interface import Numbers, array_of, namespace
+from ..structure import Structure
 from .between_samples import SampledMotion
 from .collocation import STAGES, B, linear_steps
 from .trace_equations import TraceAt, TraceEquations
@@ -18,7 +19,7 @@ from .trace_equations import TraceAt, TraceEquations
 AT_ONCE = 1 << 22
 """Numbers of the steps that are computed at once."""
 LEAP = 1.0
-"""Largest distance, in rad or m, between where a step leads and where the velocities at its ends do."""
+"""Largest angle in rad between where a step leads and where the velocities at its ends do."""
 
 
 class TraceParts(NamedTuple):
@@ -104,7 +105,7 @@ class Tracer:
         xp, at = namespace(motion.q), equations.at(motion, True)
         acting = equations.backend.weights("windows", self.parts.acting(first, len(motion.time)), motion.q)
         wide = acting.reshape(*acting.shape, *[1] * motion.q.ndim)
-        _refuse_leaps(motion, at.qd, equations.backend.structure.joint_names)
+        _refuse_leaps(motion, at.qd, equations.backend.structure)
         begin = begin or self._start(at, wide[0])
         stages = [equations.at(motion.within_steps(part), False).equations for part in STAGES]
         lengths = motion.lengths.reshape(-1, *[1] * (motion.q.ndim - 2))
@@ -142,20 +143,21 @@ class Tracer:
         return TraceBlock(motion.time, velocity, energy, power, work, equations.coriolis)
 
 
-def _refuse_leaps(motion: SampledMotion, qd: Numbers, joints: Sequence[str]) -> None:
-    """Raise ValueError for positions that go elsewhere than the velocities say.
+def _refuse_leaps(motion: SampledMotion, qd: Numbers, structure: Structure) -> None:
+    """Raise ValueError for angles that go elsewhere than their velocities say.
 
     Such are angles that are wrapped at a turn, another unit of time, and loops that close the other way.
     """
     q, speed, lengths = (array_of(a) for a in (motion.q, qd, motion.lengths))
     steps = lengths.reshape(-1, *[1] * (q.ndim - 1))
     gone, told = np.diff(q, axis=0), 0.5 * steps * (speed[:-1] + speed[1:])
-    leaps = np.argwhere(np.abs(gone - told) > LEAP)
+    turns = np.array([unit == "rad" for unit in structure.joint_units])
+    leaps = np.argwhere(turns & (np.abs(gone - told) > LEAP))
     if len(leaps):
         at = tuple(leaps[0])
         raise ValueError(
-            f"q of {joints[at[-1]]!r} goes by {gone[at]:.3g} in the step at sample {at[0]}, where its "
-            f"velocities lead by {told[at]:.3g}: unwrap angles, give time in s, close loops one way"
+            f"q of {structure.joint_names[at[-1]]!r} goes by {gone[at]:.3g} in the step at sample {at[0]}, "
+            f"where its velocities lead by {told[at]:.3g}: unwrap angles, give time in s, close loops one way"
         )
 
 
