@@ -18,8 +18,8 @@ ROWS = np.stack([TIME, np.sin(TIME), TIME**2])
 @pytest.mark.parametrize("size", [37, 500, 6000])
 def test_cycles_are_the_same_wherever_blocks_end(size: int) -> None:
     spans = [(0.0, 1.3), (1.3, 2.0), (1.5, 2.5), (20.004, 31.006), (55.0, TIME[-1])]
-    found: dict[int, np.ndarray] = {}
-    sink = CycleSink(spans, 11, found.__setitem__)
+    found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+    sink = CycleSink(spans, 11, lambda number, *rows: found.update({number: rows}))
     most = 0
     for at in range(0, len(TIME), size):
         sink(ROWS[:, at : at + size])
@@ -27,7 +27,11 @@ def test_cycles_are_the_same_wherever_blocks_end(size: int) -> None:
     sink.finish()
     for number, (start, end) in enumerate(spans):
         at = np.linspace(start, end, 11)
-        np.testing.assert_allclose(found[number], [at, np.sin(at), at**2], atol=1e-8)
+        points, samples = found[number]
+        np.testing.assert_allclose(points, [at, np.sin(at), at**2], atol=1e-8)
+        inside = [at for at in TIME if start < at < end]
+        np.testing.assert_allclose(samples[0], [start, *inside, end], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(samples[1], np.sin(samples[0]), atol=1e-8)
     assert most <= 1200 + 2 * size, "the longest cycle, and not what lies between"
 
 
@@ -78,3 +82,19 @@ def test_cycles_begin_by_a_column_a_load_or_a_table(way: str, tmp_path: Path) ->
     table = pd.read_parquet(tmp_path / "out/trials/a/samples.parquet")
     ends = table.groupby("cycle").time.agg(["min", "max"]).to_numpy()
     np.testing.assert_allclose(ends, spans, atol=1e-9)
+
+
+def test_cycles_lie_in_the_range_of_time_that_is_analysed(tmp_path: Path) -> None:
+    time = np.round(np.arange(0, 4, 0.01), 2)
+    q = np.sin(time)[:, None] * [1, 0.5, 0.2]
+    write_csv(tmp_path / "a.csv", np.column_stack([time, q, time % 1 < 0.295]), (*JOINTS, "stands"))
+    asked = "[analysis]\nignore_extra = true\nfrom_time = 0.5\nto_time = 3.5\n"
+    file = tmp_path / "study.toml"
+    trial = '[[trial]]\nlog = "a.csv"\nrobot = "planar3"\n'
+    for way in ('start = "stands"', 'table = "cycles.csv"'):
+        (tmp_path / "cycles.csv").write_text("trial,start,end\na,0.4,1\na,1,2\na,2,3\na,3,3.6\n")
+        file.write_text(f"schema = 1\npages = false\n{asked}[cycles]\n{way}\n{trial}")
+        assert run_study(file, tmp_path / "out", Here()).broken == ()
+        table = pd.read_parquet(tmp_path / "out/trials/a/samples.parquet")
+        ends = table.groupby("cycle").time.agg(["min", "max"]).to_numpy()
+        np.testing.assert_allclose(ends, [(1, 2), (2, 3)], atol=1e-9)

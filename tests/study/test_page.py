@@ -144,6 +144,24 @@ def test_trials_without_cycles_are_dots_with_deviations(driver: Any, tmp_path: P
         np.testing.assert_allclose([dot[1:] for dot in shown], expected, rtol=1e-5)
 
 
+def test_integrals_over_cycles_are_dots_beside_curves(page: Any, out: Path) -> None:
+    names = "return [...document.getElementById('column').options].map((option) => option.textContent)"
+    choose(page, "factor", 1)
+    choose(page, "column", page.execute_script(names).index("integral/power/joint1"))
+    shown = page.execute_script(
+        "return document.getElementById('bands').data"
+        ".map((dot) => [dot.name, dot.mode, Array.from(dot.y), dot.error_y.array[0]])"
+    )
+    rows = pd.read_parquet(out / "summary.parquet").query("column == 'integral/power/joint1'")
+    each = rows.groupby(["condition", "subject"])["mean"].mean()
+    for (level, mode, values, deviation), expected in zip(shown, ("fast", "slow"), strict=True):
+        assert (level, mode) == (expected, "markers")
+        assert [*values, deviation] == pytest.approx([each[level].mean(), each[level].std()], rel=1e-5)
+    assert "Means over cycles" in page.find_element("id", "bands-caption").text
+    choose(page, "column", 1)
+    assert {len(y) for _, y in page.execute_script(CURVES)} == {101}
+
+
 def test_it_leads_to_each_trial_and_tells_the_broken_one(page: Any) -> None:
     table = page.find_element("id", "trials")
     rows = [row.text for row in table.find_elements("css selector", "tbody tr")]

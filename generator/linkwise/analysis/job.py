@@ -194,10 +194,14 @@ class Job:
         return self.decomposer.rows.columns
 
     @property
+    def analysed(self) -> Samples:
+        """Samples that will be analysed: those of the log in the range of time, without trimmed ends."""
+        return self.samples.within(*span_of(self.samples, self.asked.processing))
+
+    @property
     def count(self) -> int:
         """Number of samples that will be analysed."""
-        start, stop = span_of(self.samples, self.asked.processing)
-        return stop - start
+        return len(self.analysed.time)
 
     def analysis(self, done: WholeMovement, values: Array) -> Analysis:
         """Return the analysis, with what is known of the samples.
@@ -205,8 +209,7 @@ class Job:
         values: all samples, (rows, S)
         """
         robot = self.decomposer.robot
-        analysed = self.samples.within(*span_of(self.samples, self.asked.processing))
-        poles = pole_warnings(robot.tree, robot.joints, analysed)
+        poles = pole_warnings(robot.tree, robot.joints, self.analysed)
         warnings = (*self.samples.warnings, *self._twice_borne(), *self._fed(), *poles, *self._never_on(done))
         return Analysis(
             **vars(done),

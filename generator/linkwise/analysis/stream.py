@@ -9,6 +9,7 @@ from linkwise_runtime.motion.tracer import TraceState
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.even_time import TOLERANCE
 from linkwise.analysis.filtering import derivatives
+from linkwise.analysis.integrals import parted_integrals
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result import Totals, WholeMovement, Work
@@ -91,14 +92,13 @@ class MovementSums:
         self._total += added
         np.maximum(self._peak, magnitude.max(axis=1), out=self._peak)
         power = block[self._power]
-        parts = np.stack([np.maximum(power, 0.0), np.maximum(-power, 0.0)])
         on = np.stack([np.ones(block.shape[1]), *self._on(block)])
         if self._last is not None:  # the step from the last block to this one
-            parts, on = (np.concatenate(two, axis=-1) for two in zip(self._last, (parts, on), strict=True))
+            power, on = (np.concatenate(two, axis=1) for two in zip(self._last, (power, on), strict=True))
         steps = on[:, 1:] * on[:, :-1]
         self._steps += steps.sum(axis=1)
-        self._energy += 0.5 * np.einsum("wps,fs->fwp", parts[..., 1:] + parts[..., :-1], steps)
-        self._last = parts[..., -1:].copy(), on[:, -1:].copy()
+        self._energy += parted_integrals(power, steps)
+        self._last = power[:, -1:].copy(), on[:, -1:].copy()
         return True
 
     def _on(self, block: Array) -> Iterator[Array]:

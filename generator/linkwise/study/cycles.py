@@ -15,7 +15,7 @@ import numpy as np
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.job import Job
 from linkwise.analysis.logs.checks import named_once
-from linkwise.arrays import Array, Mask
+from linkwise.arrays import Array, Index, Mask
 from linkwise.errors import LinkwiseError, within
 from linkwise.extras import extra
 from linkwise.study.ledger import CURVES
@@ -31,7 +31,7 @@ Span = tuple[float, float]
 
 def cycle_spans(cycles: Cycles, job: Job, trial: str) -> list[Span]:
     """Return the beginning and end of each whole cycle in s; raise LinkwiseError where there is none."""
-    time = job.samples.time
+    time = job.analysed.time
     if cycles.table:
         found = written_cycles(cycles.table).get(trial, [])
     else:
@@ -55,9 +55,9 @@ def cycle_spans(cycles: Cycles, job: Job, trial: str) -> list[Span]:
 
 
 def _on(job: Job) -> Mask:
-    """Return at which samples the phase that defines the cycles is on."""
-    (phase,) = (one for one in job.phases if one.name == "cycle")
-    samples, robot = job.samples, job.decomposer.robot
+    """Return at which samples the phase that defines the cycles is on, the last of the job."""
+    phase = job.phases[-1]
+    samples, robot = job.analysed, job.decomposer.robot
     parts = []
     for at in range(0, len(samples.time), AT_ONCE):
         span = slice(at, at + AT_ONCE)
@@ -98,13 +98,14 @@ def _span(start: str, end: str) -> Span:
 class CycleSink:
     """Receiver of blocks of samples that passes on each cycle, at even shares of its time.
 
-    Blocks have columns in rows, the time first; spans ascend; take(number, rows) receives rows
-    (columns, points), the time among them
+    Blocks have columns in rows, the time first; spans ascend; take(number, points, samples) receives
+    points (columns, points), and the samples from end to end (columns, samples), the time among them; a
+    cubic spline through samples is what there is between them
     """
 
     spans: Sequence[Span]
     points: int
-    take: Callable[[int, Array], None]
+    take: Callable[[int, Array, Array], None]
     _kept: list[Array] = field(default_factory=list)
     _next: int = 0
 
@@ -136,16 +137,29 @@ class CycleSink:
                 break
             part: Any = there[:, first : last + MARGIN]
             spline = extra("scipy.interpolate").CubicSpline(part[0], part, axis=1)
-            self.take(self._next, spline(np.linspace(start, end, self.points)))
+            points = spline(np.linspace(start, end, self.points))
+            inside = part[:, (part[0] > start) & (part[0] < end)]
+            self.take(self._next, points, np.concatenate([points[:, :1], inside, points[:, -1:]], axis=1))
             self._next += 1
         self._kept = [there.copy()]
 
 
 class TrialCycles:
-    """Receiver of samples that passes each cycle to `write`, with its number; none without cycles."""
+    """Receiver of samples that passes on each cycle; none without cycles.
 
-    def __init__(self, plan: StudyPlan, job: Job, write: Callable[[int, Array], None]) -> None:
-        self._write, self._names = write, [column.name for column in job.columns]
+    write: receives rows (columns, points), their cycle's number and percent of it, (points,) each
+    integrals: receives samples of each cycle, as `CycleSink` takes them
+    """
+
+    def __init__(
+        self,
+        plan: StudyPlan,
+        job: Job,
+        write: Callable[[Array, Index, Array], None],
+        integrals: Callable[[Array], None],
+    ) -> None:
+        self._write, self._integrals = write, integrals
+        self._names = [column.name for column in job.columns]
         self._points = 0 if plan.cycles is None else plan.cycles.points
         self._moments = RunningMoments(len(self._names) * self._points)
         with within(job.source):
@@ -157,8 +171,9 @@ class TrialCycles:
         """Number of cycles so far."""
         return self._moments.count
 
-    def _take(self, number: int, rows: Array) -> None:
-        self._write(number, rows)
+    def _take(self, number: int, rows: Array, samples: Array) -> None:
+        self._write(rows, np.full(self._points, number, np.intp), np.linspace(0, 100, self._points))
+        self._integrals(samples)
         shifted = rows.copy()
         shifted[0] -= rows[0, 0]  # time, from the beginning of the cycle
         self._moments(shifted.reshape(-1, 1))

@@ -23,7 +23,19 @@ from linkwise.study.plan import OF_FILES, SUBJECT, Comparison, Cycles, PaperFigu
 from linkwise.study.summary import STATISTICS
 
 COLUMNS = (
-    *("trial", "cycle", "percent", "time", "column", "unit", "statistic", "subjects", "trials"),
+    *(
+        "trial",
+        "cycle",
+        "percent",
+        "start",
+        "end",
+        "time",
+        "column",
+        "unit",
+        "statistic",
+        "subjects",
+        "trials",
+    ),
     *(f"{over}{name}" for over in ("", "trials_") for name in STATISTICS),
 )
 """Names of columns of tables, besides the factors."""

@@ -15,9 +15,10 @@ from linkwise.study.plan import StudyPlan, Trial
 
 MARK = "study.json"
 """File in the folder of a study that marks it as one."""
-RECORD, TABLE, CURVES, SUMMARY, PAGE = (
+RECORD, TABLE, CYCLES, CURVES, SUMMARY, PAGE = (
     "_record.json",
     "samples.parquet",
+    "_cycles.parquet",
     "_curves.npz",
     "_summary.npz",
     "_report.html",
@@ -85,7 +86,7 @@ def outputs_in(folder: Path) -> dict[str, int]:
 def is_trial(folder: Path) -> bool:
     """Return whether a folder holds files of a trial, and nothing else."""
     there = {path.name for path in folder.iterdir()} if folder.is_dir() else set[str]()
-    return bool(there) and there <= {RECORD, TABLE, CURVES, SUMMARY, PAGE}
+    return bool(there) and there <= {RECORD, TABLE, CYCLES, CURVES, SUMMARY, PAGE}
 
 
 def _key(plan: StudyPlan, trial: Trial, record: TrialRecord) -> str:

@@ -40,7 +40,10 @@ def study_page(
         "name": printable(plan.name),
         "factors": list(plan.factors),
         "points": 1 if plan.cycles is None else plan.cycles.points,
-        "columns": [{"name": printable(name), "unit": unit} for name, unit in columns.items()],
+        "columns": [
+            {"name": printable(name), "unit": unit, "isCurve": any(name in one.curves for one in trials)}
+            for name, unit in columns.items()
+        ],
         "values": encoded(_values(trials, list(columns)), "<f4"),
         "trials": [_trial(trial, folders[trial.name]) for trial in trials],
         "broken": [
@@ -99,5 +102,6 @@ def _test(test: Compared) -> dict[str, object]:
         "between": list(map(printable, test.comparison.between)),
         "subjects": min(len(side.each) for side in test.sides),
         "alpha": test.comparison.alpha,
+        "isCurve": len(test.statistic) > 1,
         "clusters": [[cluster.start, cluster.end, cluster.p] for cluster in test.clusters],
     }

@@ -24,7 +24,8 @@ class Cycles:
     """Cycles of a trial: `start` begins a cycle each time, `during` is one as long as it lasts.
 
     Both are written as a phase's WHAT of `linkwise analyze`. `table` is a CSV file of trial, start, end in s.
-    Cycles shorter than `shortest` or longer than `longest`, in s, are left out.
+    Cycles shorter than `shortest` or longer than `longest`, in s, are left out. `integrals` are patterns of
+    columns that are integrated over each cycle, those of power that tables keep if there are none.
     """
 
     start: str = ""
@@ -33,6 +34,7 @@ class Cycles:
     points: int = POINTS
     shortest: float = 0.0
     longest: float = math.inf
+    integrals: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if sum(map(bool, (self.start, self.during, self.table))) != 1:

@@ -21,6 +21,7 @@ from linkwise.study.comparisons import compared_columns
 from linkwise.study.file import read_study
 from linkwise.study.folder import StudyMark, held_study, refuse_unless_study, sweep_trials, trial_folders
 from linkwise.study.inputs import trial_here
+from linkwise.study.integrals import integral_columns
 from linkwise.study.ledger import MARK, TrialRecord, done_before, is_trial
 from linkwise.study.paths import removed
 from linkwise.study.plan import StudyPlan
@@ -143,9 +144,9 @@ def check_columns(plan: StudyPlan, before: Collection[str]) -> None:
     """
     with within(str(plan.file)):
         columns = _columns(plan, before)
-        names = [column.name for column in columns]
-        if names:
+        if columns:
             kept_columns(columns, plan.columns)
+            names = [column.name for column in (*columns, *integral_columns(plan, columns))]
             for comparison in plan.comparisons:
                 compared_columns(comparison, names)
             for figure in plan.figures:

@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from linkwise.analysis.result_rows import Column
-from linkwise.arrays import Array
+from linkwise.arrays import Array, Index
 from linkwise.extras import extra
 from linkwise.study.patterns import fitting
 from linkwise.study.spread import Spread, columns_of_trials, groups_of, spread
@@ -33,17 +33,21 @@ def kept_columns(columns: Sequence[Column], patterns: Sequence[str]) -> list[int
 
 
 class TrialTable:
-    """A Parquet file of one trial; texts that are the same in every row take almost no space."""
+    """A Parquet file of one trial; texts that are the same in every row take almost no space.
+
+    places: which of CYCLE and PERCENT each row has, after the labels
+    """
 
     def __init__(
-        self, path: Path, labels: Mapping[str, str], columns: Sequence[Column], is_of_cycles: bool
+        self, path: Path, labels: Mapping[str, str], columns: Sequence[Column], places: Sequence[str] = ()
     ) -> None:
         self._arrow = arrow = extra("pyarrow")
         self._labels = labels
         text = arrow.dictionary(arrow.int32(), arrow.string())
         fields = [arrow.field(name, text, False) for name in labels]
-        if is_of_cycles:
-            fields += [arrow.field(CYCLE, arrow.int32(), False), arrow.field(PERCENT, arrow.float64(), False)]
+        kinds = {CYCLE: arrow.int32(), PERCENT: arrow.float64()}
+        fields += [arrow.field(name, kinds[name], False) for name in places]
+        self._places = [kinds[name] for name in places]
         fields += [arrow.field(c.name, arrow.float64(), False, {"unit": c.unit}) for c in columns]
         self._schema = arrow.schema(fields)
         self._writer: Any = extra("pyarrow.parquet").ParquetWriter(
@@ -60,20 +64,20 @@ class TrialTable:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Write the end of the file."""
         self._writer.close()
 
-    def __call__(self, rows: Array, cycle: int | None = None) -> None:
-        """Write rows (columns, samples); the samples of a cycle are at even shares of it."""
+    def __call__(self, rows: Array, *places: Array | Index) -> None:
+        """Write rows (columns, samples), each sample at its places, (samples,) each."""
         arrow, count = self._arrow, rows.shape[1]
         codes = np.zeros(count, dtype=np.int32)
         arrays = [
             arrow.DictionaryArray.from_arrays(codes, arrow.array([text])) for text in self._labels.values()
         ]
-        if cycle is not None:
-            arrays += [
-                arrow.array(np.full(count, cycle, dtype=np.int32)),
-                arrow.array(np.linspace(0, 100, count)),
-            ]
+        arrays += [arrow.array(at, kind) for at, kind in zip(places, self._places, strict=True)]
         batch = arrow.record_batch([*arrays, *map(arrow.array, rows)], schema=self._schema)
         self._writer.write_batch(batch, row_group_size=count)
 

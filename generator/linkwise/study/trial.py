@@ -20,6 +20,7 @@ from linkwise.output import whole_directory
 from linkwise.progress import silent
 from linkwise.study.cycles import TrialCycles
 from linkwise.study.inputs import trial_here, trial_key
+from linkwise.study.integrals import CycleIntegrals
 from linkwise.study.ledger import (
     PAGE,
     RECORD,
@@ -33,7 +34,7 @@ from linkwise.study.ledger import (
 from linkwise.study.plan import StudyPlan, Trial
 from linkwise.study.robots import opened_robot
 from linkwise.study.summary import RunningMoments
-from linkwise.study.tables import TrialTable, kept_columns
+from linkwise.study.tables import CYCLE, PERCENT, TrialTable, kept_columns
 
 
 @dataclass(frozen=True)
@@ -88,10 +89,13 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         every = EverySample(len(columns), *((job.count, draft) if plan.pages else (0, None)))
         files.enter_context(every)
         moments = RunningMoments(len(columns))
-        table = files.enter_context(
-            TrialTable(draft / TABLE, labels, [columns[at] for at in kept], plan.cycles is not None)
-        )
-        cycles = TrialCycles(plan, job, lambda number, rows: table(rows[kept], number))
+        places = () if plan.cycles is None else (CYCLE, PERCENT)
+        table = files.enter_context(TrialTable(draft / TABLE, labels, [columns[at] for at in kept], places))
+        integrals = files.enter_context(CycleIntegrals(plan, columns, labels, draft))
+        cycles = TrialCycles(plan, job, lambda rows, *places: table(rows[kept], *places), integrals)
+
+        if plan.cycles is not None and plan.cycles.what:  # it may be on at single samples: no time, no work
+            job = replace(job, phases=job.phases[:-1])
 
         def sink(block: Array) -> None:
             moments(block)
@@ -105,11 +109,12 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         done = job.run(sink, silent)
         cycles.finish(draft)
         analysis = job.analysis(done, every.values)
+    every_column = (*columns, *integrals.columns)
     np.savez(
         draft / SUMMARY,
-        statistics=moments.table,
-        names=[c.name for c in columns],
-        units=[c.unit for c in columns],
+        statistics=np.concatenate([moments.table, integrals.statistics], axis=1),
+        names=[c.name for c in every_column],
+        units=[c.unit for c in every_column],
     )
     if plan.pages:
         (draft / PAGE).write_bytes(report(analysis).encode())
