@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from helpers.motion_logs import JOINTS, write_csv
+from helpers.motion_logs import JOINTS, LEG, write_csv
 from helpers.studies import Here
 from linkwise import LinkwiseError
 from linkwise.study import run_study
@@ -98,3 +98,17 @@ def test_cycles_lie_in_the_range_of_time_that_is_analysed(tmp_path: Path) -> Non
         table = pd.read_parquet(tmp_path / "out/trials/a/samples.parquet")
         ends = table.groupby("cycle").time.agg(["min", "max"]).to_numpy()
         np.testing.assert_allclose(ends, [(1, 2), (2, 3)], atol=1e-9)
+
+
+def test_cycles_last_as_long_as_a_contact_is_on(tmp_path: Path) -> None:
+    time = np.round(np.arange(0, 3, 0.01), 2)
+    names = ["pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r"]
+    log = np.column_stack([time, 0.1 * np.sin(time)[:, None] * np.ones(6), (time - 0.5) % 1 < 0.295])
+    write_csv(tmp_path / "a.csv", log, (*names, "stands"))
+    held = 'contact = ["sole:foot=held@0.1,-0.06,0"]\ncontact_while = ["sole=stands"]\n'
+    trial = f'[cycles]\nduring = "sole"\n[[trial]]\nlog = "a.csv"\nrobot = "{LEG}"\n'
+    file = tmp_path / "study.toml"
+    file.write_text(f"schema = 1\npages = false\n[analysis]\nignore_extra = true\n{held}{trial}")
+    assert run_study(file, tmp_path / "out", Here()).broken == ()
+    table = pd.read_parquet(tmp_path / "out/trials/a/_cycles.parquet")
+    np.testing.assert_allclose(table[["start", "end"]], [(0.5, 0.79), (1.5, 1.79), (2.5, 2.79)], atol=1e-9)

@@ -56,12 +56,14 @@ def cycle_spans(cycles: Cycles, job: Job, trial: str) -> list[Span]:
 
 def _on(job: Job) -> Mask:
     """Return at which samples the phase that defines the cycles is on, the last of the job."""
-    phase = job.phases[-1]
+    phase, times = job.phases[-1], job.decomposer.times
     samples, robot = job.analysed, job.decomposer.robot
     parts = []
     for at in range(0, len(samples.time), AT_ONCE):
         span = slice(at, at + AT_ONCE)
-        parts.append(phase.on(robot, samples.time[span], samples.q[span], np.zeros((0, 0))))
+        time, q = samples.time[span], samples.q[span]
+        shares = np.zeros((0, 0)) if times is None else times.shares(robot.model, time, q).T
+        parts.append(phase.on(robot, time, q, shares))
         let_go(samples.q)
     return np.concatenate(parts)
 
