@@ -22,6 +22,7 @@ from .quantities import (
     Propagation,
     Trajectory,
 )
+from .share_uncertainty import Uncertainty
 
 TORQUE = "torque:joint"
 PASSIVE_KINDS = ("spring", "damping", "friction", "armature")
@@ -61,6 +62,21 @@ COEFFICIENTS = _by_order("coefficient", COEFFICIENT_UNITS, ("gravity", TORQUE), 
 PASSIVE = tuple(
     Quantity("passive_torque", ("joint",), TORQUE, "what the joint takes of its own", ("source", kind))
     for kind in PASSIVE_KINDS
+)
+SD = "standard deviation of the"
+"""Beginning of what deviations mean."""
+DEVIATIONS = (
+    *_one("partial_torque_sd", "joint link", TORQUE, f"{SD} torque on the joint, through the link"),
+    *_by_order("coefficient_sd", COEFFICIENT_UNITS, ("", ""), f"{SD} coefficient {TAU_IJK}")[:2],
+    *_by_order("propagation_sd", (TORQUE, TORQUE), ("gravity_sd", TORQUE), f"{SD} torque {TAU_IJK}"),
+    *_one("torque_sd", "joint", TORQUE, f"{SD} joint torque of all links"),
+    *(
+        Quantity("joint_propagation_sd", ("joint", "cause"), TORQUE, f"{SD} torque of all links", (ORDER, order))
+        for order in ("acceleration", "velocity")
+    ),
+    *_one("joint_gravity_sd", "joint", TORQUE, f"{SD} torque at rest of all links"),
+    *_one("power_sd", "joint link", "W", f"{SD} power that the joint sends into the link"),
+    *_one("joint_power_sd", "joint", "W", f"{SD} power that the joint sends into all links"),
 )
 QDD_OF_JOINTS = _one("forward_dynamics", "joint", "acceleration:joint", "joint acceleration")
 REQUIRED = object()
@@ -165,6 +181,16 @@ DYNAMICS = (
         rigid=True,
         lacking=("autograd",),
         c="coefficient_regressors",
+    ),
+    Call(
+        "uncertainty",
+        QDD,
+        DEVIATIONS,
+        Uncertainty,
+        options={"bodies": REQUIRED},
+        rigid=True,
+        lacking=("autograd",),
+        out=False,
     ),
     *_by_link(
         "mass_matrix",

@@ -17,6 +17,8 @@ from typing import Any, Literal, Self, cast, overload
 from numpy.typing import ArrayLike
 
 from .arguments import Beside, check_numbers
+from .certainty.share_deviations import uncertainty
+from .certainty.uncertain_bodies import UncertainBodies
 from .control.controllers import Cancellation, PartialImpedance, cancellation, partial_impedance
 from .file_joints import Order
 from .html_tables import robot_table
@@ -34,6 +36,7 @@ from .quantities import (
     Power,
     Propagation,
 )
+from .share_uncertainty import Uncertainty
 from .targets import FrameImpedance, Natural
 
 
@@ -255,6 +258,21 @@ class Dynamics(MotionCalls):
         """
         answer: Coefficients[Array] = self._call("coefficient_regressors", (q, qd), out)
         return answer
+
+    def uncertainty(self, q: Array, qd: Array, qdd: Array, bodies: UncertainBodies) -> Uncertainty[Array]:
+        """Return standard deviations of shares, of their sums and powers, where bodies are uncertain.
+
+        bodies: standard deviations of what links carry, an `UncertainBodies`
+
+        Shares are linear in the links' inertial parameters, and the covariance of these is worked out
+        exactly: nothing is of first order. Deviations are about the shares' means; where centres are
+        uncertain these differ from the shares of the robot's own bodies, by what the mean of the inertia is
+        more. Motion, places and axes of joints, springs, damping, friction, armature and gravity count as
+        certain; of reactions and induced accelerations there are no deviations. Raises ValueError, which
+        names the link, for deviations that cannot be, and as `regressor` does.
+        """
+        found: Uncertainty[Array] = uncertainty(self, q, qd, qdd, bodies)
+        return found
 
     def masked(
         self, q: Array, qd: Array, qdd: Array, mask: ArrayLike | Array, out: Array | None = None

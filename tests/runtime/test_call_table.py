@@ -15,6 +15,7 @@ from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise_runtime.call import PACKED, Call, Quantity
 from linkwise_runtime.call_table import CALLS, REQUIRED
+from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
 from linkwise_runtime.constraints.robot_constraints import Constraints
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.kinematics.robot_kinematics import Kinematics
@@ -70,6 +71,7 @@ KINDS = [
 """Back ends, and whether they are given tensors."""
 OVER_TIME = ("simulate", "trace", "counterfactual")
 """Calls that are given instants; all but the first are given a motion over these."""
+UNCERTAIN = UncertainBodies([0.1, 0.2, 0.05], 0.01, [0.1, 0.0, 0.2], 0.03)
 INSTANTS, PARTS = [0.0, 0.01, 0.02], 7
 """Instants of `simulate`; and the entries of an axis that any torques may have."""
 on_every_back_end = pytest.mark.parametrize(("backend", "tensors"), KINDS)
@@ -131,6 +133,7 @@ def given(load: Load, row: Call, batch: tuple[int, ...] = (), which: str = "tied
         "torque": torque if row.chosen.get("by_link") else torque[..., 0],
         "tau": motion["tau"],
         "without": "share:gravity" if which in SIZES else "gravity",
+        "bodies": UNCERTAIN,
         "loads": [] if which in SIZES else [AppliedLoad("hand", **hand)],
     }
     left = () if row.options.get("frame") else ("frame", "point")

@@ -11,6 +11,7 @@ import pytest
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise_runtime.call_table import CALLS
+from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
 from linkwise_runtime.robot_axes import inertial, written
 
 xr = pytest.importorskip("xarray")
@@ -114,6 +115,8 @@ def calls(package: Any, robot: Any, times: Any) -> Iterator[tuple[str, tuple[Any
     for convention in ("closing", "gradient"):
         yield "propagation", (q, qd, qdd), {"convention": convention}
     yield "masked", (q, qd, qdd, np.ones((3, 4))), {}
+    deviations = UncertainBodies(0.1, times(0.01, "m"), 0.2, 0.03)
+    yield "uncertainty", (q, qd, qdd, deviations), {}
     yield "natural_impedance", (q, qd, qdd), {}
     for frame in ({}, own, {"frame": "centre of mass"}):
         yield "induced_accelerations", (q, qd, tau), {"loads": loads, "passive": True, **frame}

@@ -1,0 +1,200 @@
+"""Standard deviations of shares of torque, from the covariance of what links carry.
+
+Shares are linear in inertial parameters, s = sum_j Y_j . pi_j, so that with the covariance of `BodySpread`
+
+    var(s) = sum_j |F_j^T Y_j|^2 + w^T C w        w_j = Y_j . p_j
+
+of which a share through one link has its own j alone.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from ..answers.packed import PackedTables
+from ..arrays.backend import ArrayBackend
+from ..chosen_names import known_kind
+from ..interface import Numbers, side_by_side
+from ..quantities import PARAMETERS
+from ..share_uncertainty import Uncertainty
+from .uncertain_bodies import BodySpread, UncertainBodies, body_spread, tree_bodies
+
+AT_ONCE = 1 << 21
+"""Most numbers of the regressors of a piece of samples."""
+
+
+class PackedDeviations(NamedTuple):
+    """Standard deviations of one robot's shares, packed in the order of `Layout`, (S, count) each."""
+
+    c2: Numbers
+    c1: Numbers
+    gravity: Numbers
+    torque: Numbers
+    joint_torque: Numbers
+    """Of the sums over all links, (S, n)."""
+    joint_c2: Numbers
+    """(S, n, n)"""
+    joint_c1: Numbers
+    """(S, n, n)"""
+    joint_gravity: Numbers
+    """(S, n)"""
+
+
+class ShareDeviations:
+    """Standard deviations of shares of a robot on one back end, whose bodies are spread."""
+
+    def __init__(self, backend: ArrayBackend, spread: BodySpread) -> None:
+        self._backend, self._tables = backend, PackedTables(backend)
+        layout, links = backend.structure.layout, range(backend.structure.N)
+        self._layout, self._causes = layout, layout.velocity[:, 2].copy()  # writable, as torch wants it
+        self._maps = np.concatenate([spread.shapes, spread.means[..., None]], -1)
+        self._own = np.diag(spread.masses)
+        self._together = None if spread.is_diagonal else _root(spread.masses)
+        self._slices = {
+            field: [slice(*np.searchsorted(getattr(layout, field)[:, 1], [j, j + 1])) for j in links]
+            for field in ("acceleration", "velocity", "gravity", "torque")
+        }
+        place = {tuple(row): at for at, row in enumerate(layout.acceleration.tolist())}
+        self._mirrored = np.array([place[min(i, k), j, max(i, k)] for i, j, k in layout.velocity.tolist()])
+
+    def packed(
+        self, q: Numbers, qd: Numbers, qdd: Numbers, with_sums: bool = True
+    ) -> PackedDeviations:
+        """Return the deviations for motion (S, n), as many samples at once as memory wants.
+
+        with_sums: whether sums over the links by cause are wanted; else they are left out, (S, 0)
+        """
+        per_sample = PARAMETERS * sum(map(len, self._layout[:4]))
+        most = max(16, AT_ONCE // per_sample)
+        size = self._backend.chunk((q, qd, qdd), most) or len(q)
+        if len(q) <= size:
+            return self._piece(q, qd, qdd, with_sums)
+        pieces = [
+            self._piece(*(a[at : at + size] for a in (q, qd, qdd)), with_sums)
+            for at in range(0, len(q), size)
+        ]
+        return PackedDeviations(*(self._backend.xp.concat(some, 0) for some in zip(*pieces, strict=True)))
+
+    def _piece(self, q: Numbers, qd: Numbers, qdd: Numbers, with_sums: bool) -> PackedDeviations:
+        xp = self._backend.xp
+        flat = self._backend.coefficient_regressors(q, qd, 0.0 * q)
+        c2, c1, g = (
+            self._mapped(rows, field)
+            for rows, field in zip(flat, ("acceleration", "velocity", "gravity"), strict=True)
+        )
+        causes = self._backend.index(self._causes, q)
+        every = self._backend.index(self._mirrored, q)
+        moved = c2[..., every, :] * qdd[..., causes, None] + c1 * qd[..., causes, None]
+        tau = [g[..., part, :] for part in self._slices["torque"]]
+        for j, (pairs, part) in enumerate(
+            zip(self._slices["torque"], self._slices["velocity"], strict=True)
+        ):
+            size = pairs.stop - pairs.start
+            own = moved[..., part, :]
+            tau[j] = tau[j] + own.reshape(*own.shape[:-2], size, size, own.shape[-1]).sum(-2)
+        torque = xp.concat(tau, -2)
+        nothing = self._backend.zeros(q, 0)
+        return PackedDeviations(
+            *(root(xp, self._own_variance(rows, field)) for rows, field in self._fields(c2, c1, g, torque)),
+            root(xp, self._sum_over_links(torque)),
+            root(xp, self._matrices(c2, "acceleration")) if with_sums else nothing,
+            root(xp, self._matrices(c1, "velocity")) if with_sums else nothing,
+            root(xp, self._sum_over_links(g)) if with_sums else nothing,
+        )
+
+    @staticmethod
+    def _fields(*rows: Numbers) -> Sequence[tuple[Numbers, str]]:
+        return list(zip(rows, ("acceleration", "velocity", "gravity", "torque"), strict=True))
+
+    def _mapped(self, flat: Numbers, field: str) -> Numbers:
+        """Return (F_j^T Y_j, w_j) of rows, (S, count, R + 1), from rows of 10 (S, count * 10)."""
+        rows = flat.reshape(flat.shape[0], len(getattr(self._layout, field)), PARAMETERS)
+        maps = self._backend.constant(self._maps, flat)
+        parts = [rows[:, part] @ maps[j] for j, part in enumerate(self._slices[field])]
+        return self._backend.xp.concat(parts, -2)
+
+    def _own_variance(self, rows: Numbers, field: str) -> Numbers:
+        """Return the variance of shares through one link, (S, count)."""
+        own = self._own[getattr(self._layout, field)[:, 1]]
+        return self._of_shapes(rows) + rows[..., -1] ** 2 * self._backend.constant(own, rows)
+
+    @staticmethod
+    def _of_shapes(rows: Numbers) -> Numbers:
+        return (rows[..., :-1] ** 2).sum(-1)
+
+    def _sum_over_links(self, rows: Numbers) -> Numbers:
+        """Return the variance of torques (S, count, R + 1) summed over the links, (S, n)."""
+        if self._together is None:
+            return self._tables.sum_over_links(self._own_variance(rows, "torque"))
+        mass = self._tables.spread(rows[..., -1], "torque") @ self._backend.constant(self._together, rows)
+        return self._tables.sum_over_links(self._of_shapes(rows)) + (mass**2).sum(-1)
+
+    def _matrices(self, rows: Numbers, field: str) -> Numbers:
+        """Return the variance of coefficients summed over the links, (S, n, n)."""
+        if self._together is None:
+            return self._tables.matrices(self._own_variance(rows, field), field)
+        by_link = self._backend.xp.swapaxes(self._tables.spread(rows[..., -1], field), -1, -2)
+        mass = by_link @ self._backend.constant(self._together, rows)
+        return self._tables.matrices(self._of_shapes(rows), field) + (mass**2).sum(-1)
+
+    def spread(self, values: Numbers, field: str) -> Numbers:
+        """Return packed values (S, count) of a field of `Layout` as (S, n, N) or (S, n, N, n)."""
+        return self._tables.spread(values, field)
+
+
+def uncertainty(robot: Any, q: object, qd: object, qdd: object, bodies: object) -> Uncertainty[Any]:
+    """Return the answer of `Dynamics.uncertainty`."""
+    backend, motion = robot.door.read({"q": q, "qd": qd, "qdd": qdd})
+    backend.answers.check_regresses()
+    at = ShareDeviations(backend, spread_of(backend, bodies))
+    batch = tuple(motion[0].shape[:-1])
+    flat = [a.reshape(math.prod(batch), a.shape[-1]) for a in motion]
+    found, (_, rate, gain) = at.packed(*flat), (abs(a) for a in flat)
+    c2, c1 = at.spread(found.c2, "acceleration"), at.spread(found.c1, "velocity")
+    torque = at.spread(found.torque, "torque")
+    answers = (
+        torque,
+        c2,
+        c1,
+        c2 * gain[:, None, None, :],
+        c1 * rate[:, None, None, :],
+        at.spread(found.gravity, "gravity"),
+        found.joint_torque,
+        found.joint_c2 * gain[:, None, :],
+        found.joint_c1 * rate[:, None, :],
+        found.joint_gravity,
+        torque * rate[:, :, None],
+        found.joint_torque * rate,
+    )
+    return Uncertainty(*(side_by_side(a.reshape(*batch, *a.shape[1:])) for a in answers))
+
+
+def spread_of(backend: ArrayBackend, bodies: object) -> BodySpread:
+    """Return the spread of the bodies that a robot has on a back end.
+
+    Raises TypeError for what is not `UncertainBodies`, and as `body_spread` does.
+    """
+    if any(not hasattr(bodies, name) for name in UncertainBodies._fields):
+        raise TypeError(f"bodies is {known_kind(bodies, UncertainBodies)}; give an UncertainBodies")
+    assert backend.tree is not None  # `check_regresses` has seen to it
+    carried = tree_bodies(backend.tree, backend.parameters, cast(Any, backend.bodies))
+    try:
+        return body_spread(backend.structure.link_names, carried, bodies)
+    except ValueError as error:
+        raise ValueError(f"bodies: {error}") from None
+
+
+def root(xp: Any, variance: Numbers) -> Numbers:
+    """Return square roots, through which a gradient runs that is zero where the variance is."""
+    there = variance > 0
+    found: Numbers = xp.where(there, variance, xp.ones_like(variance)) ** 0.5
+    return xp.where(there, found, xp.zeros_like(variance))
+
+
+def _root(matrix: Any) -> Any:
+    """Return D with D D^T = matrix, positive semidefinite."""
+    values, vectors = np.linalg.eigh(matrix)
+    kept = values > np.finfo(float).eps * values.max(initial=0.0) * len(values)
+    return vectors[:, kept] * np.sqrt(values[kept])

@@ -1,0 +1,269 @@
+"""Bodies whose masses, centres and radii of gyration are uncertain, and the exact covariance of what they carry.
+
+Link j carries pi_j, its inertial parameters, with c its centre and r_x its radii about that,
+
+    pi_j = f_j p_j    p = (m, m c, I)    I = m (sum_x r_x^2 e_x e_x^T + c . c 1 - c c^T)
+
+Principal axes e_x stay as they are. Masses f_j m_j, centres and radii are normal and independent of each other,
+but that masses of links may go together: f_j = (1 + e) (1 + e_j), with e the error of a body mass of which
+segments have fixed parts, and e_j those of the parts. So for all pairs of links
+
+    cov(pi_j, pi_l) = E[f_j f_l] E[p_j p_l^T] - E[f_j] E[f_l] E[p_j] E[p_l]^T
+                    = cov(f_j, f_l) E[p_j] E[p_l]^T + (j = l) E[f_j^2] cov(p_j)
+
+which is exact: moments of normals are polynomials. The mean of pi_j is not quite pi_j at the means, but more
+by m (tr P 1 - P + sum_x var(r_x) e_x e_x^T) in its inertia, P being the covariance of the centre.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..chosen_names import short
+from ..rule.joint_tree import JointTree
+from ..rule.tree_arrays import SHAPES, formula_sources, given_numbers, own_numbers
+
+Floats = NDArray[np.float64]
+ROUNDING = 1e-9
+"""Part of a matrix' size that counts as rounding: entries off a diagonal, eigenvalues below zero."""
+PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+"""Entries of an inertia, in the order of inertial parameters."""
+
+
+class UncertainBodies(NamedTuple):
+    """Standard deviations of what links carry, N links in the order of j; 0 for what is certain.
+
+    Axes are those of the links' own frames, as of `Bodies`.
+    """
+
+    masses: ArrayLike = 0.0
+    """Of each link's mass, as a part of it: 0.1 for 10 %; (N,) or one number for all."""
+    centres: ArrayLike = 0.0
+    """Of centres of mass in m: (N, 3) along x, y, z, or one number for all; or covariances in m^2, (N, 3, 3)."""
+    radii: ArrayLike = 0.0
+    """Of each of the three radii of gyration about the centre, as a part of it; (N,) or one number."""
+    body_mass: float = 0.0
+    """Of a body mass of which links have fixed parts, as a part of it."""
+    segments: ArrayLike = 1.0
+    """Ones for the links that have parts of that mass, zeros for others; (N,)."""
+    correlation: ArrayLike | None = None
+    """Correlation of the links' own errors of mass, (N, N); none unless given."""
+
+
+class BodySpread(NamedTuple):
+    """Covariance of inertial parameters: cov(pi_j, pi_l) = C_jl p_j p_l^T + (j = l) F_j F_j^T."""
+
+    means: Floats
+    """Means of p_j, (N, 10)."""
+    shapes: Floats
+    """F_j, factors of what centres and radii do, (N, 10, R); none where neither is uncertain."""
+    masses: Floats
+    """C, covariance of the factors f_j of masses, (N, N)."""
+
+    @property
+    def is_diagonal(self) -> bool:
+        """True if no two masses go together."""
+        return bool((self.masses == np.diag(np.diag(self.masses))).all())
+
+    def covariance(self) -> Floats:
+        """Return the covariance of all parameters, (10 N, 10 N)."""
+        count = len(self.means)
+        whole = np.einsum("jl,jp,lq->jplq", self.masses, self.means, self.means)
+        each = np.arange(count)
+        whole[each, :, each, :] += self.shapes @ self.shapes.mT
+        size = 10 * count
+        return whole.reshape(size, size)
+
+
+def body_spread(
+    links: Sequence[str], carried: Sequence[Floats], given: Any, axes: Floats | None = None
+) -> BodySpread:
+    """Return the spread of bodies.
+
+    links: their names; carried: masses (N,), centres (N, 3), inertias about these (N, 3, 3); given: an
+    `UncertainBodies`; axes: rotations (N, 3, 3) whose axes are taken where principal ones are not unique
+
+    Raises ValueError, which names field and link, for what cannot be.
+    """
+    count, (masses, centres, inertias) = len(links), carried
+    own, radii = (_parts(links, name, getattr(given, name)) for name in ("masses", "radii"))
+    places = _centre_covariances(links, given.centres)
+    part = _parts(["body_mass"], "body_mass", given.body_mass)[0] ** 2
+    segments = _parts(links, "segments", given.segments)
+    together = checked_correlation(links, given.correlation)
+    factors = (1.0 + part * np.outer(segments, segments)) * (1.0 + together * np.outer(own, own)) - 1.0
+    turned = np.broadcast_to(np.eye(3), (count, 3, 3)) if axes is None else axes
+    found = [
+        _moments(masses[j], centres[j], places[j], *principal_moments(inertias[j], turned[j]), radii[j])
+        for j in range(count)
+    ]
+    shapes = [np.sqrt(1.0 + factors[j, j]) * _factor(cov) for j, (_, cov) in enumerate(found)]
+    widest = max(f.shape[1] for f in shapes)
+    padded = [np.pad(f, ((0, 0), (0, widest - f.shape[1]))) for f in shapes]
+    return BodySpread(np.array([mean for mean, _ in found]), np.array(padded), factors)
+
+
+def tree_bodies(
+    tree: JointTree, parameters: Mapping[str, Any], bodies: Sequence[Any] | None
+) -> tuple[Floats, Floats, Floats]:
+    """Return the masses (N,), centres (N, 3) and inertias (N, 3, 3) that a robot's links carry.
+
+    Raises ValueError where they differ from sample to sample, which a spread cannot.
+    """
+    plain = {name: _plain(value) for name, value in parameters.items()}
+    own = [_plain(a) for a in bodies] if bodies is not None else None
+    axes = [] if own is None else [a.ndim - 1 - len(shape) for a, shape in zip(own, SHAPES.values(), strict=True)]
+    for name, more in (*((n, v.ndim) for n, v in plain.items()), *(("bodies", more) for more in axes)):
+        if more:
+            raise ValueError(f"{short(name)} differs from sample to sample; uncertainty is of one robot's bodies")
+    xp: Any = np
+    listed: Any = own_numbers(tree), formula_sources(tree)
+    numbers: Any = given_numbers(xp, tree, listed, plain, None, ())
+    if own is not None:
+        return own[0], own[1], own[2]
+    mass, centre, inertia = (a[..., 0] for a in numbers.bodies)
+    return mass, centre.T, inertia.transpose(2, 0, 1)
+
+
+def checked_correlation(names: Sequence[str], given: Any) -> Floats:
+    """Return a matrix of correlations; the unit matrix for None.
+
+    Raises ValueError for what is not one.
+    """
+    count = len(names)
+    if given is None:
+        return np.eye(count)
+    matrix = _numbers("correlation", given)
+    if matrix.shape != (count, count):
+        raise ValueError(f"correlation has shape {matrix.shape}; it must be {(count, count)}")
+    if (np.abs(np.diag(matrix) - 1.0) > ROUNDING).any() or (np.abs(matrix - matrix.T) > ROUNDING).any():
+        raise ValueError("correlation is not symmetric with ones on its diagonal; give such a matrix")
+    j, l = np.unravel_index(int(np.abs(matrix).argmax()), matrix.shape)
+    if np.abs(matrix[j, l]) > 1.0 + ROUNDING:
+        told = f"{short(names[j])} and {short(names[l])}"
+        raise ValueError(f"correlation of {told} is {matrix[j, l]:g}; give one from -1 to 1")
+    least = float(np.linalg.eigvalsh(matrix).min())
+    if least < -ROUNDING * count:
+        raise ValueError(
+            f"correlation cannot be: its smallest eigenvalue is {least:.3g}, and no masses go together so; "
+            "correlations of three have to agree with each other"
+        )
+    return matrix
+
+
+def principal_moments(inertia: Floats, axes: Floats) -> tuple[Floats, Floats]:
+    """Return the principal moments of an inertia (3, 3), (3,), and the principal axes, columns (3, 3).
+
+    axes: columns that are the axes where several will do, as of a body of revolution
+    """
+    there = 0.5 * axes.T @ (inertia + inertia.T) @ axes
+    off = there - np.diag(np.diag(there))
+    if np.abs(off).max() <= ROUNDING * np.abs(there).max():
+        return np.maximum(np.diag(there), 0.0), axes
+    moments, own = np.linalg.eigh(there)
+    return np.maximum(moments, 0.0), axes @ own
+
+
+def _moments(
+    mass: float, centre: Floats, p: Floats, principal: Floats, axes: Floats, part: float
+) -> tuple[Floats, Floats]:
+    """Return the mean (10,) and covariance (10, 10) of p = (m, m c, I).
+
+    p: covariance of the centre; principal, axes: moments about it; part: deviation of radii, as a part of them
+    """
+    # Moments of a normal c: E[c c^T] = P + c c^T, and by Isserlis' theorem
+    # cov(c_a c_b, c_d) = P_ad c_b + P_bd c_a, cov(c_a c_b, c_d c_e) = c_a c_d P_be + ... + P_ad P_be + P_ae P_bd.
+    outer = np.outer(centre, centre)
+    second = p + outer
+    third = np.einsum("ad,b->abd", p, centre) + np.einsum("bd,a->abd", p, centre)
+    fourth = np.einsum("ad,be->abde", second, p) + np.einsum("ae,bd->abde", second, p)
+    fourth = fourth + np.einsum("bd,ae->abde", outer, p) + np.einsum("be,ad->abde", outer, p)
+    moments = np.zeros((15, 15))
+    moments[:3, :3] = p
+    moments[3:12, :3] = third.reshape(9, 3)
+    moments[:3, 3:12] = moments[3:12, :3].T
+    moments[3:12, 3:12] = fourth.reshape(9, 9)
+    # Of r^2 with r normal: E = (1 + part^2) r^2, var = (4 part^2 + 2 part^4) r^4.
+    moments[12:, 12:] = np.diag((4.0 * part**2 + 2.0 * part**4) * principal**2)
+    table = _table(mass, axes)
+    mean = table @ np.concatenate([centre, second.reshape(9), (1.0 + part**2) * principal])
+    mean[0] = mass
+    return mean, table @ moments @ table.T
+
+
+def _table(mass: float, axes: Floats) -> Floats:
+    """Return the matrix (10, 15) of (m, m c, I), but for m itself, from c, c c^T and principal moments."""
+    table = np.zeros((10, 15))
+    table[1:4, :3] = mass * np.eye(3)
+    for row, (a, b) in enumerate(PAIRS, 4):
+        own = (a == b) * np.eye(3)
+        own[a, b] -= 1.0
+        table[row, 3:12] = mass * own.reshape(9)
+        table[row, 12:] = axes[a] * axes[b]
+    return table
+
+
+def _factor(covariance: Floats) -> Floats:
+    """Return F with F F^T = covariance (10, 10), as many columns as it has directions."""
+    scale = np.sqrt(np.diag(covariance))
+    there = scale > 0
+    if not there.any():
+        return np.zeros((len(covariance), 0))
+    own = covariance[np.ix_(there, there)] / np.outer(scale[there], scale[there])
+    values, vectors = np.linalg.eigh(own)
+    kept = values > np.finfo(float).eps * len(own)
+    factor = np.zeros((len(covariance), int(kept.sum())))
+    factor[there] = scale[there, None] * vectors[:, kept] * np.sqrt(values[kept])
+    return factor
+
+
+def _centre_covariances(links: Sequence[str], given: Any) -> Floats:
+    """Return covariances (N, 3, 3) of the centres in m^2."""
+    count, values = len(links), _numbers("centres", given)
+    if values.shape == (count, 3, 3):
+        for link, matrix in zip(links, values, strict=True):
+            size = np.abs(matrix).max()
+            if np.abs(matrix - matrix.T).max() > ROUNDING * size or (
+                np.linalg.eigvalsh(matrix).min() < -ROUNDING * size
+            ):
+                raise ValueError(f"centres of {short(link)} is not a covariance; give (3,) deviations in m")
+        return values
+    if values.shape not in ((), (count, 3)):
+        raise ValueError(
+            f"centres has shape {values.shape}; it must be {(count, 3)} or one number, in m, or covariances "
+            f"{(count, 3, 3)}, in m^2"
+        )
+    if (values < 0).any():
+        raise ValueError(f"centres has {values.min():g}; a standard deviation is 0 or more")
+    squares = np.broadcast_to(values, (count, 3)) ** 2
+    return squares[:, :, None] * np.eye(3)
+
+
+def _parts(links: Sequence[str], name: str, given: Any) -> Floats:
+    """Return deviations (N,), each a part of what it is of."""
+    values = _numbers(name, given)
+    if values.shape not in ((), (len(links),)):
+        raise ValueError(f"{name} has shape {values.shape}; it must be {(len(links),)} or one number")
+    every = np.broadcast_to(values, (len(links),))
+    for link, value in zip(links, every, strict=True):
+        if value < 0:
+            raise ValueError(f"{name} of {short(link)} is {value:g}; a standard deviation is 0 or more")
+    return every
+
+
+def _numbers(name: str, given: Any) -> Floats:
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} is {short(given)}; give numbers") from None
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name} has NaN or infinity; give finite numbers")
+    return values
+
+
+def _plain(value: Any) -> Floats:
+    """Return a number, an array or a tensor as an array, without gradients."""
+    found = value.detach().cpu().numpy() if hasattr(value, "detach") else value
+    return np.asarray(found, dtype=float)
