@@ -71,7 +71,9 @@ DEVIATIONS = (
     *_by_order("propagation_sd", (TORQUE, TORQUE), ("gravity_sd", TORQUE), f"{SD} torque {TAU_IJK}"),
     *_one("torque_sd", "joint", TORQUE, f"{SD} joint torque of all links"),
     *(
-        Quantity("joint_propagation_sd", ("joint", "cause"), TORQUE, f"{SD} torque of all links", (ORDER, order))
+        Quantity(
+            "joint_propagation_sd", ("joint", "cause"), TORQUE, f"{SD} torque of all links", (ORDER, order)
+        )
         for order in ("acceleration", "velocity")
     ),
     *_one("joint_gravity_sd", "joint", TORQUE, f"{SD} torque at rest of all links"),

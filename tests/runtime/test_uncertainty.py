@@ -10,12 +10,11 @@ from conftest import DATA, PANDA
 from helpers.answers import random_states
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
-from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies, body_spread
+from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
 
 pytest.importorskip("pinocchio")
 
 import pinocchio as pin
-
 from numeric import oracle_models
 from numeric.pinocchio_model import PinocchioModel
 
@@ -67,7 +66,7 @@ class Oracle:
         for j, at in enumerate(self.bodies):
             inertia = self.model.inertias[at]
             m = np.full(DRAWS, inertia.mass)
-            c = inertia.lever + given.centres * draw.normal(size=(DRAWS, 3))
+            c = inertia.lever + given.centres[j] * draw.normal(size=(DRAWS, 3))
             moments = inertia.inertia
             plain = np.abs(moments - np.diag(np.diag(moments))).max() < 1e-9 * np.abs(moments).max()
             principal, axes = (np.diag(moments), np.eye(3)) if plain else np.linalg.eigh(moments)
@@ -107,7 +106,12 @@ def uncertain(count: int) -> UncertainBodies:
     np.fill_diagonal(correlation, 1.0)
     some = draw.integers(0, 2, count)
     return UncertainBodies(
-        draw.uniform(0.05, 0.15, count), 0.01, draw.uniform(0.05, 0.15, count), 0.08, some, correlation
+        draw.uniform(0.05, 0.15, count),
+        draw.uniform(0.003, 0.02, (count, 3)),
+        draw.uniform(0.05, 0.15, count),
+        0.08,
+        some,
+        correlation,
     )
 
 
@@ -122,9 +126,7 @@ def agree(found: Any, drawn: Any) -> None:
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=["planar3", "puma560", "panda", "crane"])
-def test_deviations_are_those_of_drawn_bodies(
-    robot: str, package_at: Callable[[str], ModuleType]
-) -> None:
+def test_deviations_are_those_of_drawn_bodies(robot: str, package_at: Callable[[str], ModuleType]) -> None:
     package = package_at(robot)
     dynamics, oracle = package.load("numpy"), Oracle(robot, package)
     given, motion = uncertain(dynamics.N), random_states(dynamics.n, STATES)

@@ -73,9 +73,24 @@ class AnalysisChoices:
         metavar="JOINT",
     )
 
+    uncertain: str | None = option(
+        None,
+        "How uncertain masses, centres and radii of gyration are: a standard deviation stands beside"
+        " each torque",
+        metavar="FILE",
+        is_file=True,
+    )
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Paths of all files that choices name."""
+        return (*self.loads, *self.contact_loads, *(() if self.uncertain is None else (self.uncertain,)))
+
     def request(self, robot: OpenedRobot) -> Request:
         """Return what is asked of a robot's log."""
-        return Request(self.reading, self.processing, self.outputs, self.borne(robot), self.contacts(robot))
+        uncertain = None if self.uncertain is None else Path(self.uncertain)
+        borne, held = self.borne(robot), self.contacts(robot)
+        return Request(self.reading, self.processing, self.outputs, borne, held, uncertain)
 
     def payloads(self, robot: OpenedRobot) -> tuple[Payload, ...]:
         """Return the point masses that a robot carries."""

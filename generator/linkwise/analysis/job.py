@@ -31,6 +31,7 @@ from linkwise.analysis.show import draw
 from linkwise.analysis.stream import Sink, span_of, stream
 from linkwise.analysis.torques import Decomposer, ToldBeside
 from linkwise.analysis.traced_rows import TracedRows
+from linkwise.analysis.uncertain_file import UncertainRobot, read_uncertain
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
@@ -153,6 +154,8 @@ class Request:
     outputs: Outputs = field(default_factory=Outputs)
     loads: Loads = field(default_factory=Loads)
     contacts: Contacts = field(default_factory=Contacts)
+    uncertain: Path | None = None
+    """File of how uncertain bodies are."""
 
 
 @dataclass(frozen=True)
@@ -166,6 +169,7 @@ class Job:
     closed: ClosedLog | None = None
     """Largest violation of a constraint by positions of the log, where joints are tied."""
     phases: tuple[PlacedPhase, ...] = ()
+    uncertain: UncertainRobot | None = None
 
     def run(self, sink: Sink, progress: Progress) -> WholeMovement:
         """Analyse every sample, handing the blocks to `sink`."""
@@ -186,6 +190,7 @@ class Job:
             "induced": [point.name for point in self.decomposer.rows.points],
             "trace": None if self.decomposer.traced is None else self.decomposer.traced.record(),
             "reactions": [joint.name for joint in self.decomposer.reactions.borne],
+            "uncertain": None if self.uncertain is None else self.uncertain.record(),
         }
 
     @property
@@ -228,6 +233,7 @@ class Job:
             closed=self.closed,
             times=self.decomposer.times,
             phases=self.phases,
+            uncertain=None if self.uncertain is None else self.uncertain.record(),
             traced=None if self.decomposer.traced is None else self.decomposer.traced.record(),
         )
 
@@ -281,6 +287,7 @@ def prepared(
     buffer: a directory that keeps the samples in a disk buffer, not in memory
     """
     reading, processing, outputs = asked.reading, asked.processing, asked.outputs
+    uncertain = None if asked.uncertain is None else read_uncertain(asked.uncertain, robot)
     points, bearings = induced_points(outputs.induced, robot), borne_joints(outputs.reactions, robot)
     opened = open_log(log, reading, robot.joints, robot.file_joints, robot.qpos)
     with within(str(log)):
@@ -309,9 +316,9 @@ def prepared(
         measured = measured_torques(opened, torques, robot, *how)
         traced = TracedRows.of(made, robot, borne, samples, measured and measured.some(start, stop))
     planned = InducedPlan(points, outputs.induced_whole)
-    told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced)
+    told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, uncertain)
     decomposer = Decomposer.of(robot, processing.convention, borne, times, told)
-    return Job(log.name, asked, samples, decomposer, closed, phases)
+    return Job(log.name, asked, samples, decomposer, closed, phases, uncertain)
 
 
 def _samples(

@@ -8,6 +8,7 @@ import numpy as np
 from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.analysis.borne_joints import BorneJoint
+from linkwise.analysis.certain_signs import CertainSigns, Peak
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.disk_rows import let_go
@@ -68,6 +69,8 @@ class WholeMovement:
     closure: Closure
     total: int
     """Number of samples."""
+    peaks: tuple[Peak, ...]
+    """Torques at their largest magnitude, with their deviations there; none where nothing is uncertain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +104,8 @@ class AnalysisResult(WholeMovement):
     """Times at which contacts are on, where there are any."""
     phases: tuple[PlacedPhase, ...] = ()
     """Phases that were asked for."""
+    uncertain: Mapping[str, Any] | None = None
+    """How uncertain bodies were assumed to be, as the record has it; None without."""
     traced: Mapping[str, Any] | None = None
     """Joints, sources and windows of a trace, as the record has them; None without."""
 
@@ -135,6 +140,11 @@ class AnalysisResult(WholeMovement):
         for at in range(0, self.values.shape[1], most):
             yield replace(self, values=self.values[:, at : at + most])
             let_go(self.values)
+
+    @property
+    def signs(self) -> CertainSigns:
+        """Shares with their deviations at their largest magnitude, and whose sign is certain."""
+        return CertainSigns(self.peaks, self.robot.joints, self.robot.links)
 
     @property
     def time(self) -> Array:
@@ -247,6 +257,9 @@ class AnalysisResult(WholeMovement):
         if self.robot.contacts is not None:
             parts.append(printable(f"contacts {listed(self.robot.contacts.names)}"))
         parts += [f"loads filtered at {cutoff:g} Hz" for cutoff in cutoffs]
+        if self.uncertain is not None:
+            parts.append(printable(f"bodies uncertain as {self.uncertain['file']} says"))
+            parts += map(printable, self.signs.lines)
         return " · ".join(parts)
 
     @property

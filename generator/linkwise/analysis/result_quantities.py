@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from linkwise_runtime import call_table
 from linkwise_runtime.call import Quantity
-from linkwise_runtime.call_table import CALLS, PASSIVE_KINDS, PROPAGATION, TORQUE
+from linkwise_runtime.call_table import CALLS, DEVIATIONS, PASSIVE_KINDS, PROPAGATION, TORQUE
 
 MOTION = ("tau_qdd", "tau_qd")
 """The parts of a partial torque by the motion of each joint."""
@@ -28,6 +28,8 @@ TORQUE_OF = {
 POWER, POWER_TERMS = tuple(TORQUE_OF)[:3], tuple(TORQUE_OF)[3:]
 """Power of joints, and parts of it that are in a result only on request; contacts have power of their own, as
 they slip."""
+DEVIATION_OF = {f"sd/{torque}": torque for torque in ("tau", "tau_link", *MOTION, "tau_gravity")}
+"""Standard deviations where bodies are uncertain, and the torques that they are of."""
 FORCE_OF = {torque: torque.replace("tau", "force", 1) for torque in (*PASSIVE, "tau_load")}
 """Constraint forces due to the torques that stand beside those of the links, by torque."""
 FORCES = ("force", "force_link", *FORCE_OF.values())
@@ -218,6 +220,17 @@ TABLE = {
     "reaction_friction": ("", "wrench that the joint carries as ties bear joints' own Coulomb friction"),
     "reaction_armature": ("", "wrench that the joint carries as ties bear joints' own armatures"),
     "reaction_load": ("reaction_loads bearing wrench load", "wrench that the joint carries of the load"),
+    "sd/tau": ("", "standard deviation of the joint torque, by the bodies of all links together"),
+    "sd/tau_link": ("", "standard deviation of the partial torque: on the joint, through the link"),
+    "sd/tau_qdd": (
+        "",
+        "standard deviation of the torque on the joint, through the link, by the cause's acceleration",
+    ),
+    "sd/tau_qd": (
+        "",
+        "standard deviation of the torque on the joint, through the link, by the cause's velocity",
+    ),
+    "sd/tau_gravity": ("", "standard deviation of the torque on the joint, through the link, by gravity"),
 }
 """Quantities, in the order of a Dataset: the array there with its axes, and the meaning.
 
@@ -252,10 +265,13 @@ UNITS |= {"time": "s", "q": "position:joint", "qd": "velocity:joint", "qdd": "ac
 UNITS |= {"energy": "J", "kinetic": "J", "gain": "W", "flow": "W", "reaction": "torque:wrench"}
 UNITS |= {"contact": "", "slip": "velocity:constraint"}
 """Unit by the first part of a name, as the runtime writes it: torque:joint depends on the joint."""
+PLACES = {"tau_link": 0, "tau_qdd": 3, "tau_qd": 4, "tau_gravity": 5, "tau": 6}
+"""Places of deviations in what `uncertainty` answers."""
 OF_PACKAGES = {
     "tau_link": CALLS["partial_torque"].answers[0],
     **dict(zip(OF_RIGID, PROPAGATION, strict=True)),
     "tau_share": CALLS["named_shares"].answers[0],
+    **{f"sd/{name}": DEVIATIONS[number] for name, number in PLACES.items()},
     **dict(zip(PASSIVE, call_table.PASSIVE, strict=True)),
     **dict(zip(POWER_TERMS, call_table.POWER, strict=False)),  # whose last is that of gravity
 }

@@ -55,6 +55,7 @@ def analyze(
     trace_restart: Sequence[str] = (),
     trace_torque: Mapping[str, str] | Sequence[tuple[str, str]] = (),
     trace_torque_factor: float = 1.0,
+    uncertain: str | PathLike[str] | None = None,
 ) -> Analysis:
     """Analyse a motion log with a generated robot, all samples in memory.
 
@@ -74,6 +75,7 @@ def analyze(
     trace_restart: times in s at which the trace begins anew, written as numbers, or "phases"
     trace_torque: columns of torques that actuators gave, by joint; what these leave is a source "residual"
     trace_torque_factor: what brings these to N m and N
+    uncertain: file of how uncertain bodies are, which gives torques a standard deviation beside them
 
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
@@ -95,7 +97,9 @@ def analyze(
             trace_torque_factor,
         ),
     )
-    asked = Request(reading or Reading(), processing or Processing(), outputs, borne, held)
+    asked = Request(
+        reading or Reading(), processing or Processing(), outputs, borne, held, uncertain and Path(uncertain)
+    )
     job = prepared(Path(log), loaded, asked, progress)
     with EverySample(len(job.columns), job.count) as kept:
         return job.analysis(job.run(kept, progress), kept.values)
@@ -117,7 +121,8 @@ def analyze_to(
     for name in outputs.figures:
         check_figure(name, robot, told)
     refuse_inside_package(out)
-    for file in (log, *asked.loads.paths, *asked.contacts.measured.paths):
+    own = () if asked.uncertain is None else (asked.uncertain,)
+    for file in (log, *asked.loads.paths, *asked.contacts.measured.paths, *own):
         if is_inside(file, out):
             raise LinkwiseError(f"--out {out} is to be replaced and holds the log {file}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:

@@ -6,6 +6,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 from linkwise_runtime.motion.tracer import TraceState
 
+from linkwise.analysis.certain_signs import PeakSearch
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.even_time import TOLERANCE
 from linkwise.analysis.filtering import derivatives
@@ -80,6 +81,7 @@ class MovementSums:
         self._energy = np.zeros((1 + len(phases), 2, len(self._power)))
         self._last: tuple[Array, Array] | None = None
         self._steps = np.zeros(1 + len(phases))
+        self._search = PeakSearch(rows)
 
     def add(self, block: Array, closure: Closure) -> bool:
         """Add a block (rows, samples) and its errors; return whether all of its values are finite."""
@@ -91,6 +93,7 @@ class MovementSums:
         self._samples += block.shape[1]
         self._total += added
         np.maximum(self._peak, magnitude.max(axis=1), out=self._peak)
+        self._search.add(block)
         power = block[self._power]
         on = np.stack([np.ones(block.shape[1]), *self._on(block)])
         if self._last is not None:  # the step from the last block to this one
@@ -130,6 +133,7 @@ class MovementSums:
             totals=Totals(self._total / self._samples, self._peak),
             closure=self.closure,
             total=self._samples,
+            peaks=self._search.peaks(),
             work_by_source={power: work for power, work in whole.items() if power in WORK_BY_SOURCE},
             work_in_phases=tuple(phases),
             **{name: whole[power] for name, power in POWER_OF.items()},

@@ -12,6 +12,7 @@ from linkwise.analysis.closed_motion import reason_of
 from linkwise.analysis.contacts.ground import Standing
 from linkwise.analysis.contacts.terms import ContactTerms
 from linkwise.analysis.contacts.times import ContactTimes
+from linkwise.analysis.deviation_rows import DeviationRows
 from linkwise.analysis.induced_points import InducedPlan
 from linkwise.analysis.induced_power import PowerShares
 from linkwise.analysis.induced_shares import InducedShares
@@ -23,6 +24,7 @@ from linkwise.analysis.result_rows import QuantityRows, ResultRows, torque_place
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.term_rows import TermArrays, term_rows
 from linkwise.analysis.traced_rows import ExtendedBlock, TracedRows
+from linkwise.analysis.uncertain_file import UncertainRobot
 from linkwise.analysis.verify import Closure, residual, worst_of
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
@@ -45,6 +47,8 @@ class ToldBeside(NamedTuple):
     """True to tell by source the power of links, and that which flows through joints."""
     traced: TracedRows | None = None
     """Velocities that are traced to their sources."""
+    uncertain: UncertainRobot | None = None
+    """How uncertain bodies are; None where torques have no deviations."""
 
 
 NOTHING_BESIDE = ToldBeside()
@@ -76,6 +80,7 @@ class Decomposer:
     power: PowerShares
     forces: ReactionForces
     reactions: ReactionShares
+    deviations: DeviationRows
     times: ContactTimes | None
     terms: ContactTerms | None
     """Terms of the robot on its contacts; None without contacts."""
@@ -110,15 +115,17 @@ class Decomposer:
         velocities = [at for at in places if at[0] == "tau_qd"]
         every = [*places, *power.places, *reactions.places]
         every += [] if traced is None else traced.places(velocities)
+        sources = TermArrays(*([row[-1] for row in some] for some in of_robot))
+        deviations = DeviationRows(robot, told.uncertain, convention, sources)
+        every += deviations.places(places)
         bearings, origins = [joint.name for joint in told.borne], () if traced is None else traced.origins
         rows = ResultRows.of(robot, every, loads, points, bearings, origins)
-        sources = TermArrays(*([row[-1] for row in some] for some in of_robot))
         parts = _sums(rows, "tau_link", *TERMS)
         wholes = _sums(rows, "tau", "tau_link", *PASSIVE, "tau_load")
         forces = ReactionForces(robot, tuple(loads), times)
         return cls(
             *(robot, tuple(loads), convention, rows, sources, parts, wholes),
-            *(induced, power, forces, reactions, times, terms, traced),
+            *(induced, power, forces, reactions, deviations, times, terms, traced),
         )
 
     def at(self, time: Array, inputs: Array) -> "Decomposer":
@@ -167,6 +174,7 @@ class Decomposer:
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
             rows.put(out, "tau_qd", _left(standing, velocity))
         self._fill_power(out, qd)
+        self.deviations.fill(out, rows, q, qd, qdd)
         return closure
 
     def trace(

@@ -34,7 +34,7 @@ app = typer.Typer(add_completion=False)
 @takes(
     *("log", "robot", "opensim_setup", "out", "units", "time", "topic", "qpos"),
     ...,
-    *("induced", "induced_sto", "sto_units", "induced_power", "reaction"),
+    *("induced", "induced_sto", "sto_units", "induced_power", "reaction", "uncertain"),
     *("trace", "trace_windows", "trace_weight", "trace_restart", "trace_torque"),
     *("trace_torque_factor", "backend", "page", "as_json"),
     complete=with_setup,
@@ -91,6 +91,7 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
         f" these to joint torques within {closure.links_relative:.1e} (relative){shares}",
         *_of_contacts(analysis),
         *_of_residual(analysis),
+        *analysis.signs.lines,
         *map(str, files),
     ]
 

@@ -139,7 +139,7 @@ def _check(plan: StudyPlan) -> None:
     for trial in plan.trials:
         with within(f"trial {trial.name!r}"):
             require_there(trial.log, or_folder=True)
-            for path in (*trial.choices.loads, *trial.choices.contact_loads):
+            for path in trial.choices.files:
                 require_there(path)
     if plan.cycles is not None and plan.cycles.table:
         _check_table(plan, plan.cycles.table)
@@ -207,8 +207,15 @@ def _trial(
         labels = [(SUBJECT, name), *labels]
     own = {key: value for key, value in entry.items() if key in usual}
     keys = vars(filled(AnalysisKeys, place, own, usual))
-    files = {key: tuple(resolved(path, folder) for path in keys[key]) for key in OF_FILES}
+    files = {key: _resolved(keys[key], folder) for key in OF_FILES}
     return Trial(name, tuple(labels), resolved(log, folder), _robot(robot, folder)), keys | files
+
+
+def _resolved(given: tuple[str, ...] | str | None, folder: Path) -> tuple[str, ...] | str | None:
+    """Return the paths of a choice from the study's folder on: several, one, or none."""
+    if given is None or isinstance(given, str):
+        return given and resolved(given, folder)
+    return tuple(resolved(path, folder) for path in given)
 
 
 def _robot(given: str, folder: Path) -> str:

@@ -26,7 +26,7 @@ CHUNK = 1 << 20
 def trial_files(plan: StudyPlan, trial: Trial) -> Iterator[str]:
     """Yield all files that a trial's numbers depend on."""
     yield from _inside(trial.log)
-    for path in (*trial.choices.loads, *trial.choices.contact_loads):
+    for path in trial.choices.files:
         yield path
         yield from _data_of(path)
     if Path(trial.robot).is_dir():
@@ -55,6 +55,7 @@ def trial_here(trial: Trial) -> Iterator[Trial]:
             trial.choices,
             loads=tuple(map(here, trial.choices.loads)),
             contact_loads=tuple(map(here, trial.choices.contact_loads)),
+            uncertain=trial.choices.uncertain and here(trial.choices.uncertain),
         )
         yield replace(trial, log=here(trial.log), choices=choices)
 
@@ -118,7 +119,7 @@ def trial_key(
         trial.name,
         trial.labels,
         trial.robot if is_built_in(trial.robot) else "",  # a built-in robot has no file to hash
-        {**asdict(trial.choices), **{key: len(getattr(trial.choices, key)) for key in OF_FILES}},
+        {**asdict(trial.choices), **{key: _count(getattr(trial.choices, key)) for key in OF_FILES}},
         plan.options.request(),
         None if plan.cycles is None else {**asdict(plan.cycles), "table": bool(plan.cycles.table)},
         plan.columns,
@@ -128,6 +129,11 @@ def trial_key(
         fingerprint(),
     ]
     return TrialKey(hashlib.sha256(json.dumps(told, default=str).encode()).hexdigest(), files)
+
+
+def _count(paths: tuple[str, ...] | str | None) -> int:
+    """Return the number of the files that a choice names."""
+    return len(paths) if isinstance(paths, tuple) else int(paths is not None)
 
 
 def _hash(path: str, trial: Trial) -> str:

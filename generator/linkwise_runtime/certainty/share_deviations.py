@@ -19,7 +19,7 @@ from ..chosen_names import known_kind
 from ..interface import Numbers, side_by_side
 from ..quantities import PARAMETERS
 from ..share_uncertainty import Uncertainty
-from .uncertain_bodies import BodySpread, UncertainBodies, body_spread, tree_bodies
+from .uncertain_bodies import BodySpread, UncertainBodies, body_axes, body_spread, tree_bodies
 
 AT_ONCE = 1 << 21
 """Most numbers of the regressors of a piece of samples."""
@@ -59,9 +59,7 @@ class ShareDeviations:
         place = {tuple(row): at for at, row in enumerate(layout.acceleration.tolist())}
         self._mirrored = np.array([place[min(i, k), j, max(i, k)] for i, j, k in layout.velocity.tolist()])
 
-    def packed(
-        self, q: Numbers, qd: Numbers, qdd: Numbers, with_sums: bool = True
-    ) -> PackedDeviations:
+    def packed(self, q: Numbers, qd: Numbers, qdd: Numbers, with_sums: bool = True) -> PackedDeviations:
         """Return the deviations for motion (S, n), as many samples at once as memory wants.
 
         with_sums: whether sums over the links by cause are wanted; else they are left out, (S, 0)
@@ -88,9 +86,7 @@ class ShareDeviations:
         every = self._backend.index(self._mirrored, q)
         moved = c2[..., every, :] * qdd[..., causes, None] + c1 * qd[..., causes, None]
         tau = [g[..., part, :] for part in self._slices["torque"]]
-        for j, (pairs, part) in enumerate(
-            zip(self._slices["torque"], self._slices["velocity"], strict=True)
-        ):
+        for j, (pairs, part) in enumerate(zip(self._slices["torque"], self._slices["velocity"], strict=True)):
             size = pairs.stop - pairs.start
             own = moved[..., part, :]
             tau[j] = tau[j] + own.reshape(*own.shape[:-2], size, size, own.shape[-1]).sum(-2)
@@ -181,7 +177,7 @@ def spread_of(backend: ArrayBackend, bodies: object) -> BodySpread:
     assert backend.tree is not None  # `check_regresses` has seen to it
     carried = tree_bodies(backend.tree, backend.parameters, cast(Any, backend.bodies))
     try:
-        return body_spread(backend.structure.link_names, carried, bodies)
+        return body_spread(backend.structure.link_names, carried, body_axes(backend.tree), bodies)
     except ValueError as error:
         raise ValueError(f"bodies: {error}") from None
 

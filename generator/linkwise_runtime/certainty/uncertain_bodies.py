@@ -1,12 +1,12 @@
-"""Bodies whose masses, centres and radii of gyration are uncertain, and the exact covariance of what they carry.
+"""Bodies whose masses, centres and radii of gyration are uncertain: exact covariance of what links carry.
 
 Link j carries pi_j, its inertial parameters, with c its centre and r_x its radii about that,
 
     pi_j = f_j p_j    p = (m, m c, I)    I = m (sum_x r_x^2 e_x e_x^T + c . c 1 - c c^T)
 
-Principal axes e_x stay as they are. Masses f_j m_j, centres and radii are normal and independent of each other,
-but that masses of links may go together: f_j = (1 + e) (1 + e_j), with e the error of a body mass of which
-segments have fixed parts, and e_j those of the parts. So for all pairs of links
+Principal axes e_x stay as they are. Errors of masses f_j m_j, centres and radii are normal and independent of
+each other, but that masses of links may go together: f_j = (1 + e) (1 + e_j), with e the error of a body mass
+of which segments have fixed parts, and e_j those of the parts. So for all pairs of links
 
     cov(pi_j, pi_l) = E[f_j f_l] E[p_j p_l^T] - E[f_j] E[f_l] E[p_j] E[p_l]^T
                     = cov(f_j, f_l) E[p_j] E[p_l]^T + (j = l) E[f_j^2] cov(p_j)
@@ -33,15 +33,13 @@ PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 
 class UncertainBodies(NamedTuple):
-    """Standard deviations of what links carry, N links in the order of j; 0 for what is certain.
-
-    Axes are those of the links' own frames, as of `Bodies`.
-    """
+    """Standard deviations of what links carry, N links in the order of j; 0 for what is certain."""
 
     masses: ArrayLike = 0.0
     """Of each link's mass, as a part of it: 0.1 for 10 %; (N,) or one number for all."""
     centres: ArrayLike = 0.0
-    """Of centres of mass in m: (N, 3) along x, y, z, or one number for all; or covariances in m^2, (N, 3, 3)."""
+    """Of centres of mass in m: (N, 3) along x, y, z of the body in its file, or one number for all; or
+    covariances in these axes in m^2, (N, 3, 3)."""
     radii: ArrayLike = 0.0
     """Of each of the three radii of gyration about the centre, as a part of it; (N,) or one number."""
     body_mass: float = 0.0
@@ -77,26 +75,23 @@ class BodySpread(NamedTuple):
         return whole.reshape(size, size)
 
 
-def body_spread(
-    links: Sequence[str], carried: Sequence[Floats], given: Any, axes: Floats | None = None
-) -> BodySpread:
+def body_spread(links: Sequence[str], carried: Sequence[Floats], axes: Floats, given: Any) -> BodySpread:
     """Return the spread of bodies.
 
-    links: their names; carried: masses (N,), centres (N, 3), inertias about these (N, 3, 3); given: an
-    `UncertainBodies`; axes: rotations (N, 3, 3) whose axes are taken where principal ones are not unique
+    links: their names; carried: masses (N,), centres (N, 3), inertias about these (N, 3, 3), in the axes of
+    their frames; axes: rotations (N, 3, 3) from the bodies' own axes to these; given: an `UncertainBodies`
 
     Raises ValueError, which names field and link, for what cannot be.
     """
     count, (masses, centres, inertias) = len(links), carried
     own, radii = (_parts(links, name, getattr(given, name)) for name in ("masses", "radii"))
-    places = _centre_covariances(links, given.centres)
+    places = axes @ _centre_covariances(links, given.centres) @ axes.mT
     part = _parts(["body_mass"], "body_mass", given.body_mass)[0] ** 2
     segments = _parts(links, "segments", given.segments)
     together = checked_correlation(links, given.correlation)
     factors = (1.0 + part * np.outer(segments, segments)) * (1.0 + together * np.outer(own, own)) - 1.0
-    turned = np.broadcast_to(np.eye(3), (count, 3, 3)) if axes is None else axes
     found = [
-        _moments(masses[j], centres[j], places[j], *principal_moments(inertias[j], turned[j]), radii[j])
+        _moments(masses[j], centres[j], places[j], *principal_moments(inertias[j], axes[j]), radii[j])
         for j in range(count)
     ]
     shapes = [np.sqrt(1.0 + factors[j, j]) * _factor(cov) for j, (_, cov) in enumerate(found)]
@@ -114,10 +109,16 @@ def tree_bodies(
     """
     plain = {name: _plain(value) for name, value in parameters.items()}
     own = [_plain(a) for a in bodies] if bodies is not None else None
-    axes = [] if own is None else [a.ndim - 1 - len(shape) for a, shape in zip(own, SHAPES.values(), strict=True)]
+    axes = (
+        []
+        if own is None
+        else [a.ndim - 1 - len(shape) for a, shape in zip(own, SHAPES.values(), strict=True)]
+    )
     for name, more in (*((n, v.ndim) for n, v in plain.items()), *(("bodies", more) for more in axes)):
         if more:
-            raise ValueError(f"{short(name)} differs from sample to sample; uncertainty is of one robot's bodies")
+            raise ValueError(
+                f"{short(name)} differs from sample to sample; uncertainty is of one robot's bodies"
+            )
     xp: Any = np
     listed: Any = own_numbers(tree), formula_sources(tree)
     numbers: Any = given_numbers(xp, tree, listed, plain, None, ())
@@ -125,6 +126,12 @@ def tree_bodies(
         return own[0], own[1], own[2]
     mass, centre, inertia = (a[..., 0] for a in numbers.bodies)
     return mass, centre.T, inertia.transpose(2, 0, 1)
+
+
+def body_axes(tree: JointTree) -> Floats:
+    """Return the rotations from the axes of bodies in their file to those of the links' frames, (N, 3, 3)."""
+    own = {frame.name: frame.rotation for frame in tree.frames}
+    return np.array([own.get(tree.link_name(j), np.eye(3)) for j in range(len(tree.links))], dtype=float)
 
 
 def checked_correlation(names: Sequence[str], given: Any) -> Floats:
@@ -171,10 +178,12 @@ def _moments(
 ) -> tuple[Floats, Floats]:
     """Return the mean (10,) and covariance (10, 10) of p = (m, m c, I).
 
-    p: covariance of the centre; principal, axes: moments about it; part: deviation of radii, as a part of them
+    p: covariance of the centre; principal, axes: moments about it; part: of radii, as a part of them
     """
     # Moments of a normal c: E[c c^T] = P + c c^T, and by Isserlis' theorem
-    # cov(c_a c_b, c_d) = P_ad c_b + P_bd c_a, cov(c_a c_b, c_d c_e) = c_a c_d P_be + ... + P_ad P_be + P_ae P_bd.
+    # cov(c_a c_b, c_d) = P_ad c_b + P_bd c_a,
+    # cov(c_a c_b, c_d c_e) = c_a c_d P_be + c_a c_e P_bd + c_b c_d P_ae + c_b c_e P_ad
+    #                         + P_ad P_be + P_ae P_bd.
     outer = np.outer(centre, centre)
     second = p + outer
     third = np.einsum("ad,b->abd", p, centre) + np.einsum("bd,a->abd", p, centre)

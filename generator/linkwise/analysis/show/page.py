@@ -12,6 +12,7 @@ from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import (
     BY_POWER,
+    DEVIATION_OF,
     FORCES,
     GROUND,
     INDUCED,
@@ -63,7 +64,7 @@ def view(result: AnalysisResult) -> dict[str, str]:
     }
 
 
-OFF_PAGE = (*TORQUE_OF, *FORCES, *GROUND, *INDUCED, *BY_POWER, *REACTIONS, *TRACED)
+OFF_PAGE = (*TORQUE_OF, *FORCES, *GROUND, *INDUCED, *BY_POWER, *REACTIONS, *TRACED, *DEVIATION_OF)
 """Quantities that a page does not hold: power, the product of two that it holds, power by source, and those
 of contacts; of what `sourced` shows it holds sums."""
 
