@@ -14,70 +14,14 @@ from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
 
 pytest.importorskip("pinocchio")
 
-import pinocchio as pin
 from numeric import oracle_models
+from numeric.drawn_bodies import Oracle, agree
 from numeric.pinocchio_model import PinocchioModel
 
-DRAWS, STATES = 20_000, 3
+STATES = 3
 CRANE = DATA / "crane.urdf"
 ROBOTS = ["planar3", "puma560", str(PANDA), str(CRANE)]
 """Two tables, an arm of a file, and a tree on a floating base, in which joints follow others."""
-
-
-class Oracle:
-    """Pinocchio's torques of bodies that are drawn, link by link."""
-
-    def __init__(self, robot: str, package: ModuleType) -> None:
-        own = package.tree.TREE
-        if robot == str(CRANE):
-            options = Options(base="floating")
-            whole = PinocchioModel(CRANE, read_system(CRANE, options), True)
-            self.model, self.n, self.state, self.tie = whole.model, whole.n, whole._state, whole.tie
-        else:
-            made = {"planar3": oracle_models.planar3, "puma560": oracle_models.puma560}
-            self.model = made[robot]() if robot in made else oracle_models.panda(PANDA)
-            self.n, self.tie = self.model.nv, np.eye(self.model.nv)
-            self.state = lambda *motion: motion
-        self.data = self.model.createData()
-        self.bodies = [self.model.getJointId(own.joints[link.joint].name) for link in own.links]
-
-    def rows(self, q: Any, qd: Any, qdd: Any) -> Any:
-        """Y (n, N, 10) in the frames of Pinocchio's joints."""
-        full = pin.computeJointTorqueRegressor(self.model, self.data, *self.state(q, qd, qdd))
-        return (self.tie.T @ full).reshape(self.n, -1, 10)[:, [at - 1 for at in self.bodies]]
-
-    def shares(self, q: Any, qd: Any, qdd: Any) -> tuple[Any, Any, Any]:
-        """Y of c2_ijk qdd_k and c1_ijk qd_k (n, N, n, 10) and of g_ij (n, N, 10), by differences."""
-        rest, units = np.zeros(self.n), np.eye(self.n)
-        weight, speed = self.rows(q, rest, rest), self.rows(q, qd, rest)
-        c2 = np.stack([self.rows(q, rest, e) - weight for e in units], 2)
-        # 1/2 dh/dqd_k = 1/2 (h(qd + e_k) - h(qd) - h(e_k)) of an h that is quadratic
-        faster = [self.rows(q, qd + e, rest) - self.rows(q, e, rest) for e in units]
-        c1 = np.stack([0.5 * (f - speed + weight) for f in faster], 2)
-        return c2 * qdd[:, None], c1 * qd[:, None], weight
-
-    def drawn(self, given: UncertainBodies, seed: int) -> Any:
-        """Parameters of all links, (draws, N, 10), by the law that docs/method.md states."""
-        draw, count = np.random.default_rng(seed), len(self.bodies)
-        together = np.eye(count) if given.correlation is None else np.array(given.correlation)
-        own = draw.multivariate_normal(np.zeros(count), together, DRAWS) * given.masses
-        whole = 1.0 + given.body_mass * draw.normal(size=(DRAWS, 1)) * given.segments
-        every = []
-        for j, at in enumerate(self.bodies):
-            inertia = self.model.inertias[at]
-            m = np.full(DRAWS, inertia.mass)
-            c = inertia.lever + given.centres[j] * draw.normal(size=(DRAWS, 3))
-            moments = inertia.inertia
-            plain = np.abs(moments - np.diag(np.diag(moments))).max() < 1e-9 * np.abs(moments).max()
-            principal, axes = (np.diag(moments), np.eye(3)) if plain else np.linalg.eigh(moments)
-            longer = 1.0 + given.radii[j] * draw.normal(size=(DRAWS, 3))
-            i = np.einsum("dx,ax,bx->dab", longer**2 * principal, axes, axes)
-            i += inertia.mass * (c**2).sum(1)[:, None, None] * np.eye(3)
-            i -= inertia.mass * c[:, :, None] * c[:, None]
-            entries = [i[:, a, b] for a, b in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))]
-            heavier = (whole * (1.0 + own))[:, j, None]
-            every.append(heavier * np.stack([m, *(m * x for x in c.T), *entries], 1))
-        return np.stack(every, 1)
 
 
 @pytest.fixture(scope="module")
@@ -95,6 +39,17 @@ def package_at(
         return import_package(folder)
 
     return make
+
+
+def oracle_of(robot: str, package: ModuleType) -> Oracle:
+    """Pinocchio's model of a robot."""
+    made = {
+        "planar3": oracle_models.planar3,
+        "puma560": oracle_models.puma560,
+        str(PANDA): lambda: oracle_models.panda(PANDA),
+        str(CRANE): lambda: PinocchioModel(CRANE, read_system(CRANE, Options(base="floating")), True),
+    }
+    return Oracle(made[robot](), package.tree.TREE)
 
 
 def uncertain(count: int) -> UncertainBodies:
@@ -115,20 +70,10 @@ def uncertain(count: int) -> UncertainBodies:
     )
 
 
-def agree(found: Any, drawn: Any) -> None:
-    """Hold deviations to those of draws: within 5 % for 95 % of entries, within 20 % where they count."""
-    found, drawn = np.ravel(found), np.ravel(drawn)
-    there = drawn > 1e-10 * drawn.max()  # off the path, and where only rounding is
-    assert found[~there].max(initial=0.0) <= 1e-10 * drawn.max()
-    apart = np.abs(found[there] / drawn[there] - 1.0)
-    assert np.quantile(apart, 0.95) <= 0.05
-    assert apart[drawn[there] > 1e-3 * drawn.max()].max() <= 0.20
-
-
 @pytest.mark.parametrize("robot", ROBOTS, ids=["planar3", "puma560", "panda", "crane"])
 def test_deviations_are_those_of_drawn_bodies(robot: str, package_at: Callable[[str], ModuleType]) -> None:
     package = package_at(robot)
-    dynamics, oracle = package.load("numpy"), Oracle(robot, package)
+    dynamics, oracle = package.load("numpy"), oracle_of(robot, package)
     given, motion = uncertain(dynamics.N), random_states(dynamics.n, STATES)
     found, drawn = dynamics.uncertainty(*motion, given), oracle.drawn(given, 1)
     for s in range(STATES):
@@ -151,3 +96,78 @@ def test_deviations_are_those_of_drawn_bodies(robot: str, package_at: Callable[[
         agree(found.joint_power[s], spread(whole) * np.abs(qd))
         agree(found.power[s], spread(whole, True) * np.abs(qd)[:, None])
         agree(found.c1[s] * np.abs(qd), spread(c1, True))
+
+
+def test_lengths_count_by_slopes_of_robots_whose_joints_are_elsewhere(
+    package_at: Callable[[str], ModuleType],
+) -> None:
+    package = package_at(str(CRANE))
+    dynamics, oracle = package.load("numpy"), oracle_of(str(CRANE), package)
+    names = dynamics.tree_joint_names
+    lengths = np.zeros((len(names), 3))
+    moved = {"pitch": np.array([0.003, 0.0, 0.01]), "level": np.array([0.002, 0.005, 0.004])}
+    for name, sizes in moved.items():
+        lengths[names.index(name)] = sizes
+    motion = random_states(dynamics.n, 1)
+    found = dynamics.uncertainty(*motion, UncertainBodies(lengths=lengths))
+    q, qd, qdd = (a[0] for a in motion)
+    pi = np.array([oracle.model.inertias[at].toDynamicParameters() for at in oracle.bodies])
+    squares: list[Any] = [0.0] * 6
+    for name, sizes in moved.items():
+        at = oracle.model.getJointId(name)
+        for axis in range(3):
+            each = []
+            for way in (0.01, -0.01):
+                placement = oracle.model.jointPlacements[at].copy()
+                # Along the axes of the body that carries the joint: Pinocchio's joint before it has these.
+                oracle.model.jointPlacements[at].translation = placement.translation + way * np.eye(3)[axis]
+                rows = [*oracle.shares(q, qd, qdd), oracle.rows(q, qd, qdd)]
+                each.append([np.einsum("ij...p,jp->ij...", a, pi) for a in rows])
+                oracle.model.jointPlacements[at] = placement
+            slopes = [(a - b) / 0.02 * sizes[axis] for a, b in zip(*each, strict=True)]
+            sums = slopes[3].sum(1), slopes[1].sum(1)
+            squares = [a + b**2 for a, b in zip(squares, [*slopes, *sums], strict=True)]
+    answers = (found.acceleration, found.velocity, found.gravity, found.torque)
+    for value, square in zip((*answers, found.joint_torque, found.joint_velocity), squares, strict=True):
+        np.testing.assert_allclose(value[0], np.sqrt(square), rtol=0, atol=1e-10 * np.sqrt(square).max())
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (
+            {"masses": [0.1, -0.1, 0.1]},
+            "bodies: masses of 'link2' is -0.1; a standard deviation is 0 or more",
+        ),
+        ({"centres": np.nan}, "bodies: centres has NaN or infinity; give finite numbers"),
+        ({"radii": [0.1, 0.1]}, r"bodies: radii has shape \(2,\); it must be \(3,\) or one number"),
+        ({"correlation": np.eye(2)}, r"correlation has shape \(2, 2\); it must be \(3, 3\)"),
+        (
+            {"correlation": [[1.0, 0.9, -0.9], [0.9, 1.0, 0.9], [-0.9, 0.9, 1.0]]},
+            "correlation cannot be: its smallest eigenvalue is -0.8",
+        ),
+        (
+            {"correlation": [[1.0, 1.2, 0.0], [1.2, 1.0, 0.0], [0.0, 0.0, 1.0]]},
+            "correlation of 'link1' and 'link2' is 1.2; give one from -1 to 1",
+        ),
+        ({"centres": np.array([np.diag([1.0, 1.0, -1.0])] * 3)}, "centres of 'link1' is not a covariance"),
+        ({"lengths": -0.001}, "lengths has -0.001"),
+    ],
+)
+def test_deviations_that_cannot_be_are_refused_by_name(
+    given: dict[str, Any], told: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    robot = package_of("planar3").load("numpy")
+    with pytest.raises(ValueError, match=told) as info:
+        robot.uncertainty(*random_states(3, 1), UncertainBodies(**given))
+    assert "\n" not in str(info.value)
+
+
+def test_bodies_of_each_sample_and_other_things_are_refused(package_of: Callable[[str], ModuleType]) -> None:
+    package = package_of("planar3")
+    own = package.bodies()
+    several = own._replace(masses=np.stack([own.masses, own.masses]))
+    with pytest.raises(ValueError, match="differs from sample to sample"):
+        package.load("numpy", bodies=several).uncertainty(*random_states(3, 2), UncertainBodies(0.1))
+    with pytest.raises(TypeError, match=r"bodies is 0\.1; give an UncertainBodies"):
+        package.load("numpy").uncertainty(*random_states(3, 2), 0.1)

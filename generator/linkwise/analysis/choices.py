@@ -75,8 +75,8 @@ class AnalysisChoices:
 
     uncertain: str | None = option(
         None,
-        "How uncertain masses, centres and radii of gyration are: a standard deviation stands beside"
-        " each torque",
+        "How uncertain masses, centres, radii of gyration and lengths are: a standard deviation stands"
+        " beside each torque",
         metavar="FILE",
         is_file=True,
     )

@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from linkwise_runtime.certainty.share_deviations import ShareDeviations
+from linkwise_runtime.certainty.share_deviations import ShareDeviations, share_deviations
 
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_quantities import DEVIATION_OF
@@ -41,7 +41,7 @@ class DeviationRows:
     def deviations(self) -> ShareDeviations:
         """Deviations of the robot's shares, packed."""
         assert self.uncertain is not None
-        return ShareDeviations(self.robot.model.backend, self.uncertain.spread)
+        return share_deviations(self.robot.model.backend, self.uncertain.bodies)
 
     def fill(self, out: Array, rows: ResultRows, q: Array, qd: Array, qdd: Array) -> None:
         """Fill the rows in `out` (rows, S) for motion (S, n)."""

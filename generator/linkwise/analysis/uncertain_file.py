@@ -1,13 +1,16 @@
-"""File that says how uncertain a robot's bodies are: standard deviations of masses, centres and radii.
+"""File that says how uncertain a robot's bodies are: deviations of masses, centres, radii and lengths.
 
 schema = 1
 [all]                        # every link, unless its own table says otherwise
 mass = "10 %"
 centre = "10 mm"             # along each axis; or three, along the body's own x, y and z
 radii = "10 %"               # each of the three radii of gyration about the centre
+length = "3 mm"              # place of each joint that is off its body's origin, along each axis
 [link.forearm]
 mass = "0.1 kg"
 centre = ["5 mm", "5 mm", "20 mm"]
+[joint.elbow]
+length = ["0 mm", "4 mm", "0 mm"]
 [body_mass]                  # a mass of which links have fixed parts: their masses go together by it
 sd = "2 %"
 links = ["upper_arm", "forearm"]
@@ -18,14 +21,14 @@ matrix = [[1.0, 0.5], [0.5, 1.0]]
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from linkwise_runtime.certainty.share_deviations import spread_of
-from linkwise_runtime.certainty.uncertain_bodies import BodySpread, UncertainBodies, checked_correlation
+from linkwise_runtime.certainty.share_deviations import share_deviations
+from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies, checked_correlation
 from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.analysis.opened_robot import OpenedRobot
@@ -36,21 +39,21 @@ from linkwise.input_file import require_file
 from linkwise.package.decode import known_keys
 from linkwise.robot.readers.toml.table import toml_data
 
-TOP = ("schema", "all", "link", "body_mass", "correlation")
+TOP = ("schema", "all", "link", "joint", "body_mass", "correlation")
 PART, LENGTH = {"%": 0.01}, {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 MASS = {"%": 0.01, "kg": 1.0}
-UNITS = {"mass": MASS, "centre": LENGTH, "radii": PART}
+OF_LINKS = {"mass": MASS, "centre": LENGTH, "radii": PART}
 """Units of each key of a link, by what brings them to parts, kg or m."""
+UNITS = OF_LINKS | {"length": LENGTH}
+"""Units of each key, with that of joints."""
 NOT_MODELLED = {
-    "length": "lengths, places and axes of joints count as certain",
-    "lengths": "lengths, places and axes of joints count as certain",
+    "axis": "axes of joints count as certain",
     "motion": "motion counts as certain",
     "loads": "loads count as certain",
-    "joint": "places and axes of joints count as certain",
     "preset": "there are no presets; write the numbers of your source",
 }
 """Keys that others might expect, and what is so."""
-CERTAIN = "motion, loads, lengths, places and axes of joints, springs, damping, friction, armature"
+CERTAIN = "motion, loads, axes of joints, springs, damping, friction, armature"
 """All that counts as certain."""
 LARGEST = 1.0
 """Largest deviation as a part: with more, one normal mass in six is negative."""
@@ -64,8 +67,9 @@ class UncertainRobot:
     file: str
     """Name of the file."""
     bodies: UncertainBodies
-    spread: BodySpread
     links: tuple[str, ...]
+    joints: tuple[str, ...]
+    """Joints of the tree."""
 
     def record(self) -> dict[str, Any]:
         """Return what was assumed as plain data: parts of masses and of radii, centres in m."""
@@ -83,6 +87,10 @@ class UncertainRobot:
                 name
                 for name, part in zip(self.links, np.asarray(given.segments).tolist(), strict=True)
                 if part
+            ],
+            "joints": [
+                {"name": name, "length": length}
+                for name, length in zip(self.joints, np.asarray(given.lengths).tolist(), strict=True)
             ],
             "correlation": None if given.correlation is None else np.asarray(given.correlation).tolist(),
             "certain": CERTAIN,
@@ -106,10 +114,10 @@ def read_uncertain(path: Path, robot: OpenedRobot) -> UncertainRobot:
         known_keys("the file", data, TOP)
         bodies = _bodies(data, robot)
         try:
-            spread = spread_of(robot.model.backend, bodies)
+            share_deviations(robot.model.backend, bodies)
         except ValueError as error:
             raise LinkwiseError(str(error)) from None
-    return UncertainRobot(path.name, bodies, spread, robot.links)
+    return UncertainRobot(path.name, bodies, robot.links, robot.tree_joints)
 
 
 def refuse_unmodelled(robot: OpenedRobot) -> None:
@@ -131,24 +139,23 @@ def refuse_unmodelled(robot: OpenedRobot) -> None:
 
 
 def _tables(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the tables of links, with that of all."""
-    links = data.get("link")
-    every = [data.get("all"), *(links.values() if isinstance(links, dict) else ())]
+    """Return the tables of links and joints, with that of all."""
+    several = [data.get(key) for key in ("link", "joint")]
+    every = [
+        data.get("all"),
+        *(own for group in several if isinstance(group, dict) for own in group.values()),
+    ]
     return [table for table in every if isinstance(table, dict)]
 
 
 def _bodies(data: Mapping[str, Any], robot: OpenedRobot) -> UncertainBodies:
     usual = known_keys("[all]", data.get("all", {}), UNITS)
-    own = data.get("link", {})
-    if not isinstance(own, dict):
-        raise LinkwiseError("link must hold a table for each link; head each [link.NAME]")
-    for name in own:
-        _link(f"[link.{name}]", name, robot)
-    found: dict[str, list[Any]] = {key: [] for key in UNITS}
+    own = _named(data, "link", robot.links, OF_LINKS, robot)
+    found: dict[str, list[Any]] = {key: [] for key in OF_LINKS}
     assert robot.tree is not None
     for name, body in zip(robot.links, robot.tree.links, strict=True):
-        table = known_keys(f"[link.{name}]", own.get(name, {}), UNITS)
-        for key in UNITS:
+        table = own.get(name, {})
+        for key in OF_LINKS:
             place = f"[link.{name}]" if key in table else "[all]"
             given = table.get(key, usual.get(key))
             found[key].append(_deviation(place, key, given, body.mass, name))
@@ -160,16 +167,46 @@ def _bodies(data: Mapping[str, Any], robot: OpenedRobot) -> UncertainBodies:
         part,
         segments,
         _correlation(data, robot),
+        _lengths(data, usual, robot),
     )
 
 
+def _named(
+    data: Mapping[str, Any], what: str, names: Sequence[str], keys: Iterable[str], robot: OpenedRobot
+) -> dict[str, dict[str, Any]]:
+    """Return the tables of links or joints by name."""
+    tables = data.get(what, {})
+    if not isinstance(tables, dict):
+        raise LinkwiseError(f"{what} must hold tables by name; head each [{what}.NAME]")
+    for name, table in tables.items():
+        _place(f"[{what}.{name}]", what, name, names, robot)
+        known_keys(f"[{what}.{name}]", table, keys)
+    return tables
+
+
+def _lengths(data: Mapping[str, Any], usual: Mapping[str, Any], robot: OpenedRobot) -> Array:
+    """Return deviations of the places of the tree's joints in m, (F, 3).
+
+    That of all is for joints that are off the origin of what carries them: several axes in one place would
+    else each have an error of its own.
+    """
+    assert robot.tree is not None
+    own, found = _named(data, "joint", robot.tree_joints, ("length",), robot), []
+    for name, joint in zip(robot.tree_joints, robot.tree.joints, strict=True):
+        table = own.get(name, {})
+        given = table.get("length", usual.get("length") if any(joint.translation) else None)
+        place = f"[joint.{name}]" if "length" in table else "[all]"
+        found.append(_deviation(place, "length", given, 0.0, name))
+    return np.array(found)
+
+
 def _deviation(place: str, key: str, given: Any, mass: float, link: str) -> Any:
-    """Return the deviation of one key of a link: a part, or for a centre three lengths in m."""
-    if key == "centre":
+    """Return the deviation of one key: a part, or for a place three lengths in m."""
+    if UNITS[key] is LENGTH:
         several = given if isinstance(given, list) else [given] * 3
         if len(several) != 3:
             raise LinkwiseError(
-                f'{place}: centre has {len(several)} numbers; give "10 mm", or three for x, y, z'
+                f'{place}: {key} has {len(several)} numbers; give "10 mm", or three for x, y, z'
             )
         return [0.0 if one is None else _quantity(place, key, one)[0] for one in several]
     if given is None:
@@ -228,17 +265,18 @@ def _links(place: str, given: Any, robot: OpenedRobot) -> list[int]:
     """Return the numbers of links that are listed by name."""
     if not isinstance(given, list) or not given or not all(isinstance(name, str) for name in given):
         raise LinkwiseError(f"{place} needs links, a list of their names")
-    found = [_link(place, name, robot) for name in given]
+    found = [_place(place, "link", name, robot.links, robot) for name in given]
     if len(set(found)) < len(found):
         raise LinkwiseError(f"{place}: links names one twice; name each once")
     return found
 
 
-def _link(place: str, name: str, robot: OpenedRobot) -> int:
-    if name not in robot.links:
-        near = listed(nearest_first(name, robot.links))
-        raise LinkwiseError(f"{place}: {robot.name} has no link {name!r}; its links are {near}")
-    return robot.links.index(name)
+def _place(place: str, what: str, name: str, names: Sequence[str], robot: OpenedRobot) -> int:
+    """Return the number of a link or a joint."""
+    if name not in names:
+        near = listed(nearest_first(name, names))
+        raise LinkwiseError(f"{place}: {robot.name} has no {what} {name!r}; its {what}s are {near}")
+    return names.index(name)
 
 
 def _quantity(

@@ -4,11 +4,12 @@ Shares are linear in inertial parameters, s = sum_j Y_j . pi_j, so that with the
 
     var(s) = sum_j |F_j^T Y_j|^2 + w^T C w        w_j = Y_j . p_j
 
-of which a share through one link has its own j alone.
+of which a share through one link has its own j alone. Places of joints add (ds/dp)^2 for each direction p of
+one standard deviation: they are independent of bodies, and count to first order.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -18,8 +19,10 @@ from ..arrays.backend import ArrayBackend
 from ..chosen_names import known_kind
 from ..interface import Numbers, side_by_side
 from ..quantities import PARAMETERS
+from ..rule.calls import RigidRule
+from ..rule.joint_tree import JointTree
 from ..share_uncertainty import Uncertainty
-from .uncertain_bodies import BodySpread, UncertainBodies, body_axes, body_spread, tree_bodies
+from .uncertain_bodies import BodySpread, UncertainBodies, body_axes, body_spread, length_shifts, tree_bodies
 
 AT_ONCE = 1 << 21
 """Most numbers of the regressors of a piece of samples."""
@@ -45,7 +48,8 @@ class PackedDeviations(NamedTuple):
 class ShareDeviations:
     """Standard deviations of shares of a robot on one back end, whose bodies are spread."""
 
-    def __init__(self, backend: ArrayBackend, spread: BodySpread) -> None:
+    def __init__(self, backend: ArrayBackend, spread: BodySpread, shifts: Any = ()) -> None:
+        """Set up the deviations; shifts: those of joints' places, as of `length_shifts`."""
         self._backend, self._tables = backend, PackedTables(backend)
         layout, links = backend.structure.layout, range(backend.structure.N)
         self._layout, self._causes = layout, layout.velocity[:, 2].copy()  # writable, as torch wants it
@@ -57,6 +61,8 @@ class ShareDeviations:
             for field in ("acceleration", "velocity", "gravity", "torque")
         }
         place = {tuple(row): at for at, row in enumerate(layout.acceleration.tolist())}
+        self._shifts = shifts
+        self._rule = backend.rule or RigidRule(cast(JointTree, backend.tree))
         self._mirrored = np.array([place[min(i, k), j, max(i, k)] for i, j, k in layout.velocity.tolist()])
 
     def packed(self, q: Numbers, qd: Numbers, qdd: Numbers, with_sums: bool = True) -> PackedDeviations:
@@ -91,14 +97,31 @@ class ShareDeviations:
             own = moved[..., part, :]
             tau[j] = tau[j] + own.reshape(*own.shape[:-2], size, size, own.shape[-1]).sum(-2)
         torque = xp.concat(tau, -2)
+        variances = [self._own_variance(rows, field) for rows, field in self._fields(c2, c1, g, torque)]
+        variances.append(self._sum_over_links(torque))
+        if with_sums:
+            variances += [self._matrices(c2, "acceleration"), self._matrices(c1, "velocity")]
+            variances.append(self._sum_over_links(g))
+        for changes in self._changes(q, qd, qdd, with_sums):
+            variances = [a + b**2 for a, b in zip(variances, changes, strict=True)]
         nothing = self._backend.zeros(q, 0)
-        return PackedDeviations(
-            *(root(xp, self._own_variance(rows, field)) for rows, field in self._fields(c2, c1, g, torque)),
-            root(xp, self._sum_over_links(torque)),
-            root(xp, self._matrices(c2, "acceleration")) if with_sums else nothing,
-            root(xp, self._matrices(c1, "velocity")) if with_sums else nothing,
-            root(xp, self._sum_over_links(g)) if with_sums else nothing,
-        )
+        roots = [root(xp, variance) for variance in variances]
+        return PackedDeviations(*roots, *([] if with_sums else [nothing] * 3))
+
+    def _changes(self, q: Numbers, qd: Numbers, qdd: Numbers, with_sums: bool) -> Iterator[list[Numbers]]:
+        """Yield for each direction of joints' places what shares change by, in the order of answers."""
+        if not len(self._shifts):
+            return
+        tables, sums = self._rule.tables(self._backend, q), self._tables.sum_over_links
+        numbers = self._backend.tree_numbers((tables.own, tables.sources), q)
+        for shift in self._shifts:
+            along = self._backend.constant(shift, q)
+            c2, c1, g, tau = self._rule.translation_gradient(self._backend, (q, qd, qdd), numbers, along)
+            found = [c2, c1, g, tau, sums(tau)]
+            if with_sums:
+                matrices = self._tables.matrices
+                found += [matrices(c2, "acceleration"), matrices(c1, "velocity"), sums(g)]
+            yield found
 
     @staticmethod
     def _fields(*rows: Numbers) -> Sequence[tuple[Numbers, str]]:
@@ -144,7 +167,7 @@ def uncertainty(robot: Any, q: object, qd: object, qdd: object, bodies: object) 
     """Return the answer of `Dynamics.uncertainty`."""
     backend, motion = robot.door.read({"q": q, "qd": qd, "qdd": qdd})
     backend.answers.check_regresses()
-    at = ShareDeviations(backend, spread_of(backend, bodies))
+    at = share_deviations(backend, bodies)
     batch = tuple(motion[0].shape[:-1])
     flat = [a.reshape(math.prod(batch), a.shape[-1]) for a in motion]
     found, (_, rate, gain) = at.packed(*flat), (abs(a) for a in flat)
@@ -167,17 +190,18 @@ def uncertainty(robot: Any, q: object, qd: object, qdd: object, bodies: object) 
     return Uncertainty(*(side_by_side(a.reshape(*batch, *a.shape[1:])) for a in answers))
 
 
-def spread_of(backend: ArrayBackend, bodies: object) -> BodySpread:
-    """Return the spread of the bodies that a robot has on a back end.
+def share_deviations(backend: ArrayBackend, bodies: object) -> ShareDeviations:
+    """Return the deviations of a robot on a back end that has regressors.
 
-    Raises TypeError for what is not `UncertainBodies`, and as `body_spread` does.
+    Raises TypeError for what is not `UncertainBodies`, ValueError as `body_spread` does.
     """
     if any(not hasattr(bodies, name) for name in UncertainBodies._fields):
         raise TypeError(f"bodies is {known_kind(bodies, UncertainBodies)}; give an UncertainBodies")
-    assert backend.tree is not None  # `check_regresses` has seen to it
-    carried = tree_bodies(backend.tree, backend.parameters, cast(Any, backend.bodies))
+    tree, given = cast(JointTree, backend.tree), cast(UncertainBodies, bodies)
+    carried = tree_bodies(tree, backend.parameters, cast(Any, backend.bodies))
     try:
-        return body_spread(backend.structure.link_names, carried, body_axes(backend.tree), bodies)
+        spread = body_spread(backend.structure.link_names, carried, body_axes(tree), given)
+        return ShareDeviations(backend, spread, length_shifts(tree, given.lengths))
     except ValueError as error:
         raise ValueError(f"bodies: {error}") from None
 

@@ -48,6 +48,9 @@ class UncertainBodies(NamedTuple):
     """Ones for the links that have parts of that mass, zeros for others; (N,)."""
     correlation: ArrayLike | None = None
     """Correlation of the links' own errors of mass, (N, N); none unless given."""
+    lengths: ArrayLike = 0.0
+    """Of the places of the tree's joints in m: (F, 3) along x, y, z of the body in its file that carries the
+    joint, or one number for all; or covariances, (F, 3, 3). They count to first order."""
 
 
 class BodySpread(NamedTuple):
@@ -85,7 +88,7 @@ def body_spread(links: Sequence[str], carried: Sequence[Floats], axes: Floats, g
     """
     count, (masses, centres, inertias) = len(links), carried
     own, radii = (_parts(links, name, getattr(given, name)) for name in ("masses", "radii"))
-    places = axes @ _centre_covariances(links, given.centres) @ axes.mT
+    places = axes @ _covariances(links, "centres", given.centres) @ axes.mT
     part = _parts(["body_mass"], "body_mass", given.body_mass)[0] ** 2
     segments = _parts(links, "segments", given.segments)
     together = checked_correlation(links, given.correlation)
@@ -132,6 +135,28 @@ def body_axes(tree: JointTree) -> Floats:
     """Return the rotations from the axes of bodies in their file to those of the links' frames, (N, 3, 3)."""
     own = {frame.name: frame.rotation for frame in tree.frames}
     return np.array([own.get(tree.link_name(j), np.eye(3)) for j in range(len(tree.links))], dtype=float)
+
+
+def length_shifts(tree: JointTree, given: Any) -> Floats:
+    """Return directions along which joints' places differ by one standard deviation, (D, 3, frames) in m.
+
+    They are those of `RigidRule.translation_gradient`, and independent of each other. A joint that nothing
+    turns has none: its place is that of all.
+
+    given: `UncertainBodies.lengths`; raises as `body_spread` does
+    """
+    covariances = _covariances([joint.name for joint in tree.joints], "lengths", given)
+    own = {frame.name: np.array(frame.rotation) for frame in tree.frames}
+    found = []
+    for f, joint in enumerate(tree.joints):
+        before = [tree.joints[at] for at in tree.chain(joint.parent)]
+        if any(one.kind == "revolute" and one.ratio for one in before):
+            axes = own.get(before[-1].link, np.eye(3))
+            for column in _factor(axes @ covariances[f] @ axes.T).T:
+                shift = np.zeros((3, len(tree.joints) + 1))
+                shift[:, f] = column
+                found.append(shift)
+    return np.array(found).reshape(-1, 3, len(tree.joints) + 1)
 
 
 def checked_correlation(names: Sequence[str], given: Any) -> Floats:
@@ -228,24 +253,24 @@ def _factor(covariance: Floats) -> Floats:
     return factor
 
 
-def _centre_covariances(links: Sequence[str], given: Any) -> Floats:
-    """Return covariances (N, 3, 3) of the centres in m^2."""
-    count, values = len(links), _numbers("centres", given)
+def _covariances(names: Sequence[str], what: str, given: Any) -> Floats:
+    """Return covariances (count, 3, 3) of places in m^2."""
+    count, values = len(names), _numbers(what, given)
     if values.shape == (count, 3, 3):
-        for link, matrix in zip(links, values, strict=True):
+        for name, matrix in zip(names, values, strict=True):
             size = np.abs(matrix).max()
             if np.abs(matrix - matrix.T).max() > ROUNDING * size or (
                 np.linalg.eigvalsh(matrix).min() < -ROUNDING * size
             ):
-                raise ValueError(f"centres of {short(link)} is not a covariance; give (3,) deviations in m")
+                raise ValueError(f"{what} of {short(name)} is not a covariance; give (3,) deviations in m")
         return values
     if values.shape not in ((), (count, 3)):
         raise ValueError(
-            f"centres has shape {values.shape}; it must be {(count, 3)} or one number, in m, or covariances "
+            f"{what} has shape {values.shape}; it must be {(count, 3)} or one number, in m, or covariances "
             f"{(count, 3, 3)}, in m^2"
         )
     if (values < 0).any():
-        raise ValueError(f"centres has {values.min():g}; a standard deviation is 0 or more")
+        raise ValueError(f"{what} has {values.min():g}; a standard deviation is 0 or more")
     squares = np.broadcast_to(values, (count, 3)) ** 2
     return squares[:, :, None] * np.eye(3)
 

@@ -24,6 +24,8 @@ CACHE = 1 << 22
 """Bytes of the arrays of one chunk of samples, which are to stay in the processor's cache."""
 LINK_NUMBERS = 200
 """Numbers of a link and its joint for one sample, without the products."""
+STEP = 0.5
+"""Step of joints' places in m, of the size of robots: no digits are lost."""
 ROW_NUMBERS = 6 * PARAMETERS
 """Numbers that a row of a regressor needs while it is computed."""
 
@@ -109,6 +111,36 @@ class RigidRule:
             return [gradient + gather(with_zero, diagonal, -1)]
 
         return self._answers(library, motion, p, bodies, answer)[0]
+
+    def translation_gradient(
+        self,
+        library: Library,
+        motion: Sequence[Own],
+        numbers: TreeArrays,
+        shift: Own,
+    ) -> list[Own]:
+        """Return the changes of c2, c1, g and tau, (..., count) each, with the joints' places along a shift.
+
+        They are exact but for rounding: places enter in the second degree, of which central differences keep
+        nothing, however wide.
+
+        numbers: of the tree; shift: directions (3, frames) of joints' translations, zero for the ground
+        """
+        batch, tables = tuple(motion[0].shape[:-1]), self.tables(library, motion[0])
+        links = link_numbers(library.xp, tables.links.eye, *numbers.bodies)
+        step = STEP * shift[..., None]
+        ways = [numbers._replace(translations=numbers.translations + way) for way in (step, -step)]
+
+        def answer(own: Sequence[Numbers], some: TreeArrays, carried: LinkNumbers) -> list[Numbers]:
+            at = _moment(library, tables, own, some, carried)
+            return [*at.coefficients(), *at.singles((3, 4))]
+
+        ahead, behind = (
+            self._in_pieces(library, motion, way, links, answer, 2 * self.layout.zero) for way in ways
+        )
+        return [
+            ((a - b) / (2.0 * STEP)).reshape(*batch, a.shape[-1]) for a, b in zip(ahead, behind, strict=True)
+        ]
 
     def energies(
         self,
