@@ -48,7 +48,7 @@ class DeviationRows:
         if self.uncertain is None:
             return
         _, motion = self.robot.model.door.read({"q": q, "qd": qd, "qdd": qdd})
-        found: Any = self.deviations.packed(*motion, with_sums=False)
+        found: Any = self.deviations.packed(motion, with_sums=False)
         c2, c1, gravity, torque, whole = (np.asarray(a) for a in found[:5])
         twice = 2.0 if self.convention == "gradient" else 1.0
         rows.put(out, "sd/tau", whole)

@@ -91,7 +91,7 @@ def record(result: AnalysisResult) -> dict[str, Any]:
         "reactions": list(result.reactions),
         "phases": [phase.told for phase in result.phases],
         **({} if result.traced is None else {"trace": dict(result.traced)}),
-        **({} if result.uncertain is None else {"uncertain": result.uncertain | result.signs.record()}),
+        **({} if result.uncertain is None else {"uncertain": {**result.uncertain, **result.signs.record()}}),
         "closure": asdict(result.closure),
         **({} if result.closed is None else {"constraints": _constraints(result, result.closed)}),
         **({} if robot.contacts is None else {"contacts": _contacts(result)}),

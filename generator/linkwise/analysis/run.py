@@ -97,9 +97,8 @@ def analyze(
             trace_torque_factor,
         ),
     )
-    asked = Request(
-        reading or Reading(), processing or Processing(), outputs, borne, held, uncertain and Path(uncertain)
-    )
+    told = None if uncertain is None else Path(uncertain)
+    asked = Request(reading or Reading(), processing or Processing(), outputs, borne, held, told)
     job = prepared(Path(log), loaded, asked, progress)
     with EverySample(len(job.columns), job.count) as kept:
         return job.analysis(job.run(kept, progress), kept.values)

@@ -125,7 +125,8 @@ class Decomposer:
         forces = ReactionForces(robot, tuple(loads), times)
         return cls(
             *(robot, tuple(loads), convention, rows, sources, parts, wholes),
-            *(induced, power, forces, reactions, deviations, times, terms, traced),
+            *(induced, power, forces, reactions),
+            *(deviations, times, terms, traced),
         )
 
     def at(self, time: Array, inputs: Array) -> "Decomposer":

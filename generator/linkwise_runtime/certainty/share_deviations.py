@@ -22,7 +22,15 @@ from ..quantities import PARAMETERS
 from ..rule.calls import RigidRule
 from ..rule.joint_tree import JointTree
 from ..share_uncertainty import Uncertainty
-from .uncertain_bodies import BodySpread, UncertainBodies, body_axes, body_spread, length_shifts, tree_bodies
+from .uncertain_bodies import (
+    BodySpread,
+    Floats,
+    UncertainBodies,
+    body_axes,
+    body_spread,
+    length_shifts,
+    tree_bodies,
+)
 
 AT_ONCE = 1 << 21
 """Most numbers of the regressors of a piece of samples."""
@@ -65,24 +73,22 @@ class ShareDeviations:
         self._rule = backend.rule or RigidRule(cast(JointTree, backend.tree))
         self._mirrored = np.array([place[min(i, k), j, max(i, k)] for i, j, k in layout.velocity.tolist()])
 
-    def packed(self, q: Numbers, qd: Numbers, qdd: Numbers, with_sums: bool = True) -> PackedDeviations:
-        """Return the deviations for motion (S, n), as many samples at once as memory wants.
+    def packed(self, motion: Sequence[Numbers], with_sums: bool = True) -> PackedDeviations:
+        """Return the deviations for q, qd and qdd (S, n), as many samples at once as memory wants.
 
         with_sums: whether sums over the links by cause are wanted; else they are left out, (S, 0)
         """
-        per_sample = PARAMETERS * sum(map(len, self._layout[:4]))
-        most = max(16, AT_ONCE // per_sample)
-        size = self._backend.chunk((q, qd, qdd), most) or len(q)
-        if len(q) <= size:
-            return self._piece(q, qd, qdd, with_sums)
-        pieces = [
-            self._piece(*(a[at : at + size] for a in (q, qd, qdd)), with_sums)
-            for at in range(0, len(q), size)
-        ]
+        most = max(16, AT_ONCE // (PARAMETERS * sum(map(len, self._layout[:4]))))
+        samples = len(motion[0])
+        size = self._backend.chunk(motion, most) or samples
+        if samples <= size:
+            return self._piece(motion, with_sums)
+        starts = range(0, samples, size)
+        pieces = [self._piece([a[at : at + size] for a in motion], with_sums) for at in starts]
         return PackedDeviations(*(self._backend.xp.concat(some, 0) for some in zip(*pieces, strict=True)))
 
-    def _piece(self, q: Numbers, qd: Numbers, qdd: Numbers, with_sums: bool) -> PackedDeviations:
-        xp = self._backend.xp
+    def _piece(self, motion: Sequence[Numbers], with_sums: bool) -> PackedDeviations:
+        xp, (q, qd, qdd) = self._backend.xp, motion
         flat = self._backend.coefficient_regressors(q, qd, 0.0 * q)
         c2, c1, g = (
             self._mapped(rows, field)
@@ -170,7 +176,7 @@ def uncertainty(robot: Any, q: object, qd: object, qdd: object, bodies: object) 
     at = share_deviations(backend, bodies)
     batch = tuple(motion[0].shape[:-1])
     flat = [a.reshape(math.prod(batch), a.shape[-1]) for a in motion]
-    found, (_, rate, gain) = at.packed(*flat), (abs(a) for a in flat)
+    found, (_, rate, gain) = at.packed(flat), (abs(a) for a in flat)
     c2, c1 = at.spread(found.c2, "acceleration"), at.spread(found.c1, "velocity")
     torque = at.spread(found.torque, "torque")
     answers = (
@@ -209,12 +215,14 @@ def share_deviations(backend: ArrayBackend, bodies: object) -> ShareDeviations:
 def root(xp: Any, variance: Numbers) -> Numbers:
     """Return square roots, through which a gradient runs that is zero where the variance is."""
     there = variance > 0
-    found: Numbers = xp.where(there, variance, xp.ones_like(variance)) ** 0.5
-    return xp.where(there, found, xp.zeros_like(variance))
+    roots = xp.where(there, variance, xp.ones_like(variance)) ** 0.5
+    found: Numbers = xp.where(there, roots, xp.zeros_like(variance))
+    return found
 
 
-def _root(matrix: Any) -> Any:
+def _root(matrix: Floats) -> Floats:
     """Return D with D D^T = matrix, positive semidefinite."""
     values, vectors = np.linalg.eigh(matrix)
     kept = values > np.finfo(float).eps * values.max(initial=0.0) * len(values)
-    return vectors[:, kept] * np.sqrt(values[kept])
+    found: Floats = vectors[:, kept] * np.sqrt(values[kept])
+    return found

@@ -74,8 +74,8 @@ class BodySpread(NamedTuple):
         whole = np.einsum("jl,jp,lq->jplq", self.masses, self.means, self.means)
         each = np.arange(count)
         whole[each, :, each, :] += self.shapes @ self.shapes.mT
-        size = 10 * count
-        return whole.reshape(size, size)
+        found: Floats = whole.reshape(10 * count, 10 * count)
+        return found
 
 
 def body_spread(links: Sequence[str], carried: Sequence[Floats], axes: Floats, given: Any) -> BodySpread:
@@ -172,7 +172,7 @@ def checked_correlation(names: Sequence[str], given: Any) -> Floats:
         raise ValueError(f"correlation has shape {matrix.shape}; it must be {(count, count)}")
     if (np.abs(np.diag(matrix) - 1.0) > ROUNDING).any() or (np.abs(matrix - matrix.T) > ROUNDING).any():
         raise ValueError("correlation is not symmetric with ones on its diagonal; give such a matrix")
-    j, l = np.unravel_index(int(np.abs(matrix).argmax()), matrix.shape)
+    j, l = divmod(int(np.abs(matrix).argmax()), count)
     if np.abs(matrix[j, l]) > 1.0 + ROUNDING:
         told = f"{short(names[j])} and {short(names[l])}"
         raise ValueError(f"correlation of {told} is {matrix[j, l]:g}; give one from -1 to 1")

@@ -117,7 +117,7 @@ class RigidRule:
         library: Library,
         motion: Sequence[Own],
         numbers: TreeArrays,
-        shift: Own,
+        shift: Numbers,
     ) -> list[Own]:
         """Return the changes of c2, c1, g and tau, (..., count) each, with the joints' places along a shift.
 
