@@ -12,26 +12,26 @@ class Uncertainty(NamedTuple, Generic[Array]):
     """
 
     torque: Array
-    """Of tau_ij (..., n, N)."""
+    """Deviation of tau_ij (..., n, N)."""
     c2: Array
-    """Of the coefficients c2_ijk (..., n, N, n)."""
+    """Deviation of the coefficients c2_ijk (..., n, N, n)."""
     c1: Array
-    """Of the coefficients c1_ijk (..., n, N, n)."""
+    """Deviation of the coefficients c1_ijk (..., n, N, n)."""
     acceleration: Array
-    """Of c2_ijk qdd_k (..., n, N, n)."""
+    """Deviation of c2_ijk qdd_k (..., n, N, n)."""
     velocity: Array
-    """Of c1_ijk qd_k (..., n, N, n)."""
+    """Deviation of c1_ijk qd_k (..., n, N, n)."""
     gravity: Array
-    """Of g_ij (..., n, N)."""
+    """Deviation of g_ij (..., n, N)."""
     joint_torque: Array
-    """Of tau_i = sum_j tau_ij (..., n)."""
+    """Deviation of tau_i = sum_j tau_ij (..., n)."""
     joint_acceleration: Array
-    """Of sum_j c2_ijk qdd_k (..., n, n)."""
+    """Deviation of sum_j c2_ijk qdd_k (..., n, n)."""
     joint_velocity: Array
-    """Of sum_j c1_ijk qd_k (..., n, n)."""
+    """Deviation of sum_j c1_ijk qd_k (..., n, n)."""
     joint_gravity: Array
-    """Of sum_j g_ij (..., n)."""
+    """Deviation of sum_j g_ij (..., n)."""
     power: Array
-    """Of tau_ij qd_i in W (..., n, N)."""
+    """Deviation of tau_ij qd_i in W (..., n, N)."""
     joint_power: Array
-    """Of tau_i qd_i in W (..., n)."""
+    """Deviation of tau_i qd_i in W (..., n)."""

@@ -53,7 +53,7 @@ SAME = UncertainBodies(
     np.array([1.0, 0.0, 1.0]),
     np.array([[1.0, 0.0, 0.0], [0.0, 1.0, -0.6], [0.0, -0.6, 1.0]]),
 )
-"""What the file says; each link of the arm has 1.5 kg."""
+"""The file as it is to be read; each link of the arm has 1.5 kg."""
 
 
 @pytest.fixture(scope="module")

@@ -50,6 +50,7 @@ ANALYSIS: dict[str, Any] = {
     "contact_loads": ("grf.mot",),
     "contact_threshold": 42.0,
     "unactuated": ("base_x",),
+    "uncertain": "bodies.toml",
     "induced": ("joints",),
     "induced_power": True,
     "reaction": ("knee,world",),
@@ -106,6 +107,7 @@ WRITTEN = AnalysisChoices(
     contact_loads=("grf.mot",),
     contact_threshold=42.0,
     unactuated=("base_x",),
+    uncertain="bodies.toml",
 )
 
 

@@ -54,6 +54,7 @@ RUNTIME = (
     "dynamics",
     "motion_calls",
     "robot_calls",
+    "certainty",
     "control",
     "motion",
     "constraints",

@@ -20,7 +20,7 @@ SMALL = 1e-3
 """Part of a joint's largest torque below which no share of it is listed."""
 
 
-class Peak(NamedTuple):
+class LargestTorque(NamedTuple):
     """A torque at its largest magnitude in a movement."""
 
     column: Column
@@ -46,7 +46,7 @@ class Peak(NamedTuple):
         }
 
 
-class PeakSearch:
+class LargestTorques:
     """Search for the largest magnitudes of torques that have deviations, block by block."""
 
     def __init__(self, rows: ResultRows) -> None:
@@ -68,24 +68,25 @@ class PeakSearch:
             if abs(block[row, at]) > abs(self._found[0, place]):
                 self._found[:, place] = block[row, at], block[beside, at], block[0, at]
 
-    def peaks(self) -> tuple[Peak, ...]:
+    def peaks(self) -> tuple[LargestTorque, ...]:
         """Return what was found, in the order of rows."""
         columns = (self._rows.columns[row] for row in self._torques.tolist())
         return tuple(
-            Peak(column, *found) for column, found in zip(columns, self._found.T.tolist(), strict=True)
+            LargestTorque(column, *found)
+            for column, found in zip(columns, self._found.T.tolist(), strict=True)
         )
 
 
 @dataclass(frozen=True)
 class CertainSigns:
-    """What a result says of the signs of its shares; names are those of links and joints."""
+    """Signs of the shares of a result, and how certain they are; names are those of links and joints."""
 
-    peaks: tuple[Peak, ...]
+    peaks: tuple[LargestTorque, ...]
     joints: tuple[str, ...]
     links: tuple[str, ...]
 
     @property
-    def shares(self) -> tuple[Peak, ...]:
+    def shares(self) -> tuple[LargestTorque, ...]:
         """Shares through one link by one cause, those that are next to nothing left out."""
         most: dict[int | None, float] = {}
         for peak in self.peaks:
@@ -98,7 +99,7 @@ class CertainSigns:
         )
 
     @property
-    def uncertain(self) -> tuple[Peak, ...]:
+    def uncertain(self) -> tuple[LargestTorque, ...]:
         """Shares whose sign is not certain, the largest first."""
         return tuple(
             sorted((p for p in self.shares if not p.is_certain), key=lambda p: abs(p.value), reverse=True)

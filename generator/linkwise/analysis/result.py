@@ -8,7 +8,7 @@ import numpy as np
 from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.analysis.borne_joints import BorneJoint
-from linkwise.analysis.certain_signs import CertainSigns, Peak
+from linkwise.analysis.certain_signs import CertainSigns, LargestTorque
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.disk_rows import let_go
@@ -69,7 +69,7 @@ class WholeMovement:
     closure: Closure
     total: int
     """Number of samples."""
-    peaks: tuple[Peak, ...]
+    peaks: tuple[LargestTorque, ...]
     """Torques at their largest magnitude, with their deviations there; none where nothing is uncertain."""
 
 
@@ -105,7 +105,7 @@ class AnalysisResult(WholeMovement):
     phases: tuple[PlacedPhase, ...] = ()
     """Phases that were asked for."""
     uncertain: Mapping[str, Any] | None = None
-    """How uncertain bodies were assumed to be, as the record has it; None without."""
+    """Uncertainty of bodies that was assumed, as the record has it; None without."""
     traced: Mapping[str, Any] | None = None
     """Joints, sources and windows of a trace, as the record has them; None without."""
 

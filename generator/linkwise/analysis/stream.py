@@ -6,7 +6,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 from linkwise_runtime.motion.tracer import TraceState
 
-from linkwise.analysis.certain_signs import PeakSearch
+from linkwise.analysis.certain_signs import LargestTorques
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.even_time import TOLERANCE
 from linkwise.analysis.filtering import derivatives
@@ -81,7 +81,7 @@ class MovementSums:
         self._energy = np.zeros((1 + len(phases), 2, len(self._power)))
         self._last: tuple[Array, Array] | None = None
         self._steps = np.zeros(1 + len(phases))
-        self._search = PeakSearch(rows)
+        self._search = LargestTorques(rows)
 
     def add(self, block: Array, closure: Closure) -> bool:
         """Add a block (rows, samples) and its errors; return whether all of its values are finite."""

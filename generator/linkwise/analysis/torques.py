@@ -48,7 +48,7 @@ class ToldBeside(NamedTuple):
     traced: TracedRows | None = None
     """Velocities that are traced to their sources."""
     uncertain: UncertainRobot | None = None
-    """How uncertain bodies are; None where torques have no deviations."""
+    """Uncertainty of bodies; None where torques have no deviations."""
 
 
 NOTHING_BESIDE = ToldBeside()

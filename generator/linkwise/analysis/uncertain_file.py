@@ -62,7 +62,7 @@ QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([%a-z]
 
 @dataclass(frozen=True, eq=False)
 class UncertainRobot:
-    """How uncertain the bodies of a robot are, as a file says it."""
+    """Uncertainty of the bodies of a robot, as a file says it."""
 
     file: str
     """Name of the file."""

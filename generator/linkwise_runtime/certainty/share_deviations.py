@@ -44,7 +44,7 @@ class PackedDeviations(NamedTuple):
     gravity: Numbers
     torque: Numbers
     joint_torque: Numbers
-    """Of the sums over all links, (S, n)."""
+    """Deviations of the sums over all links, (S, n)."""
     joint_c2: Numbers
     """(S, n, n)"""
     joint_c1: Numbers

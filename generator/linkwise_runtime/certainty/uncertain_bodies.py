@@ -36,21 +36,21 @@ class UncertainBodies(NamedTuple):
     """Standard deviations of what links carry, N links in the order of j; 0 for what is certain."""
 
     masses: ArrayLike = 0.0
-    """Of each link's mass, as a part of it: 0.1 for 10 %; (N,) or one number for all."""
+    """Deviation of each link's mass, as a part of it: 0.1 for 10 %; (N,) or one number for all."""
     centres: ArrayLike = 0.0
-    """Of centres of mass in m: (N, 3) along x, y, z of the body in its file, or one number for all; or
-    covariances in these axes in m^2, (N, 3, 3)."""
+    """Deviation of centres of mass in m: (N, 3) along x, y, z of the body in its file, or one number for all;
+    or covariances in these axes in m^2, (N, 3, 3)."""
     radii: ArrayLike = 0.0
-    """Of each of the three radii of gyration about the centre, as a part of it; (N,) or one number."""
+    """Deviation of each of the three radii of gyration about the centre, as a part of it; (N,) or one."""
     body_mass: float = 0.0
-    """Of a body mass of which links have fixed parts, as a part of it."""
+    """Deviation of a body mass of which links have fixed parts, as a part of it."""
     segments: ArrayLike = 1.0
     """Ones for the links that have parts of that mass, zeros for others; (N,)."""
     correlation: ArrayLike | None = None
     """Correlation of the links' own errors of mass, (N, N); none unless given."""
     lengths: ArrayLike = 0.0
-    """Of the places of the tree's joints in m: (F, 3) along x, y, z of the body in its file that carries the
-    joint, or one number for all; or covariances, (F, 3, 3). They count to first order."""
+    """Deviation of the places of the tree's joints in m: (F, 3) along x, y, z of the body in its file that
+    carries the joint, or one number for all; or covariances, (F, 3, 3). They count to first order."""
 
 
 class BodySpread(NamedTuple):
