@@ -149,6 +149,20 @@ def test_signs_and_sentence_are_those_of_the_largest_magnitudes(arm: Path) -> No
     assert record["sentence"] in result.provenance
 
 
+def test_bands_of_the_figure_are_one_deviation_to_either_side(arm: Path) -> None:
+    pytest.importorskip("matplotlib")
+    result = analyze(arm / "log.csv", arm / "arm", uncertain=arm / "bodies.toml")
+    figure = result.figure("paper:ab")
+    torques, partial = figure.axes[1:3]
+    for axis, name in ((torques, "tau/ab"), (partial, "tau/ab/b")):
+        corners = axis.patches[0].get_xy()[:-1, 1]
+        value, deviation = result[name], result[f"sd/{name}"]
+        expected = np.concatenate([value - deviation, (value + deviation)[::-1]])
+        np.testing.assert_allclose(corners, expected, rtol=1e-12)
+    assert not figure.axes[0].patches
+    assert not analyze(arm / "log.csv", arm / "arm").figure("paper:ab").axes[1].patches
+
+
 @pytest.mark.parametrize(
     ("value", "deviation", "told"),
     [
