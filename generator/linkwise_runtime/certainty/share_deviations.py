@@ -22,9 +22,9 @@ from ..quantities import PARAMETERS
 from ..rule.calls import RigidRule
 from ..rule.joint_tree import JointTree
 from ..share_uncertainty import Uncertainty
+from .parameter_moments import Floats
 from .uncertain_bodies import (
     BodySpread,
-    Floats,
     UncertainBodies,
     body_axes,
     body_spread,
