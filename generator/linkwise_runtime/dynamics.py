@@ -17,10 +17,13 @@ from typing import Any, Literal, Self, cast, overload
 from numpy.typing import ArrayLike
 
 from .arguments import Beside, check_numbers
+from .arrays.numpy_backend import NumpyBackend
+from .certainty.identifiability import Identifiability, identifiability
+from .certainty.share_bounds import ShareBounds, share_bounds
 from .control.controllers import Cancellation, PartialImpedance, cancellation, partial_impedance
 from .file_joints import Order
 from .html_tables import robot_table
-from .interface import Array
+from .interface import Array, array_of
 from .kinematics.robot_kinematics import Kinematics
 from .labelled import labelled
 from .motion_calls import MotionCalls
@@ -34,6 +37,8 @@ from .quantities import (
     Power,
     Propagation,
 )
+from .rule.calls import RigidRule
+from .rule.joint_tree import Bodies
 from .targets import FrameImpedance, Natural
 
 
@@ -255,6 +260,59 @@ class Dynamics(MotionCalls):
         """
         answer: Coefficients[Array] = self._call("coefficient_regressors", (q, qd), out)
         return answer
+
+    def identifiability(self, measured: Sequence[int | str] | None = None) -> Identifiability:
+        """Return which shares follow from joint torques alone, and which lean on the file's masses.
+
+        Torques of the same motion are the same for many bodies: those determine a share that has one value for
+        all of them, here by the rank of the regressors at random motions. Springs, damping, friction and
+        armature are taken to be known. Where joints are tied, torques and shares are those of the independent
+        joints, as in `constraints.propagation`. Printed, it is a table.
+
+        measured: joints whose torques are measured, by name or number; unless given, all that something
+        drives: of a floating base none
+
+        Raises ValueError for links given by energies, on the back end autograd, for parameters or bodies with
+        samples, and for joints that are not there.
+        """
+        return identifiability(self, self._on_numpy, measured)
+
+    def share_bounds(
+        self,
+        q: Array,
+        qd: Array,
+        qdd: Array,
+        masses: float | Mapping[int | str, Any] | None = None,
+        measured: Sequence[int | str] | None = None,
+        shares: str | Sequence[str] = "torque",
+    ) -> ShareBounds:
+        """Return the least and greatest value of each share over all bodies with the same joint torques.
+
+        The bodies are all that could exist, with pseudo-inertias that are positive semidefinite, whose torques
+        on the measured joints are those of this robot's at every motion; no link is above ten times the
+        robot's mass and reach, see `certainty.feasible_bodies`. Each end is proved by the dual of its
+        semidefinite program, whose `gap` is told, and `bodies` has those at an end.
+
+        q, qd, qdd: one motion, (n,); of joints that are tied, a closed position and the motion of the
+        independent ones
+        masses: limits of masses: a part of every claimed one, 0.1 for 10 % less or more, or by link such a
+        part, or (least, greatest) in kg
+        measured: as in `identifiability`
+        shares: "torque" (tau_ij), "acceleration", "velocity" or "gravity", or several of them
+
+        Needs Clarabel and SciPy, and raises ImportError without. Raises as `identifiability` does, and
+        ValueError for several samples, limits of masses that no bodies keep, and links that could not exist.
+        """
+        motion = {"q": q, "qd": qd, "qdd": qdd}
+        return share_bounds(self, self._on_numpy, motion, masses, measured, shares)
+
+    def _on_numpy(self, bodies: Bodies[Any] | None) -> "Dynamics":
+        """Return this robot of rigid links on NumPy, with bodies in place of its own."""
+        tree = self.backend.tree
+        assert tree is not None  # as `LinearRobot.of` has seen
+        values = {name: array_of(value) for name, value in self.backend.parameters.items()}
+        backend = NumpyBackend(self.structure, None, values, RigidRule(tree), "rule", bodies)
+        return Dynamics(self.structure, backend, self._load, self._asked)
 
     def masked(
         self, q: Array, qd: Array, qdd: Array, mask: ArrayLike | Array, out: Array | None = None

@@ -15,7 +15,7 @@ from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.arrays import Array
 from linkwise.escape import printable
-from linkwise.identification.pseudo_inertia import central
+from linkwise_runtime.certainty.pseudo_inertia import central
 from linkwise.package.entries import JointEntry
 from linkwise.package.manifest import Manifest
 

@@ -1,0 +1,1 @@
+"""Certainty: what joint torques determine, and what the rest may be."""
