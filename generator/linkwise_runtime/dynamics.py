@@ -285,6 +285,7 @@ class Dynamics(MotionCalls):
         masses: float | Mapping[int | str, Any] | None = None,
         measured: Sequence[int | str] | None = None,
         shares: str | Sequence[str] = "torque",
+        joints: Sequence[int | str] | None = None,
     ) -> ShareBounds:
         """Return the least and greatest value of each share over all bodies with the same joint torques.
 
@@ -299,12 +300,13 @@ class Dynamics(MotionCalls):
         part, or (least, greatest) in kg
         measured: as in `identifiability`
         shares: "torque" (tau_ij), "acceleration", "velocity" or "gravity", or several of them
+        joints: loaded joints whose shares are wanted, all unless given; two programs are solved for each share
 
         Needs Clarabel and SciPy, and raises ImportError without. Raises as `identifiability` does, and
         ValueError for several samples, limits of masses that no bodies keep, and links that could not exist.
         """
         motion = {"q": q, "qd": qd, "qdd": qdd}
-        return share_bounds(self, self._on_numpy, motion, masses, measured, shares)
+        return share_bounds(self, self._on_numpy, motion, masses, measured, shares, joints)
 
     def _on_numpy(self, bodies: Bodies[Any] | None) -> "Dynamics":
         """Return this robot of rigid links on NumPy, with bodies in place of its own."""

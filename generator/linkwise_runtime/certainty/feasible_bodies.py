@@ -37,12 +37,17 @@ INSIDE = 1e-11
 """Part of the way to the centre by which bodies at ends stay inside, so that rounding keeps them there."""
 ROUNDS = 200
 """Most steps of Newton's method to the centre."""
-CENTRED = 1e-11
-"""Newton decrement at which the centre is found."""
-ROUNDING = 1e-11
-"""Part of what adds up to a slope, up to which the slope is rounding: all bodies then have one value."""
+CENTRED, DAMPED = 1e-11, 0.25
+"""Newton decrements: below the one the centre is found, above the other steps are damped."""
+ROUNDING = 1e-9
+"""Part of y that leans on what no torque shows, up to which it is rounding: all bodies have one value."""
+STEP = 0.9
+"""Longest step of the solver, as a part of the way to the edge: with longer ones it stalls earlier."""
 CLOSE = 1e-12
 """Tolerances of the solver: it goes on until it cannot do better, and the certificate judges."""
+ENDLESS = 1e-3
+"""Least gain by a direction of the largest size that goes on for ever: a speck of J below zero, of rounding,
+lets first moments in that are its root."""
 
 
 class End(NamedTuple):
@@ -73,6 +78,10 @@ class FeasibleBodies:
 
     centre: Floats
     """Parameters of the bodies at the centre, (N, 10)."""
+    sizes: Floats
+    """Size of each parameter, (N, 10)."""
+    basis: Floats
+    """Orthonormal changes of parameters in units of their sizes that no torque shows, (10 N, d)."""
     steps: Floats
     """Changes of parameters by u, (10 N, d)."""
     rows: Floats
@@ -80,20 +89,24 @@ class FeasibleBodies:
     sized: tuple[int, ...]
     """Rows, counted from that after the links', that only keep bodies within bounds."""
 
-    def least(self, y: Floats) -> End:
-        """Return the least y . pi, for y (N, 10)."""
+    def least(self, y: Floats, may_end: bool = True) -> End:
+        """Return the least y . pi, for y (N, 10).
+
+        may_end: False where bodies may grow without end in what y asks for. Shares on a joint whose torque is
+        measured never do: what has no end has J >= 0 and changes no torque, so that each link's part of the
+        joint's own inertia, none of them negative, is zero: then its mass is not moved by the joint at all.
+        """
         at_centre = float((y * self.centre).sum())
+        sized = (y * self.sizes).reshape(-1)
+        if np.linalg.norm(self.basis.T @ sized) <= ROUNDING * np.linalg.norm(sized):
+            return End(at_centre, at_centre, self.centre)
         c = self.steps.T @ y.reshape(-1)
         size = float(np.linalg.norm(c))
-        if size <= ROUNDING * float(np.linalg.norm(np.abs(self.steps.T) @ np.abs(y).reshape(-1))):
-            return End(at_centre, at_centre, self.centre)
         u, z = self._solved(c / size, self.rows)
         u = self._inside(u)
         bound = self._proved(c / size, z)
         pi = self.centre + (self.steps @ u).reshape(self.centre.shape)
-        count = 10 * len(self.centre)
-        pressed = z[count:][list(self.sized)].sum() > PRESSED * self._ones @ np.abs(z)
-        endless = pressed and self._is_endless(c / size)
+        endless = not may_end and self._is_endless(c / size)
         return End(-np.inf if endless else at_centre + size * bound, float((y * pi).sum()), pi)
 
     @cached_property
@@ -139,12 +152,6 @@ class FeasibleBodies:
         return bool(c @ u < -ENDLESS)
 
 
-PRESSED = 1e-7
-"""Part of all multipliers from which on the bounds of sizes hold an end back."""
-ENDLESS = 1e-5
-"""Least gain by a direction of unit length that goes on for ever; smaller ones are the solver's errors."""
-
-
 def conic_least(c: Floats, rows: Floats, ones: Floats, links: int) -> tuple[Floats, Floats]:
     """Return the u of least c . u with ones + rows u in the cones, and the multipliers in these.
 
@@ -153,6 +160,7 @@ def conic_least(c: Floats, rows: Floats, ones: Floats, links: int) -> tuple[Floa
     clarabel, sparse = solver()
     settings = clarabel.DefaultSettings()
     settings.verbose = settings.equilibrate_enable = False
+    settings.max_step_fraction = STEP
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = CLOSE
     cones = [clarabel.PSDTriangleConeT(4)] * links
     others = len(rows) - 10 * links
@@ -187,7 +195,10 @@ def feasible_bodies(own: Floats, hidden: Floats, limits: Floats, links: Sequence
         raise ValueError(_impossible(own, limits, links))
     slack = triangle(np.eye(4)) * (2.0 * NARROW if inner < NARROW else 0.0)
     ones[: 10 * len(own)] += np.tile(slack, len(own))
-    return _centred(own, basis * sizes.reshape(-1)[:, None], rows, ones, x, sized)
+    q, centre, turn = _centred(rows, ones, x, len(own))
+    changes = basis * sizes.reshape(-1)[:, None]
+    at_centre = own + (changes @ centre).reshape(own.shape)
+    return FeasibleBodies(at_centre, sizes, basis, np.linalg.solve(turn.T, changes.T).T, q, sized)
 
 
 def _lengths(sizes: Floats) -> Floats:
@@ -257,23 +268,21 @@ def _innermost(rows: Floats, ones: Floats, links: int) -> tuple[Floats, float]:
     return u[:-1], float(u[-1])
 
 
-def _centred(
-    own: Floats, changes: Floats, rows: Floats, ones: Floats, x: Floats, sized: tuple[int, ...]
-) -> FeasibleBodies:
-    """Return the set as its analytic centre sees it, found by Newton's method from x inside."""
-    links, d = len(own), rows.shape[1]
+def _centred(rows: Floats, ones: Floats, x: Floats, links: int) -> tuple[Floats, Floats, Floats]:
+    """Return Q, the analytic centre and R of Q R = rows seen from there; x: a place inside.
+
+    Newton's method: with Q^T Q = 1 the Hessian and -Q^T 1 the gradient, steps are Q^T 1.
+    """
     identity = np.concatenate([np.tile(triangle(np.eye(4)), links), np.ones(len(rows) - 10 * links)])
-    q, turn = np.zeros_like(rows), np.eye(d)
+    q, turn = np.linalg.qr(_seen_from(rows, ones + rows @ x, links))
     for _ in range(ROUNDS):
-        scaled = _seen_from(rows, ones + rows @ x, links)
-        q, turn = np.linalg.qr(scaled)
-        step = q.T @ identity  # Newton's, as Q^T Q = 1 is the Hessian, and -Q^T 1 the gradient
+        step = q.T @ identity
         decrement = float(np.linalg.norm(step))
         if decrement < CENTRED:
             break
-        x = x + np.linalg.solve(turn, step) / (1.0 + (decrement if decrement > 0.25 else 0.0))
-    centre = own + (changes @ x).reshape(own.shape)
-    return FeasibleBodies(centre, np.linalg.solve(turn.T, changes.T).T, q, sized)
+        x = x + np.linalg.solve(turn, step) / (1.0 + (decrement if decrement > DAMPED else 0.0))
+        q, turn = np.linalg.qr(_seen_from(rows, ones + rows @ x, links))
+    return q, x, turn
 
 
 def _seen_from(rows: Floats, place: Floats, links: int) -> Floats:

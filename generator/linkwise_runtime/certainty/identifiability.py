@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..chosen_names import listed
 from .pseudo_inertia import Floats
 from .share_rows import LinearRobot, OnNumpy, RigidRobot, ShareArrays
 from .torque_space import TorqueSpace, torque_space
@@ -80,7 +81,7 @@ class Identifiability:
 
     def __str__(self) -> str:
         """Return a table: how many shares of each kind follow, then joint by joint the links of tau_ij."""
-        measured = "all joints" if self.measured == self.joints else ", ".join(self.measured)
+        measured = "all joints" if self.measured == self.joints else listed(self.measured)
         lines = [
             f"{self.name}: torques of {measured} determine {self.base_count} combinations of "
             f"{self.parameter_count} inertial parameters",

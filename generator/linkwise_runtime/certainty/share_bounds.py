@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ..door import Door
 from ..interface import array_of
 from ..rule.joint_tree import Bodies
 from .feasible_bodies import End, FeasibleBodies, feasible_bodies, solver
-from .identifiability import Masks, by_link, hidden_from
+from .identifiability import NONE, STATES, Masks, by_link, hidden_from
 from .pseudo_inertia import Floats, central
 from .share_rows import LinearRobot, OnNumpy, RigidRobot
 
@@ -112,6 +112,7 @@ def share_bounds(
     masses: object,
     measured: object,
     shares: object,
+    joints: object,
 ) -> ShareBounds:
     """Return the answer of `Dynamics.share_bounds`."""
     kinds = _kinds(shares)
@@ -130,12 +131,13 @@ def share_bounds(
     places = linear.measured(measured)
     several = linear.random_motion(len(places))
     space = hidden_from(linear, places, several)
-    everywhere = linear.share_rows([a[:4] for a in several], reactions=False)
+    everywhere = linear.share_rows([a[:STATES] for a in several], reactions=False)
     rows = linear.share_rows(_closed(linear, state), reactions=False)
     rows = {kind: _of_motion(kind, rows[kind][0], state, linear.own) for kind in kinds}
     bodies = feasible_bodies(linear.parameters, space.hidden_parameters, limits, robot.link_names)
     masks = {kind: by_link(everywhere, kind, space) for kind in kinds}
-    found = {kind: _Ends.of(rows[kind], linear.parameters, masks[kind].follows, bodies) for kind in kinds}
+    asked = Asked(linear.parameters, bodies, _asked(joints, linear.joints), tuple(places))
+    found = {kind: ShareEnds.of(rows[kind], masks[kind].follows, asked) for kind in kinds}
     return ShareBounds(
         linear.joints,
         robot.link_names,
@@ -208,9 +210,35 @@ def _limits(given: object, mass: float, where: str) -> tuple[float, float]:
     )
 
 
+def _asked(given: object, joints: Sequence[str]) -> tuple[int, ...]:
+    """Return the places of the loaded joints that were asked for, all unless given."""
+    if given is None:
+        return tuple(range(len(joints)))
+    several = given if isinstance(given, list | tuple) else [given]
+    return tuple(position_of(one, joints, "joint", "joints") for one in several)
+
+
+class Asked(NamedTuple):
+    """Shares that are asked for, and over which bodies."""
+
+    own: Floats
+    """Parameters of the robot's own links, (N, 10)."""
+    bodies: FeasibleBodies
+    joints: tuple[int, ...]
+    """Loaded joints."""
+    measured: tuple[int, ...]
+    """Joints whose torques are measured."""
+
+    def least(self, row: Floats, place: Place) -> End:
+        """Return the least share at a place, by its row (10,)."""
+        y = np.zeros_like(self.own)
+        y[place[1]] = row
+        return self.bodies.least(y, may_end=place[0] in self.measured)
+
+
 @dataclass(frozen=True, eq=False)
-class _Ends:
-    """Ends of one kind of shares."""
+class ShareEnds:
+    """Ends of one kind of shares; of those that were not asked for, not a number."""
 
     value: Floats
     least: Floats
@@ -219,14 +247,17 @@ class _Ends:
     pairs: Mapping[Place, tuple[Floats, Floats]]
 
     @classmethod
-    def of(cls, rows: Floats, own: Floats, follows: Masks, bodies: FeasibleBodies) -> "_Ends":
+    def of(cls, rows: Floats, follows: Masks, asked: Asked) -> "ShareEnds":
         """Return the ends of shares with these rows (m, N, ..., 10)."""
-        by_link = own[:, *(None,) * (rows.ndim - 3)]
-        value = (rows * by_link).sum(-1)
+        over = (slice(None), *(None,) * (rows.ndim - 3))
+        value = (rows * asked.own[over]).sum(-1)
         least, greatest, gap = value.copy(), value.copy(), np.zeros_like(value)
         pairs = {}
-        for place in _leaning(rows, follows):
-            low, high = (_least(sign * rows[place], place[1], bodies) for sign in (1.0, -1.0))
+        for place in _leaning(rows * asked.bodies.sizes[over], follows):
+            if place[0] not in asked.joints:
+                least[place] = greatest[place] = gap[place] = np.nan
+                continue
+            low, high = (asked.least(sign * rows[place], place) for sign in (1.0, -1.0))
             least[place], greatest[place] = min(low.bound, value[place]), max(-high.bound, value[place])
             gap[place] = max(_gap(low), _gap(high))
             pairs[place] = low.parameters, high.parameters
@@ -234,15 +265,13 @@ class _Ends:
 
 
 def _leaning(rows: Floats, follows: Masks) -> Iterator[Place]:
-    """Yield the places of shares that are not zero and lean on the file's masses."""
-    for place in np.argwhere(rows.any(-1) & ~follows).tolist():
+    """Yield the places of shares that are not zero and lean on the file's masses.
+
+    rows: rows of shares, in units of the parameters' sizes
+    """
+    lengths = np.linalg.norm(rows, axis=-1)
+    for place in np.argwhere((lengths > NONE * lengths.max(initial=0.0)) & ~follows).tolist():
         yield tuple(place)
-
-
-def _least(row: Floats, link: int, bodies: FeasibleBodies) -> End:
-    y = np.zeros_like(bodies.centre)
-    y[link] = row
-    return bodies.least(y)
 
 
 def _gap(end: End) -> float:
