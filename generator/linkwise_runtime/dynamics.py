@@ -264,10 +264,10 @@ class Dynamics(MotionCalls):
     def identifiability(self, measured: Sequence[int | str] | None = None) -> Identifiability:
         """Return which shares follow from joint torques alone, and which lean on the file's masses.
 
-        Torques of the same motion are the same for many bodies: those determine a share that has one value for
-        all of them, here by the rank of the regressors at random motions. Springs, damping, friction and
-        armature are taken to be known. Where joints are tied, torques and shares are those of the independent
-        joints, as in `constraints.propagation`. Printed, it is a table.
+        Many bodies have the same joint torques at every motion: a share follows from these if it has one
+        value for all such bodies, which the rank of regressors at random motions tells. Springs, damping,
+        friction and armature are taken to be known. Where joints are tied, torques and shares are those of
+        the independent joints, as in `constraints.propagation`. Printed, the answer is a table.
 
         measured: joints whose torques are measured, by name or number; unless given, all that something
         drives: of a floating base none
@@ -289,10 +289,10 @@ class Dynamics(MotionCalls):
     ) -> ShareBounds:
         """Return the least and greatest value of each share over all bodies with the same joint torques.
 
-        The bodies are all that could exist, with pseudo-inertias that are positive semidefinite, whose torques
-        on the measured joints are those of this robot's at every motion; no link is above ten times the
-        robot's mass and reach, see `certainty.feasible_bodies`. Each end is proved by the dual of its
-        semidefinite program, whose `gap` is told, and `bodies` has those at an end.
+        The bodies are all that could exist, with pseudo-inertias that are positive semidefinite, whose
+        torques on the measured joints are those of this robot's at every motion; no link is above ten times
+        the robot's mass and reach, see `certainty.feasible_bodies`. Each end is proved by the dual of its
+        semidefinite program, whose `gap` is told, and `bodies` of the answer has those at an end.
 
         q, qd, qdd: one motion, (n,); of joints that are tied, a closed position and the motion of the
         independent ones
@@ -300,7 +300,7 @@ class Dynamics(MotionCalls):
         part, or (least, greatest) in kg
         measured: as in `identifiability`
         shares: "torque" (tau_ij), "acceleration", "velocity" or "gravity", or several of them
-        joints: loaded joints whose shares are wanted, all unless given; two programs are solved for each share
+        joints: loaded joints whose shares are wanted, all unless given; each share is two programs
 
         Needs Clarabel and SciPy, and raises ImportError without. Raises as `identifiability` does, and
         ValueError for several samples, limits of masses that no bodies keep, and links that could not exist.
@@ -312,7 +312,7 @@ class Dynamics(MotionCalls):
         """Return this robot of rigid links on NumPy, with bodies in place of its own."""
         tree = self.backend.tree
         assert tree is not None  # as `LinearRobot.of` has seen
-        values = {name: array_of(value) for name, value in self.backend.parameters.items()}
+        values = {name: array_of(cast(Any, value)) for name, value in self.backend.parameters.items()}
         backend = NumpyBackend(self.structure, None, values, RigidRule(tree), "rule", bodies)
         return Dynamics(self.structure, backend, self._load, self._asked)
 

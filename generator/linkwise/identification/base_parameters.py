@@ -16,10 +16,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from linkwise_runtime.certainty.random_motions import Motion, random_motion
 from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.arrays import Array, Index
-from linkwise_runtime.certainty.random_motions import Motion, random_motion
 
 NAMES = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """Mass, first moment, and inertia about the origin of the link's frame, in the order of the regressor."""

@@ -6,6 +6,7 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from linkwise_runtime.certainty.random_motions import Motion, random_closed_motion, random_motion
 from linkwise_runtime.rule.joint_tree import Bodies
 from linkwise_runtime.rule.regressors import inertial_parameters
 
@@ -21,7 +22,6 @@ from linkwise.identification.identification_result import Identification
 from linkwise.identification.log_warnings import doubts, noisy_positions
 from linkwise.identification.normal_factors import JointEquations, joint_equations
 from linkwise.identification.physical_fit import physical_fit
-from linkwise_runtime.certainty.random_motions import Motion, random_closed_motion, random_motion
 from linkwise.identification.torque_log import TorqueLog, read_torque_log
 from linkwise.option import option
 from linkwise.progress import Progress, silent

@@ -181,24 +181,32 @@ def feasible_bodies(own: Floats, hidden: Floats, limits: Floats, links: Sequence
 
     Raises ValueError where no body could exist, with the link's name.
     """
-    fixed = np.flatnonzero(limits[:, 0] == limits[:, 1])
+    fixed = np.flatnonzero(limits[:, 0] == limits[:, 1]).tolist()
     sizes = link_sizes(own)
-    basis = _kept(np.linalg.qr(hidden / sizes.reshape(-1)[:, None])[0], own, fixed)
+    basis = np.linalg.qr(hidden / sizes.reshape(-1)[:, None])[0]
+    basis, start = _held(basis, own / sizes, limits / sizes[:, :1], fixed)
+    claimed, own = own, start * sizes
     cones = np.eye(4)[None] * _lengths(sizes)[:, None]
     cone_rows, offset = _scaled(basis, sizes, cones), _triangles(own, cones)
-    massless = fixed[limits[fixed, 0] == 0.0]
+    massless = [j for j in fixed if limits[j, 0] == 0.0]
     offset.reshape(-1, 10)[massless, -1] += 1.0  # with m = 0 and h = 0 the rest is S >= 0
-    others, bounds, sized = _other_rows(basis, sizes, own, limits, set(fixed.tolist()))
+    others, bounds, sized = _other_rows(basis, sizes, own, limits, set(fixed))
     rows, ones = np.concatenate([cone_rows, others]), np.concatenate([offset, bounds])
     x, inner = _innermost(rows, ones, len(own))
-    if inner < -NARROW:
-        raise ValueError(_impossible(own, limits, links))
+    outside = np.abs(own[fixed, 0] - limits[fixed, 0]) > NARROW * sizes[fixed, 0]
+    if inner < -NARROW or outside.any():
+        raise ValueError(_impossible(claimed, limits, links))
     slack = triangle(np.eye(4)) * (2.0 * NARROW if inner < NARROW else 0.0)
     ones[: 10 * len(own)] += np.tile(slack, len(own))
     q, centre, turn = _centred(rows, ones, x, len(own))
     changes = basis * sizes.reshape(-1)[:, None]
     at_centre = own + (changes @ centre).reshape(own.shape)
-    return FeasibleBodies(at_centre, sizes, basis, np.linalg.solve(turn.T, changes.T).T, q, sized)
+    return FeasibleBodies(at_centre, sizes, basis, _solved(turn, changes), q, sized)
+
+
+def _solved(turn: Floats, changes: Floats) -> Floats:
+    """Return changes R^-1: by u in place of x."""
+    return np.array(np.linalg.solve(turn.T, changes.T).T, dtype=np.float64)
 
 
 def _lengths(sizes: Floats) -> Floats:
@@ -209,7 +217,8 @@ def _lengths(sizes: Floats) -> Floats:
 
 def _triangles(pi: Floats, cones: Floats) -> Floats:
     """Return the triangles (10 N,) of scaled pseudo-inertias C J C^T."""
-    return triangle(cones @ pseudo_inertia(pi) @ np.swapaxes(cones, -1, -2)).reshape(-1)
+    found: Floats = triangle(cones @ pseudo_inertia(pi) @ np.swapaxes(cones, -1, -2)).reshape(-1)
+    return found
 
 
 def _scaled(basis: Floats, sizes: Floats, cones: Floats) -> Floats:
@@ -219,14 +228,24 @@ def _scaled(basis: Floats, sizes: Floats, cones: Floats) -> Floats:
     return np.stack(found, 1) if found else np.zeros((sizes.size, 0))
 
 
-def _kept(basis: Floats, own: Floats, fixed: Floats) -> Floats:
-    """Return the part of the basis that keeps fixed masses, and first moments where these are 0."""
-    held = [10 * j + a for j in fixed for a in range(4 if own[j, 0] == 0.0 else 1)]
+def _held(basis: Floats, own: Floats, limits: Floats, fixed: Sequence[int]) -> tuple[Floats, Floats]:
+    """Return the part of the basis that keeps fixed masses, and bodies that have them, as near as can be.
+
+    own, limits: in units of the sizes. Where a mass is held at 0, so is the first moment.
+    """
+    held = [10 * j + a for j in fixed for a in range(4 if limits[j, 0] == 0.0 else 1)]
     if not held:
-        return basis
-    _, found, right = np.linalg.svd(basis[held])
-    rank = int((found > 1e-9).sum())
-    return basis @ right[rank:].T
+        return basis, own
+    wanted = np.array([limits[at // 10, 0] if at % 10 == 0 else 0.0 for at in held])
+    there = own.reshape(-1)
+    left, found, right = np.linalg.svd(basis[held])
+    rank = int((found > ROUNDING).sum())
+    steps = right[:rank].T @ ((left.T @ (wanted - there[held]))[:rank] / found[:rank])
+    start, kept = there + basis @ steps, basis @ right[rank:].T
+    if np.abs(start[held] - wanted).max() <= NARROW:
+        start[held] = wanted
+    kept[held] = 0.0
+    return kept, start.reshape(own.shape)
 
 
 def _other_rows(
@@ -305,5 +324,6 @@ def _impossible(own: Floats, limits: Floats, links: Sequence[str]) -> str:
             "a possible body; correct its mass, centre and inertia"
         )
     outside = np.flatnonzero((own[:, 0] < limits[:, 0]) | (own[:, 0] > limits[:, 1]))
-    named = f"link {links[int(outside[0])]!r} outside of its own" if len(outside) else "too narrow together"
+    first = f"link {links[int(outside[0])]!r} outside of its own" if len(outside) else ""
+    named = first or "too narrow together"
     return f"no bodies within the limits of masses have these joint torques: {named}; widen `masses`"

@@ -81,20 +81,23 @@ class ShareBounds:
         Raises ValueError for a share that is not there or follows from torques.
         """
         if kind not in self.value:
-            raise ValueError(f"kind is {short(kind)}; choose one that was asked for: {choice(kind, self.value, 'value')}")
+            raise ValueError(
+                f"kind is {short(kind)}; choose one that was asked for: {choice(kind, self.value, 'value')}"
+            )
         if end not in ("least", "greatest"):
             raise ValueError(f"end is {short(end)}; choose least or greatest")
-        given = [(joint, self.joints, "joint"), (link, self.links, "link")]
+        asked: list[tuple[object, tuple[str, ...], str]] = [(joint, self.joints, "joint")]
+        asked.append((link, self.links, "link"))
         if self.value[kind].ndim == 3:
-            given.append((coordinate, self.joints, "coordinate"))
-        place = tuple(
-            position_of(one, names, "link" if what == "link" else "joint", what) for one, names, what in given
-        )
+            asked.append((coordinate, self.joints, "coordinate"))
+        kinds = ("joint", "link", "joint")
+        place = tuple(position_of(*one[:2], what, one[2]) for one, what in zip(asked, kinds, strict=False))
         pair = self.ends.get((kind, place))
         if pair is None:
+            words = ", ".join(names[at] for at, (_, names, _) in zip(place, asked, strict=True))
             raise ValueError(
-                f"the {kind} share of {', '.join(names[at] for at, (_, names, _) in zip(place, given, strict=True))}"
-                " is zero or follows from joint torques: all bodies have the same"
+                f"the {kind} share of {words} is zero, follows from joint torques, or was not asked for: "
+                "there are no bodies at its ends"
             )
         return bodies_of(pair[end == "greatest"])
 
@@ -197,13 +200,12 @@ def mass_limits(given: object, own: Floats, links: Sequence[str]) -> Floats:
 
 def _limits(given: object, mass: float, where: str) -> tuple[float, float]:
     """Return limits of one mass, given as a part of it or as a pair of kg."""
-    ends = given if isinstance(given, list | tuple) and where != "masses" else [given]
-    if not all(isinstance(x, Real) and not isinstance(x, bool) and not np.isnan(float(x)) for x in ends):
-        ends = []
-    if len(ends) == 1 and 0.0 <= float(ends[0]) < np.inf:
-        return max(mass * (1.0 - float(ends[0])), 0.0), mass * (1.0 + float(ends[0]))
-    if len(ends) == 2 and 0.0 <= float(ends[0]) <= float(ends[1]):
-        return float(ends[0]), float(ends[1])
+    pair = given if isinstance(given, list | tuple) and where != "masses" else [given]
+    numbers = [float(x) for x in pair if isinstance(x, Real) and not isinstance(x, bool)]
+    if len(numbers) == len(pair) == 1 and 0.0 <= numbers[0] < np.inf:
+        return max(mass * (1.0 - numbers[0]), 0.0), mass * (1.0 + numbers[0])
+    if len(numbers) == len(pair) == 2 and 0.0 <= numbers[0] <= numbers[1]:
+        return numbers[0], numbers[1]
     raise ValueError(
         f"{where} is {short(given)}; give a part of the claimed mass, 0.1 for 10 % less or more, or by "
         "link's name such a part or (least, greatest) in kg"

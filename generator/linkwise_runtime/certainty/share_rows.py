@@ -175,7 +175,7 @@ def _own_bodies(backend: ArrayBackend, tree: JointTree) -> Bodies[Floats]:
     """Return the bodies that the links carry, for the run-time parameters that were given."""
     if backend.bodies is not None:
         return Bodies(*(array_of(a).astype(float) for a in backend.bodies))
-    values = {name: np.asarray(array_of(value), dtype=float) for name, value in backend.parameters.items()}
+    values = {name: np.asarray(array_of(cast(Numbers, value))) for name, value in backend.parameters.items()}
     sources = own_numbers(tree), cast(Numbers, formula_sources(tree))
     found = given_numbers(cast(Any, np), tree, sources, cast(Mapping[str, Numbers], values), None, ())
     masses, centres, inertias = (np.asarray(a)[..., 0] for a in found.bodies)
