@@ -55,6 +55,7 @@ RUNTIME = (
     "motion_calls",
     "robot_calls",
     "control",
+    "certainty",
     "motion",
     "constraints",
     "arrays",

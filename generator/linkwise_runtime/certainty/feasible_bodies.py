@@ -319,9 +319,10 @@ def _impossible(own: Floats, limits: Floats, links: Sequence[str]) -> str:
     sizes = _lengths(link_sizes(own))
     least = np.linalg.eigvalsh(sizes[:, :, None] * pseudo_inertia(own) * sizes[:, None])[:, 0]
     if least.min() < -NARROW:
+        worst = links[int(least.argmin())]
         return (
-            f"no bodies that could exist have these joint torques: link {links[int(least.argmin())]!r} is not "
-            "a possible body; correct its mass, centre and inertia"
+            f"no bodies that could exist have these joint torques: link {worst!r} is not a possible body; "
+            "correct its mass, centre and inertia"
         )
     outside = np.flatnonzero((own[:, 0] < limits[:, 0]) | (own[:, 0] > limits[:, 1]))
     first = f"link {links[int(outside[0])]!r} outside of its own" if len(outside) else ""

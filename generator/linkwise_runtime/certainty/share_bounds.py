@@ -260,7 +260,7 @@ class ShareEnds:
                 least[place] = greatest[place] = gap[place] = np.nan
                 continue
             low, high = (asked.least(sign * rows[place], place) for sign in (1.0, -1.0))
-            least[place], greatest[place] = min(low.bound, value[place]), max(-high.bound, value[place])
+            least[place], greatest[place] = low.bound, -high.bound
             gap[place] = max(_gap(low), _gap(high))
             pairs[place] = low.parameters, high.parameters
         return cls(value, least, greatest, gap, pairs)
