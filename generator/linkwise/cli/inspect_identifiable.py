@@ -140,8 +140,8 @@ def _motion(model: Dynamics, found: Identifiability, given: Sequence[str]) -> tu
         raise LinkwiseError(f"--at {strange[0]}=…: it follows others; give {', '.join(found.joints)}")
     q, qd, qdd = (np.full(model.n, usual) for usual in USUAL)
     q = np.clip(q, model.joint_limits.lower or -np.inf, model.joint_limits.upper or np.inf)
-    for k, numbers in stated.items():
-        for whole, number in zip((q, qd, qdd), numbers, strict=False):
+    for k, state in stated.items():
+        for whole, number in zip((q, qd, qdd), state, strict=False):
             whole[k] = number
     return (_closed(model, own, q, stated), qd, qdd) if model.backend.ties_joints else (q, qd, qdd)
 
