@@ -58,7 +58,7 @@ class End(NamedTuple):
     attained: float
     """Value of the bodies that were found, which exist: the bound is not further off than this."""
     parameters: Floats
-    """Their parameters, (N, 10)."""
+    """Parameters of these bodies, (N, 10)."""
 
 
 def solver() -> tuple[Any, Any]:

@@ -1,4 +1,4 @@
-"""What joint torques determine: which shares follow from them alone, and which lean on the file's masses.
+"""Shares that joint torques determine: which follow from them alone, and which lean on the file's masses.
 
 A share through link j is y . pi_j. It is determined if y lies in the space of `torque_space` at every motion,
 here at some random ones. Shares that are zero for all motion, as off the path of a link, are not counted.
@@ -47,7 +47,7 @@ class Determined(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """Which shares follow from joint torques alone; the others lean on how the file spreads mass over links.
+    """Shares that follow from joint torques alone; the others lean on how the file spreads mass over links.
 
     m joints have torques of their own: all, or the independent ones where joints are tied.
     """
@@ -66,7 +66,7 @@ class Identifiability:
     shares: Mapping[str, Determined]
     """Shares by link: torque and gravity (m, N), acceleration and velocity (m, N, m), reactions (F, N, 6)."""
     sums: Mapping[str, Determined]
-    """Their sums over the links: (m,), (m, m) by coordinate, and (F, 6)."""
+    """Sums over the links: (m,), (m, m) by coordinate, and (F, 6)."""
 
     @property
     def parameter_count(self) -> int:
