@@ -24,7 +24,8 @@ def test_the_table_says_what_follows_and_how_far_the_rest_may_be_off() -> None:
     rows = {tuple(line.split()[:2]): line.split()[2:] for line in text.splitlines() if line[:8] == "  joint1"}
     assert "1 of 6" in text
     assert "5 of 14" in text
-    assert rows["joint1", "link2"] == ["1.918", "0.8787", "3.301"]
+    assert rows["joint1", "link2"] == ["1.918", "0.8787", "3.301", "*"]  # with a link 1 of any mass
+    assert "  * an end goes further with links above 10 times the robot's mass and reach" in text
     assert "  joint3  link3      0.6807  follows from torques" in text
     assert "joint3 -0.2 rad, 2 rad/s, 5 rad/s^2" in text
     assert max(map(len, text.splitlines())) < 120

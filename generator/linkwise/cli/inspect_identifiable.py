@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.certainty.feasible_bodies import LARGEST
 from linkwise_runtime.certainty.identifiability import Identifiability
 from linkwise_runtime.certainty.share_bounds import ShareBounds
 from linkwise_runtime.dynamics import Dynamics
@@ -208,6 +209,7 @@ def _intervals(
                 "least": least,
                 "greatest": greatest,
                 "proved": bool(bounds.proved["torque"][i, j]),
+                "held_by_size": bool(bounds.sized["torque"][i, j]),
             }
 
 
@@ -235,8 +237,10 @@ def identified_text(data: Mapping[str, Any]) -> str:
         names = f"  {printable(row['joint']):<{width[0]}}  {printable(row['link']):<{width[1]}}"
         head = f"{names}  {row['value']:>10.4g}"
         ends = f"  {_end(row['least'], '-'):>10}  {_end(row['greatest'], ''):>10}"
-        doubt = "" if row["proved"] else "  (proved less closely)"
+        doubt = " *" * row["held_by_size"] + "  (proved less closely)" * (not row["proved"])
         lines.append(f"{head}  follows from torques" if row["follows"] else head + ends + doubt)
+    if any(row["held_by_size"] for row in data["tau"]):
+        lines.append(f"  * an end goes further with links above {LARGEST:g} times the robot's mass and reach")
     shown = {row["joint"] for row in data["tau"]}
     if rest := len(data["joints"]) - len(shown):
         lines.append(f"  and {rest} more joint{'s' * (rest != 1)}: --details shows all")

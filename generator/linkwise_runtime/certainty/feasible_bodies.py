@@ -45,6 +45,8 @@ STEP = 0.9
 """Longest step of the solver, as a part of the way to the edge: with longer ones it stalls earlier."""
 CLOSE = 1e-12
 """Tolerances of the solver: it goes on until it cannot do better, and the certificate judges."""
+PRESSED = 1e-6
+"""Part of all multipliers from which on those of the bound of sizes hold an end back."""
 ENDLESS = 1e-3
 """Least gain by a direction of the largest size that goes on for ever: a speck of J below zero, of rounding,
 lets first moments in that are its root."""
@@ -59,6 +61,8 @@ class End(NamedTuple):
     """Value of the bodies that were found, which exist: the bound is not further off than this."""
     parameters: Floats
     """Parameters of these bodies, (N, 10)."""
+    sized: bool = False
+    """True where the bound of sizes holds the end back: with larger links it would lie further out."""
 
 
 def solver() -> tuple[Any, Any]:
@@ -106,8 +110,10 @@ class FeasibleBodies:
         u = self._inside(u)
         bound = self._proved(c / size, z)
         pi = self.centre + (self.steps @ u).reshape(self.centre.shape)
-        endless = not may_end and self._is_endless(c / size)
-        return End(-np.inf if endless else at_centre + size * bound, float((y * pi).sum()), pi)
+        pressing = z[10 * len(self.centre) :][list(self.sized)].sum()
+        pressed = bool(pressing > PRESSED * np.abs(z).sum())
+        endless = pressed and not may_end and self._is_endless(c / size)
+        return End(-np.inf if endless else at_centre + size * bound, float((y * pi).sum()), pi, pressed)
 
     @cached_property
     def _ones(self) -> Floats:

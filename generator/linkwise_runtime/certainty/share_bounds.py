@@ -50,6 +50,8 @@ class ShareBounds:
     """Values above which no possible bodies go, as proved; infinity where they go without end."""
     gap: Mapping[str, Floats]
     """Largest distance, over both ends, of what is proved from what bodies that were found attain."""
+    sized: Mapping[str, Masks]
+    """Shares of which the largest size of links holds back an end: with larger links it would go further."""
     limits: Floats
     """Least and greatest mass of each link, (N, 2), infinite where none was given."""
     ends: Mapping[tuple[str, Place], tuple[Floats, Floats]]
@@ -149,6 +151,7 @@ def share_bounds(
         {kind: one.least for kind, one in found.items()},
         {kind: one.greatest for kind, one in found.items()},
         {kind: one.gap for kind, one in found.items()},
+        {kind: one.sized for kind, one in found.items()},
         limits,
         {(kind, place): pair for kind, one in found.items() for place, pair in one.pairs.items()},
     )
@@ -246,6 +249,7 @@ class ShareEnds:
     least: Floats
     greatest: Floats
     gap: Floats
+    sized: Masks
     pairs: Mapping[Place, tuple[Floats, Floats]]
 
     @classmethod
@@ -254,16 +258,16 @@ class ShareEnds:
         over = (slice(None), *(None,) * (rows.ndim - 3))
         value = (rows * asked.own[over]).sum(-1)
         least, greatest, gap = value.copy(), value.copy(), np.zeros_like(value)
-        pairs = {}
+        sized, pairs = np.zeros(value.shape, dtype=bool), {}
         for place in _leaning(rows * asked.bodies.sizes[over], follows):
             if place[0] not in asked.joints:
                 least[place] = greatest[place] = gap[place] = np.nan
                 continue
             low, high = (asked.least(sign * rows[place], place) for sign in (1.0, -1.0))
             least[place], greatest[place] = low.bound, -high.bound
-            gap[place] = max(_gap(low), _gap(high))
+            gap[place], sized[place] = max(_gap(low), _gap(high)), low.sized or high.sized
             pairs[place] = low.parameters, high.parameters
-        return cls(value, least, greatest, gap, pairs)
+        return cls(value, least, greatest, gap, sized, pairs)
 
 
 def _leaning(rows: Floats, follows: Masks) -> Iterator[Place]:
