@@ -84,16 +84,7 @@ ROOMS: dict[str, Room] = {
     "runtime/arrays": Room((f"{RUNTIME}arrays/",), ("tests/emit/test_exports.py",)),
     **{
         f"runtime/{name}": Room((f"{RUNTIME}{name}/",))
-        for name in (
-            "lagrangians",
-            "control",
-            "certainty",
-            "motion",
-            "constraints",
-            "kinematics",
-            "answers",
-            "rule",
-        )
+        for name in ("lagrangians", "control", "motion", "constraints", "kinematics", "answers", "rule")
     },
     "c": _folder("c", *C),
     "cmake": _folder("cmake", "tests/emit/test_cmake.py"),

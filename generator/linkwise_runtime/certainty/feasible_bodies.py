@@ -21,11 +21,11 @@ z . s >= 0. So z is repaired until both hold: by Q times what Q^T z lacks, and b
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from .conic_program import conic_least
 from .pseudo_inertia import Floats, link_sizes, pseudo_inertia, squared, triangle
 
 LARGEST = 10.0
@@ -41,10 +41,6 @@ CENTRED, DAMPED = 1e-11, 0.25
 """Newton decrements: below the one the centre is found, above the other steps are damped."""
 ROUNDING = 1e-9
 """Part of y that leans on what no torque shows, up to which it is rounding: all bodies have one value."""
-STEP = 0.9
-"""Longest step of the solver, as a part of the way to the edge: with longer ones it stalls earlier."""
-CLOSE = 1e-12
-"""Tolerances of the solver: it goes on until it cannot do better, and the certificate judges."""
 PRESSED = 1e-6
 """Part of all multipliers from which on those of the bound of sizes hold an end back."""
 ENDLESS = 1e-3
@@ -63,17 +59,6 @@ class End(NamedTuple):
     """Parameters of these bodies, (N, 10)."""
     sized: bool = False
     """True where the bound of sizes holds the end back: with larger links it would lie further out."""
-
-
-def solver() -> tuple[Any, Any]:
-    """Return Clarabel and SciPy's sparse matrices; raise ImportError that says how to install them."""
-    try:
-        return import_module("clarabel"), import_module("scipy.sparse")
-    except ImportError:
-        raise ImportError(
-            "intervals of shares need Clarabel and SciPy, which are not installed here: pip install clarabel "
-            "scipy, or with linkwise pip install 'linkwise[identify]'"
-        ) from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,27 +141,6 @@ class FeasibleBodies:
         ones[links + np.array(self.sized, dtype=np.intp)] = 1.0
         u, _ = self._solved(c, self.rows, ones)
         return bool(c @ u < -ENDLESS)
-
-
-def conic_least(c: Floats, rows: Floats, ones: Floats, links: int) -> tuple[Floats, Floats]:
-    """Return the u of least c . u with ones + rows u in the cones, and the multipliers in these.
-
-    links: number of cones of semidefinite (4, 4) matrices, which come first, ten rows each
-    """
-    clarabel, sparse = solver()
-    settings = clarabel.DefaultSettings()
-    settings.verbose = settings.equilibrate_enable = False
-    settings.max_step_fraction = STEP
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = CLOSE
-    cones = [clarabel.PSDTriangleConeT(4)] * links
-    others = len(rows) - 10 * links
-    if others:
-        cones.append(clarabel.NonnegativeConeT(others))
-    nothing = sparse.csc_matrix((len(c), len(c)))
-    found = clarabel.DefaultSolver(nothing, c, sparse.csc_matrix(-rows), ones, cones, settings).solve()
-    u, z = np.array(found.x), np.array(found.z)
-    good = np.isfinite(u).all() and np.isfinite(z).all()
-    return (u, z) if good else (np.zeros_like(u), np.zeros_like(z))
 
 
 def feasible_bodies(own: Floats, hidden: Floats, limits: Floats, links: Sequence[str]) -> FeasibleBodies:

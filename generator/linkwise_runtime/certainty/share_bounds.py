@@ -11,7 +11,8 @@ from ..chosen_names import choice, position_of, short
 from ..door import Door
 from ..interface import array_of
 from ..rule.joint_tree import Bodies
-from .feasible_bodies import End, FeasibleBodies, feasible_bodies, solver
+from .conic_program import solver
+from .feasible_bodies import End, FeasibleBodies, feasible_bodies
 from .identifiability import NONE, STATES, Masks, by_link, hidden_from
 from .pseudo_inertia import Floats, central
 from .share_rows import LinearRobot, OnNumpy, RigidRobot
