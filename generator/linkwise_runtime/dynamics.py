@@ -17,15 +17,13 @@ from typing import Any, Literal, Self, cast, overload
 from numpy.typing import ArrayLike
 
 from .arguments import Beside, check_numbers
-from .certainty.share_deviations import uncertainty
-from .certainty.uncertain_bodies import UncertainBodies
+from .certainty_calls import CertaintyCalls
 from .control.controllers import Cancellation, PartialImpedance, cancellation, partial_impedance
 from .file_joints import Order
 from .html_tables import robot_table
 from .interface import Array
 from .kinematics.robot_kinematics import Kinematics
 from .labelled import labelled
-from .motion_calls import MotionCalls
 from .quantities import (
     Coefficients,
     Energy,
@@ -36,11 +34,10 @@ from .quantities import (
     Power,
     Propagation,
 )
-from .share_uncertainty import Uncertainty
 from .targets import FrameImpedance, Natural
 
 
-class Dynamics(MotionCalls):
+class Dynamics(CertaintyCalls):
     """Partial torques and other dynamics of a robot on one back end; made by the package's `load`.
 
     The robot is the open tree of its joints: unless they say otherwise, calls compute as if ties, which close
@@ -258,22 +255,6 @@ class Dynamics(MotionCalls):
         """
         answer: Coefficients[Array] = self._call("coefficient_regressors", (q, qd), out)
         return answer
-
-    def uncertainty(self, q: Array, qd: Array, qdd: Array, bodies: UncertainBodies) -> Uncertainty[Array]:
-        """Return standard deviations of shares, of their sums and powers, where bodies are uncertain.
-
-        bodies: standard deviations of what links carry, an `UncertainBodies`
-
-        Shares are linear in the links' inertial parameters, and the covariance of these is worked out
-        exactly; lengths, the places of joints, count to first order, by exact derivatives. Deviations are
-        about the shares' means; where centres are uncertain these differ from the shares of the robot's own
-        bodies, by what the mean of the inertia is more. Motion, axes of joints, springs, damping, friction,
-        armature and gravity count as certain; of reactions and induced accelerations there are no
-        deviations. Raises ValueError, which names the link, for deviations that cannot be, and as `regressor`
-        does.
-        """
-        found: Uncertainty[Array] = uncertainty(self, q, qd, qdd, bodies)
-        return found
 
     def masked(
         self, q: Array, qd: Array, qdd: Array, mask: ArrayLike | Array, out: Array | None = None

@@ -13,7 +13,7 @@ from helpers.urdf_text import joint, link, mimic, robot
 from linkwise import LinkwiseError, generate, read_robot, read_system, write_package
 from linkwise.analysis.load_robot import load_robot
 from linkwise.cli.app import app
-from linkwise.identification.pseudo_inertia import shared_mass
+from linkwise.identification.shared_mass import shared_mass
 from typer.testing import CliRunner
 
 from identification.test_identify import other_bodies, own_parameters, swings

@@ -32,11 +32,11 @@ from linkwise.cli.app import app
 from linkwise.identification.base_parameters import base_parameters
 from linkwise.identification.identified_files import page
 from linkwise.identification.identified_robot import identified_robot
-from linkwise.identification.pseudo_inertia import pseudo_inertia
 from linkwise.identification.urdf_file import urdf_text
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
+from linkwise_runtime.certainty.pseudo_inertia import pseudo_inertia
 from linkwise_runtime.rule.joint_tree import Bodies
 from linkwise_runtime.rule.regressors import inertial_parameters
 from typer.testing import CliRunner

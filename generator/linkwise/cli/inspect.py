@@ -11,9 +11,11 @@ from linkwise_runtime.structure import IMPOSED_MOTION
 from linkwise import pipeline
 from linkwise.cli import Json, counted
 from linkwise.cli.flags import RobotName, is_given, takes, tell_run
+from linkwise.cli.inspect_identifiable import Identifying, identified, identified_text
 from linkwise.cli.inspect_page import SHARES, SUBJECTS, page, varying
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, listed, printable
+from linkwise.progress import progress as shown_progress
 from linkwise.robot import Options, kept_apart, left_out
 from linkwise.robot.robot import Parameter
 from linkwise.symbolic.definition import exact_text, joint_entries, joint_tree
@@ -33,6 +35,7 @@ def inspect(
     context: typer.Context,
     robot: RobotName,
     options: Options,
+    identifying: Identifying,
     details: Annotated[
         bool,
         typer.Option("--details", help="Show every joint, link, constraint, frame, parameter and remark"),
@@ -40,6 +43,12 @@ def inspect(
     as_json: Json = False,
 ) -> None:
     """Show a robot's joints, links, parameters, and what was merged, locked, ignored or left out."""
+    if identifying.identifiable:
+        with shown_progress() as progress:
+            found = identified(robot, options, identifying, details, progress)
+        tell_run(robot)
+        print(json_text(found, indent=1) if as_json else identified_text(found))
+        return
     system, refused = _system(robot, options, not is_given(context, "parameters"))
     tell_run(robot)
     data = inspection(system, details, refused)

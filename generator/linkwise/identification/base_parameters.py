@@ -16,10 +16,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from linkwise_runtime.certainty.random_motions import Motion, random_motion
 from linkwise_runtime.dynamics import Dynamics
 
 from linkwise.arrays import Array, Index
-from linkwise.identification.random_motions import Motion, random_motion
 
 NAMES = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """Mass, first moment, and inertia about the origin of the link's frame, in the order of the regressor."""
@@ -86,7 +86,7 @@ def base_parameters(
     """
     links, n = tuple(model.link_names), len(model.joint_names)
     columns = len(NAMES) * len(links)
-    q, qd, qdd = random_motion(model, samples_needed(model, n)) if motion is None else motion
+    q, qd, qdd = random_motion(n, samples_needed(model, n)) if motion is None else motion
     rows = model.regressor(q, qd, qdd).reshape(len(q), n, columns)
     picked, combinations = _combinations(rows.reshape(-1, columns), np.arange(columns))
     hidden: tuple[str, ...] = ()

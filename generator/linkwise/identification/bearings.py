@@ -9,11 +9,11 @@ the independent joints.
 from dataclasses import dataclass
 
 import numpy as np
+from linkwise_runtime.certainty.random_motions import SPEED, Motion
 from linkwise_runtime.constraints.independent_joints import loose_base
 
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.arrays import Array, Mask
-from linkwise.identification.random_motions import SPEED, Motion
 
 RANK = 1e-6
 """Part of a column, below which its remainder, without its share along other columns, is rounding."""

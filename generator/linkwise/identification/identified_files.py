@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from linkwise_runtime.certainty.pseudo_inertia import central
 
 from linkwise.escape import json_text, markdown
 from linkwise.identification.base_parameters import NAMES, UNITS
 from linkwise.identification.identification_result import Identification
-from linkwise.identification.pseudo_inertia import central
 from linkwise.package.manifest import Manifest
 
 COEFFICIENTS = {"rad": ("N m s/rad", "N m"), "m": ("N s/m", "N")}

@@ -6,6 +6,7 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from linkwise_runtime.certainty.random_motions import Motion, random_closed_motion, random_motion
 from linkwise_runtime.rule.joint_tree import Bodies
 from linkwise_runtime.rule.regressors import inertial_parameters
 
@@ -21,7 +22,6 @@ from linkwise.identification.identification_result import Identification
 from linkwise.identification.log_warnings import doubts, noisy_positions
 from linkwise.identification.normal_factors import JointEquations, joint_equations
 from linkwise.identification.physical_fit import physical_fit
-from linkwise.identification.random_motions import Motion, random_closed_motion, random_motion
 from linkwise.identification.torque_log import TorqueLog, read_torque_log
 from linkwise.option import option
 from linkwise.progress import Progress, silent
@@ -101,8 +101,8 @@ def identify(
 def _random_motion(robot: OpenedRobot, read: TorqueLog) -> Motion:
     samples = samples_needed(robot.model, len(robot.driven))
     if robot.constrained is None:
-        return random_motion(robot.model, samples)
-    return random_closed_motion(robot.constrained, read.q[read.start : read.stop], samples)
+        return random_motion(len(robot.joints), samples)
+    return random_closed_motion(robot.constrained.constraints, read.q[read.start : read.stop], samples)
 
 
 def _own_parameters(robot: OpenedRobot) -> Array:

@@ -8,11 +8,12 @@ from typing import NamedTuple, TypeAlias
 from xml.parsers.expat import ExpatError
 
 import numpy as np
+from linkwise_runtime.certainty.pseudo_inertia import central_of, pseudo_inertia, pseudo_inertia_of
 from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
 
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.identification.pseudo_inertia import central_of, pseudo_inertia, pseudo_inertia_of, shared_mass
+from linkwise.identification.shared_mass import shared_mass
 from linkwise.robot.description import Body, Description
 from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.parameters import numeric

@@ -4,11 +4,11 @@ from collections.abc import Iterator, Mapping
 from xml.etree.ElementTree import Element
 
 import numpy as np
+from linkwise_runtime.certainty.pseudo_inertia import MOMENTS
 
 from linkwise.arrays import Array
 from linkwise.identification.own_file import Friction, LinkMass, OwnFile
 from linkwise.identification.placed_xml import Edit, PlacedXml, tag
-from linkwise.identification.pseudo_inertia import MOMENTS
 from linkwise.robot.readers.xml_file import numbers
 from linkwise.robot.transforms import from_rpy
 

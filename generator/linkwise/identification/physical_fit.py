@@ -13,18 +13,16 @@ interior-point method.
 from dataclasses import dataclass
 
 import numpy as np
+from linkwise_runtime.certainty.pseudo_inertia import link_sizes, pseudo_inertia, triangle
 
 from linkwise.arrays import Array, Mask
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
 from linkwise.identification.base_parameters import NAMES, BaseParameters
 from linkwise.identification.fit import Fit
-from linkwise.identification.pseudo_inertia import pseudo_inertia
 
 SPECK = 1e-6
 """Part of a link's size by which a body stays inside the feasible set, so that rounding keeps it there."""
-SMALLEST = 0.05
-"""Least size of a link's parameters, as a part of the largest mass, or length."""
 SLIGHT = 0.01
 """Part of its standard error, below which friction is what the solver leaves of zero."""
 SOLVED = ("Solved", "AlmostSolved")
@@ -43,7 +41,7 @@ def physical_fit(fit: Fit, base: BaseParameters, own: Array, rubs: Mask) -> Phys
 
     Raises LinkwiseError where the solver fails.
     """
-    sizes = _sizes(own)
+    sizes = link_sizes(own)
     count = own.size
     frictions = 2 * int(rubs.sum())
     rubbing = _friction_sizes(fit, rubs)
@@ -77,8 +75,8 @@ def _within_cones(left: Array, right: Array, sizes: Array, frictions: int) -> Ar
         length = np.sqrt(size[4] / size[0])
         frame = np.diag([1 / length] * 3 + [1.0]) / np.sqrt(size[0])
         matrices = [frame @ pseudo_inertia(unit) @ frame for unit in np.eye(len(NAMES))]
-        rows.append(-np.stack([_triangle(m) for m in matrices], 1) @ block)
-        bounds.append(-SPECK * _triangle(np.eye(4)))
+        rows.append(-triangle(np.stack(matrices)).T @ block)
+        bounds.append(-SPECK * triangle(np.eye(4)))
         cones.append(clarabel.PSDTriangleConeT(4))
     if frictions:
         rows.append(-np.eye(frictions, left.shape[1], left.shape[1] - frictions))
@@ -104,24 +102,6 @@ def _within_cones(left: Array, right: Array, sizes: Array, frictions: int) -> Ar
         )
     x: Array = np.linalg.solve(r, least + np.array(solution.x))
     return x
-
-
-def _triangle(matrix: Array) -> Array:
-    """Return the upper triangle by columns, off-diagonal entries times the root of 2: the cone's order."""
-    entries: list[float] = [
-        matrix[a, b] * (1.0 if a == b else np.sqrt(2.0)) for b in range(4) for a in range(b + 1)
-    ]
-    return np.array(entries, dtype=float)
-
-
-def _sizes(own: Array) -> Array:
-    """Return the size of each link's parameters, (N, 10): m, m l, m l^2 of its mass m and its reach l."""
-    masses, moments = own[:, 0], np.trace(pseudo_inertia(own)[:, :3, :3], axis1=-2, axis2=-1)
-    mass = np.maximum(masses, SMALLEST * (masses.max() or 1.0))
-    reach = np.sqrt(np.maximum(moments, 0.0) / mass)
-    length = np.maximum(reach, SMALLEST * (reach.max() or 1.0))
-    sizes: Array = mass[:, None] * length[:, None] ** np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
-    return sizes
 
 
 def _friction_sizes(fit: Fit, rubs: Mask) -> Array:

@@ -10,12 +10,12 @@ from dataclasses import asdict
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from linkwise_runtime.certainty.pseudo_inertia import central
 from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame, TreeJoint
 from linkwise_runtime.structure import PassiveJoint
 
 from linkwise.arrays import Array
 from linkwise.escape import printable
-from linkwise.identification.pseudo_inertia import central
 from linkwise.package.entries import JointEntry
 from linkwise.package.manifest import Manifest
 

@@ -1,1 +1,1 @@
-"""Certainty of answers: what the numbers of a robot's bodies rest on, and what their errors do."""
+"""Certainty: what joint torques determine, what the rest may be, and what errors of bodies do to shares."""

@@ -123,6 +123,7 @@ def page_data(result: AnalysisResult) -> str:
         "colours": list(COLOURS),
         "coloursDark": list(ON_DARK),
         "potential": robot.potential,
+        "rigid": robot.tree is not None,
         "named": "tau_share" if robot.is_written else "tau_gravity",
         "shares": list(map(printable, robot.share_names)),
         "unstored": robot.is_unstored,

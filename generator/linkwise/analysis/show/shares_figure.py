@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 MANY = 12
 """Number of joints above which a bar has the joint's own motion, the largest other one, and the rest."""
 HATCHES = {"motion": "", "acceleration": "", "velocity": "////", "own": "....", "load": "xx", "named": ""}
+LEANING = (
+    "Net torques are of all links together: joint torques determine them.\n"
+    "What goes through one link leans on how the file spreads mass over the links."
+)
+"""Remark on what rests on the file's masses, for rigid links."""
 LARGEST, REST = "largest motion of another joint", "motions of all other joints, shares added"
 
 
@@ -116,6 +121,8 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
         ncols=3,
         handlelength=2,
         fontsize=8,
+        title=LEANING if robot.tree is not None else None,
+        title_fontsize=7,
     )
     return figure
 
