@@ -34,6 +34,7 @@ from .kinematics import (
     extend_xy,
     gather,
     motion_cross,
+    places_from_world,
     poses,
     product,
     twists,
@@ -227,9 +228,7 @@ def link_energies(
     own = (axes * omega[:3, None]).sum(0)
     spin = (own[:, None] * numbers.inertias * own[None]).sum((0, 1))
     kinetic = 0.5 * (numbers.masses * (speed * speed).sum(0) + spin)
-    # Counted from the world's origin, not from the first hinge of each path.
-    whole = tables._replace(behind=xp.ones_like(tables.behind))
-    places = poses(xp, whole, numbers.translations, position).places
+    places = places_from_world(tables, numbers.translations, position, placed.axes)
     height = _centres(axes, gather(places, joints), numbers.centres)
     return [kinetic, -numbers.masses * (numbers.gravity * height).sum(0)]
 
