@@ -50,7 +50,7 @@ def test_joint_torques_determine_few_shares_by_link_and_all_sums(name: str, pack
     torques = list(shares(known.torques))
     # (samples, i, k, j, 10): of each pair of joints a row by link
     causes = [rows for c in (c2, c1) for rows in shares(np.moveaxis(c, 3, 2))]
-    said = stated(rf"of `{name}` (\d+) of the (\d+) τ_ij and (\d+) of the (\d+) c_ijk")
+    said = stated(rf"\| `{name}` \| (\d+) of (\d+) \| (\d+) of (\d+) \| all \|")
     counts = (sum(map(known.has, torques)), len(torques), sum(map(known.has, causes)), len(causes))
     assert counts == said
     for whole in (known.torques, np.moveaxis(c2, 3, 2), np.moveaxis(c1, 3, 2), g):

@@ -37,6 +37,7 @@ ROOMS = (
     "render",
     "extras",
     "progress",
+    "bounded_file",
     "input_file",
     "generator_fingerprint",
     "own_runtime",

@@ -33,11 +33,11 @@ from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.arrays import Array
+from linkwise.bounded_file import toml_data
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.package.decode import known_keys
-from linkwise.robot.readers.toml.table import toml_data
 
 TOP = ("schema", "all", "link", "joint", "body_mass", "correlation")
 PART, LENGTH = {"%": 0.01}, {"mm": 1e-3, "cm": 1e-2, "m": 1.0}

@@ -51,7 +51,7 @@ class Identifying:
     mass_limit: tuple[str, ...] = option(
         (),
         "Masses within 0.1 of the file's, of all links or of one, or from 1 to 2 kg; may be repeated",
-        metavar="0.1|LINK=0.1|LINK=1,2",
+        metavar="PART|LINK=PART|LINK=KG,KG",
     )
 
     def __post_init__(self) -> None:

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from linkwise.arrays import Array
+from linkwise.bounded_file import toml_data
 from linkwise.escape import listed
 from linkwise.extras import extra
 from linkwise.identification.own_file import Friction, LinkMass, NotWrittenBack, OwnFile
 from linkwise.robot.readers.toml.reader import INERTIA
-from linkwise.robot.readers.toml.table import toml_data
 
 KEYS = ("mass", "com", "inertia")
 TABLE = re.compile(r"^(?=[ \t]*\[\[)", re.MULTILINE)

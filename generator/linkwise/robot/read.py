@@ -7,6 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TypeAlias
 
+from linkwise import bounded_file
 from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import is_file, require_file
 from linkwise.robot.build import build
@@ -21,7 +22,6 @@ from linkwise.robot.readers.mjcf.reader import read_mjcf
 from linkwise.robot.readers.osim import document
 from linkwise.robot.readers.osim.reader import read_osim
 from linkwise.robot.readers.sdf.reader import read_sdf
-from linkwise.robot.readers.toml import table
 from linkwise.robot.readers.toml.constraints import with_constraint_file
 from linkwise.robot.readers.toml.reader import read_toml
 from linkwise.robot.readers.urdf.reader import read_urdf, root_tag
@@ -48,7 +48,7 @@ READERS: dict[str, Reader] = {
 }
 """Readers of files, by the end of the file's name."""
 
-MOST_BYTES = {".toml": table.LARGEST, ".osim": document.LARGEST}
+MOST_BYTES = {".toml": bounded_file.LARGEST, ".osim": document.LARGEST}
 """Largest size in bytes, by the end of the name, of files with a limit other than that of most XML."""
 
 FILES = ("puma560", "torso")

@@ -9,13 +9,14 @@ from typing import Any
 from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.analysis.choices import AnalysisChoices
+from linkwise.bounded_file import toml_data
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.option import chosen, written
 from linkwise.package.decode import filled, known_keys, toml_value
 from linkwise.robot import Options
-from linkwise.robot.readers.toml.table import tables, toml_data
+from linkwise.robot.readers.toml.table import tables
 from linkwise.study.cycles import written_cycles
 from linkwise.study.paths import is_address, require_there, resolved
 from linkwise.study.patterns import expanded

@@ -15,12 +15,12 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any, NoReturn
 
+from linkwise.bounded_file import too_large
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.extras import extra
 from linkwise.input_file import require_file
 from linkwise.output import passing_folder
-from linkwise.robot.readers.bounded import too_large
 
 STORES = ("s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "oss", "http", "https")
 """Kinds of addresses that are read."""

@@ -7,8 +7,8 @@ from xml.etree.ElementTree import Element, ParseError, TreeBuilder
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
+from linkwise.bounded_file import MIB, content
 from linkwise.errors import LinkwiseError
-from linkwise.robot.readers.bounded import MIB, content
 
 XACRO = "this is xacro, a language of macros; expand it first: xacro FILE > robot.urdf"
 LARGEST = 4 * MIB

@@ -16,9 +16,9 @@ from pathlib import Path, PurePath
 from typing import Any
 from warnings import catch_warnings, simplefilter
 
+from linkwise.bounded_file import content
 from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import require_file
-from linkwise.robot.readers.bounded import content
 from linkwise.robot.readers.xml_file import LARGEST
 
 NAMED = re.compile(rb"""\b(file|assetdir|meshdir|texturedir)\w*+\s*+=\s*+(?:"([^"]*)"|'([^']*)')""")

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+from linkwise.bounded_file import MIB
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
-from linkwise.robot.readers.bounded import MIB
 from linkwise.robot.readers.xml_file import parse
 from linkwise.robot.readers.xml_names import Names, names, refuse_misspelt
 

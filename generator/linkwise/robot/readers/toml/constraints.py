@@ -5,13 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
+from linkwise.bounded_file import toml_data
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.robot import transforms
 from linkwise.robot.description import Anchor, AnchoredTie, Description, JointCoupling
 from linkwise.robot.readers.toml.formula import MAX_POWER
-from linkwise.robot.readers.toml.table import TomlTable, as_float, named_parameters, tables, toml_data
+from linkwise.robot.readers.toml.table import TomlTable, as_float, named_parameters, tables
 from linkwise.robot.robot import Rotation, TieKind, Vec3
 
 TOP = ("schema", "parameters", "constraint", "independent")

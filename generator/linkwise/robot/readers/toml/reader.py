@@ -4,12 +4,13 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from linkwise.bounded_file import toml_data
 from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
 from linkwise.robot.joint_types import SINGLE
 from linkwise.robot.readers.toml.constraints import with_constraints
-from linkwise.robot.readers.toml.table import TomlTable, named_parameters, tables, toml_data
+from linkwise.robot.readers.toml.table import TomlTable, named_parameters, tables
 from linkwise.robot.robot import LIMITS, Limits, Mat3, Passive
 
 TOP = {"schema", "name", "gravity", "base", "parameters", "link", "joint", "constraint", "independent"}

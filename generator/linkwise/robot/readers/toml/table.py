@@ -1,33 +1,12 @@
 """Tables of a TOML file, with checks of their content and errors that name the table and the key."""
 
-import tomllib
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 from linkwise.errors import LinkwiseError, within
 from linkwise.package.decode import known_keys
-from linkwise.robot.readers.bounded import MIB, check_toml_bounds, content
 from linkwise.robot.readers.toml.formula import parse_formula
 from linkwise.robot.robot import Scalar, Vec3, unusable
-
-LARGEST = MIB
-"""Largest size of a file, in bytes."""
-
-
-def toml_data(path: Path) -> dict[str, Any]:
-    """Return the data of a file; raises LinkwiseError for what is not TOML or not of schema 1."""
-    try:
-        text = content(path, LARGEST).decode("utf-8-sig").replace("\r\n", "\n")
-        check_toml_bounds(text)
-        data = tomllib.loads(text)
-    except LinkwiseError:
-        raise
-    except (ValueError, RecursionError) as error:  # ValueError: not TOML, not UTF-8
-        raise LinkwiseError(f"malformed TOML: {error}") from None
-    if type(data.get("schema")) is not int or data["schema"] != 1:
-        raise LinkwiseError(f"the schema is {data.get('schema')!r}; write schema = 1 at the top")
-    return data
 
 
 class TomlTable:

@@ -1,7 +1,9 @@
-"""Bounds on a robot's file, checked before it is parsed: parsers take time and memory far beyond its size."""
+"""Bounds on files, checked before these are parsed: parsers take time and memory far beyond their size."""
 
 import re
+import tomllib
 from pathlib import Path
+from typing import Any
 
 from linkwise.errors import LinkwiseError
 
@@ -65,3 +67,22 @@ def check_toml_bounds(text: str) -> None:
             raise LinkwiseError(
                 f"malformed TOML: {what} {found} deep; no robot's file needs more than {MAX_DEPTH}"
             )
+
+
+LARGEST = MIB
+"""Largest size of a file, in bytes."""
+
+
+def toml_data(path: Path) -> dict[str, Any]:
+    """Return the data of a file; raises LinkwiseError for what is not TOML or not of schema 1."""
+    try:
+        text = content(path, LARGEST).decode("utf-8-sig").replace("\r\n", "\n")
+        check_toml_bounds(text)
+        data = tomllib.loads(text)
+    except LinkwiseError:
+        raise
+    except (ValueError, RecursionError) as error:  # ValueError: not TOML, not UTF-8
+        raise LinkwiseError(f"malformed TOML: {error}") from None
+    if type(data.get("schema")) is not int or data["schema"] != 1:
+        raise LinkwiseError(f"the schema is {data.get('schema')!r}; write schema = 1 at the top")
+    return data
