@@ -72,7 +72,7 @@ ROOMS: dict[str, Room] = {
             for name in (
                 *("__init__", "__main__", "package_cache", "pipeline", "kernel_choice", "plotstyle"),
                 *("render", "extras", "option", "arrays"),
-                *("progress", "input_file", "generator_fingerprint"),
+                *("progress", "bounded_file", "input_file", "generator_fingerprint"),
                 *("errors", "escape", "own_process", "own_runtime"),
             )
         )

@@ -42,6 +42,15 @@ class MeasuredTorques:
         return out
 
 
+def refuse_follower(robot: OpenedRobot, joint: str) -> None:
+    """Raise LinkwiseError for a joint that follows others, and so gives no torque."""
+    if joint in robot.dependent_joints:
+        raise LinkwiseError(
+            f"{joint} follows {listed(map(repr, robot.driven_joints))} and gives no torque; leave it out, or"
+            " generate the robot with --independent and other joints"
+        )
+
+
 def torque_columns(
     flag: str, columns: Sequence[str], robot: OpenedRobot, given: Sequence[tuple[str, str]]
 ) -> dict[str, str]:
@@ -52,12 +61,7 @@ def torque_columns(
     """
     found: dict[str, str] = {}
     for column, joint in given:
-        if joint in robot.dependent_joints:
-            followed = listed(map(repr, robot.driven_joints))
-            raise LinkwiseError(
-                f"{joint} follows {followed} and gives no torque; leave it out, or generate the robot with"
-                " --independent and other joints"
-            )
+        refuse_follower(robot, joint)
         if joint not in robot.joints or column not in columns:
             no_joint = joint not in robot.joints
             what, wanted, there = ("joint", joint, robot.joints) if no_joint else ("column", column, columns)

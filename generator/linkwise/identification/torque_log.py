@@ -12,7 +12,7 @@ from linkwise.analysis.closed_motion import ClosedLog, closed_samples
 from linkwise.analysis.column_matching import TIMES, with_columns, with_nearest
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.logs import open_log
-from linkwise.analysis.measured_torques import torque_columns
+from linkwise.analysis.measured_torques import refuse_follower, torque_columns
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Lowpass, Processing, Reading
@@ -111,6 +111,7 @@ def _measured(
     """Return the joints that must have a torque, from 0; raise LinkwiseError for impossible choices."""
     joints = robot.driven_joints
     for joint in unmeasured:
+        refuse_follower(robot, joint)
         if joint not in joints:
             raise LinkwiseError(
                 f"--unmeasured {joint}: there is no such joint; there are "
