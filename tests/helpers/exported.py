@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import onnxruntime
 import torch
+from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
 
 PAGE = Path(__file__).parents[2] / "docs/exports.md"
 WAYS = ("compile", "export", "ONNX")
@@ -21,6 +22,7 @@ FIXED: dict[str, Callable[[Any], dict[str, Any]]] = {
     "simulate": lambda robot: {"time": [0.0, 0.01], "tau": None},
     "trace": lambda robot: {"time": [0.0, 0.01, 0.02], "tau": None},
     "counterfactual": lambda robot: {"time": [0.0, 0.01, 0.02], "without": "gravity", "tau": None},
+    "uncertainty": lambda robot: {"bodies": UncertainBodies(masses=0.1, centres=0.01)},
     "kinematics.load_torque": lambda robot: {"frame": robot.N - 1, "force": FORCE},
 }
 """Arguments of calls besides positions, velocities, accelerations and torques."""
@@ -38,7 +40,8 @@ def module_of(robot: Any, call: str) -> tuple[Any, int]:
 
 def motion(robot: Any, count: int, samples: int, seed: int = 0) -> tuple[Any, ...]:
     draw = np.random.default_rng(seed)
-    return tuple(torch.from_numpy(draw.uniform(-1, 1, (samples, robot.n))) for _ in range(count))
+    # Small enough for positions of a motion, which may not leap.
+    return tuple(torch.from_numpy(draw.uniform(-0.4, 0.4, (samples, robot.n))) for _ in range(count))
 
 
 def results(answer: Any) -> list[Any]:
