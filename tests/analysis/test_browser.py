@@ -14,10 +14,10 @@ from helpers import urdf_text
 from helpers.motion_logs import LEG, PLANAR3, smooth, write_csv
 from linkwise import generate, read_system, write_package
 from linkwise.analysis import Contact, Contacts, Payload, analyze
-from linkwise.analysis.job import Outputs, Request
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.payload import with_payloads
+from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.result import Totals, Work
 from linkwise.analysis.result_rows import Column, ResultRows, torque_places
 from linkwise.analysis.run import analyze_to

@@ -17,8 +17,8 @@ import pytest
 from helpers.motion_logs import write_csv
 from linkwise import LinkwiseError, Load, Payload, generate, identify, read_system, write_package
 from linkwise.analysis import Processing, Reading, analyze
-from linkwise.analysis.job import Outputs, Request
 from linkwise.analysis.load_robot import load_robot
+from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.settings import Lowpass
 from linkwise.analysis.show.page import page_data

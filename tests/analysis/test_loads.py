@@ -12,9 +12,9 @@ from helpers.urdf_text import joint, link, robot
 from linkwise import Load, generate, read_system, write_package
 from linkwise.analysis import analyze
 from linkwise.analysis.filtering import padding_length
-from linkwise.analysis.job import Outputs, Request
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.loads import Loads
+from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.run import analyze_to
 from linkwise.errors import LinkwiseError
 from linkwise.progress import silent

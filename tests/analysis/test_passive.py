@@ -7,8 +7,8 @@ import pytest
 from helpers.urdf_text import joint, link, robot
 from linkwise import generate, read_system, write_package
 from linkwise.analysis import analyze
-from linkwise.analysis.job import Outputs, Request
 from linkwise.analysis.load_robot import load_robot
+from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import page_data
 from linkwise.progress import silent

@@ -10,9 +10,9 @@ from helpers.urdf_text import joint, link, robot
 from linkwise import Payload, generate, read_system, write_package
 from linkwise.analysis import Processing, analyze
 from linkwise.analysis.choices import carried
-from linkwise.analysis.job import Outputs, Request
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.payload import with_payloads
+from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import page_data
 from linkwise.errors import LinkwiseError

@@ -8,7 +8,8 @@ from helpers.motion_logs import write_csv
 from linkwise import Options, generate, read_system, write_package
 from linkwise.analysis import analyze
 from linkwise.analysis.load_robot import load_robot
-from linkwise.analysis.samples import Samples, pole_warnings
+from linkwise.analysis.poles import pole_warnings
+from linkwise.analysis.samples import Samples
 
 
 def package(folder: Path, text: str, options: Options | None = None) -> Path:

@@ -9,9 +9,9 @@ import pyarrow.parquet as pq
 import pytest
 from helpers.motion_logs import JOINTS, PLANAR3, PUMA560, smooth, write_csv
 from linkwise.analysis import Processing, analyze
-from linkwise.analysis.job import Outputs, Request
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.paper_motions import SIMULATED, write_motions
+from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.run import analyze_to
 from linkwise.errors import LinkwiseError
 from linkwise.progress import silent

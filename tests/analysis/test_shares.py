@@ -17,8 +17,8 @@ import pyarrow.parquet as pq
 import pytest
 from helpers.motion_logs import JOINTS, PLANAR3, write_csv
 from linkwise.analysis import Analysis, analyze
-from linkwise.analysis.job import Outputs, Request
 from linkwise.analysis.load_robot import load_robot
+from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.result import Totals, Work
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.run import analyze_to

@@ -9,8 +9,8 @@ from linkwise import Fitting, Options
 from linkwise.analysis import Lowpass, Processing, Reading
 from linkwise.analysis.asked_trace import TraceChoices
 from linkwise.analysis.choices import AnalysisChoices
-from linkwise.analysis.job import Outputs
 from linkwise.analysis.phases import Phase
+from linkwise.analysis.request import Outputs
 from linkwise.cli.app import app
 from linkwise.option import chosen, written
 from linkwise.study.file import AnalysisKeys

@@ -132,10 +132,12 @@ def test_samples_and_chosen_joints_are_parts_of_the_whole(backend: str, package_
 @needs_compiler
 @pytest.mark.parametrize(("name", "parameters"), [(CRANE, {}), (LEG, {}), ("planar3 symbolic", {"m_2": 2.0})])
 def test_c_answers_as_the_rule_does_in_both_number_types(
-    name: str, parameters: dict[str, float], package_of: Packages
+    name: str, parameters: dict[str, float], package_of: Packages, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = package_of(name)
     c, rule = (package.load(backend, parameters=parameters) for backend in ("native", "numpy"))
+    calls, run = list[str](), c.backend.calls.run
+    monkeypatch.setattr(c.backend.calls, "run", lambda call, *given: calls.append(call) or run(call, *given))
     exact = rule.reactions(*motion_of(rule, 19))
     for kind, largest in ((np.float64, 1e-12), (np.float32, 1e-4)):
         motion = [a.astype(kind) for a in motion_of(rule, 19)]
@@ -147,6 +149,7 @@ def test_c_answers_as_the_rule_does_in_both_number_types(
             np.testing.assert_allclose(tensor.numpy(), share, rtol=0, atol=largest * scale)
             np.testing.assert_allclose(one, expected[3], rtol=0, atol=largest * scale)
             assert share.dtype == one.dtype == kind
+    assert set(calls) == {"link_wrenches"}
 
 
 @needs_compiler

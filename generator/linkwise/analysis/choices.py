@@ -8,9 +8,9 @@ from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.contacts import Contacts, WhileColumn
 from linkwise.analysis.contacts.pressed import PRESSED
-from linkwise.analysis.job import Outputs, Request
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.opened_robot import OpenedRobot, named_body
+from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.settings import Payload, Processing, Reading
 from linkwise.errors import LinkwiseError
 from linkwise.option import option

@@ -2,31 +2,31 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from linkwise_runtime.motion.induced_power import fed_by_couplings
 
-from linkwise.analysis.asked_trace import AskedTrace, TraceChoices, restart_times
+from linkwise.analysis.asked_trace import AskedTrace, restart_times
 from linkwise.analysis.borne_joints import borne_joints
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples, slip_warnings
 from linkwise.analysis.column_matching import with_columns
-from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.times import contact_times, switch_columns
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.induced_points import InducedPlan, induced_points
-from linkwise.analysis.loads import Loads
 from linkwise.analysis.loads.read import placed_loads
 from linkwise.analysis.logs import Log, open_log
 from linkwise.analysis.measured_torques import measured_torques, torque_columns
 from linkwise.analysis.opened_robot import OpenedRobot
-from linkwise.analysis.outputs import Format, named_result, record, result_table
-from linkwise.analysis.phases import Phase, PlacedPhase, phase_columns, placed_phases
+from linkwise.analysis.outputs import named_result, record, result_table
+from linkwise.analysis.phases import PlacedPhase, phase_columns, placed_phases
+from linkwise.analysis.poles import pole_warnings
+from linkwise.analysis.request import Request
 from linkwise.analysis.result import AnalysisResult, WholeMovement
 from linkwise.analysis.result_rows import Column
-from linkwise.analysis.samples import Samples, pole_warnings, read_samples
-from linkwise.analysis.settings import Processing, Reading, Units, choices
+from linkwise.analysis.samples import Samples, read_samples
+from linkwise.analysis.settings import Reading, choices
 from linkwise.analysis.show import draw
 from linkwise.analysis.stream import Sink, span_of, stream
 from linkwise.analysis.torques import Decomposer, ToldBeside
@@ -36,7 +36,6 @@ from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.extras import extra
-from linkwise.option import option
 from linkwise.progress import Progress
 
 if TYPE_CHECKING:
@@ -80,82 +79,6 @@ class Analysis(AnalysisResult):
     def record(self) -> dict[str, Any]:
         """Return everything but the samples as plain data: choices, closure, columns and their totals."""
         return record(self)
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files to write, and their contents: the table's format, figures by name, whether to write the page."""
-
-    table: Format = option("parquet", "Format of the table; none for no table", "--format", is_key=False)
-    figures: tuple[str, ...] = option(
-        (),
-        "paper or causes, alone or with :JOINT, shares, power, energy, energy:PHASE, induced, induced:POINT,"
-        " reaction or trace, alone or with :JOINT, or contacts; may be repeated",
-        "--figure",
-        is_key=False,
-    )
-    page: bool = option(True, "Write report.html", is_key=False)
-    phases: tuple[Phase, ...] = option(
-        (),
-        "Part of the movement that the figure causes holds against the rest: WHAT is a load or contact,"
-        " a column COLUMN>VALUE of the log, or FROM..TO in s; may be repeated",
-        "--phase",
-        metavar="NAME/REST=WHAT",
-        read=lambda texts: tuple(map(Phase.of, texts)),
-    )
-    power_terms: bool = option(False, "Write power by cause and order too")
-    """True to add power by cause and order: as many columns again as torques have."""
-    induced: tuple[str, ...] = option(
-        (),
-        "Tell an acceleration by its sources: FRAME or FRAME,X,Y,Z in m, joints, or centre-of-mass; may "
-        "be repeated",
-        metavar="POINT",
-    )
-    induced_whole: bool = option(
-        False, "Tell weights, and all that velocities do, as one source each, not by link and joint"
-    )
-    storage: str = option(
-        "",
-        "Also write what --induced tells as OpenSim's storage files, NAME_POINT.sto",
-        "--induced-sto",
-        metavar="NAME",
-        is_key=False,
-    )
-    storage_units: Units = option(
-        "rad", "Unit of their angles; rad if not given", "--sto-units", needs="--induced-sto", is_key=False
-    )
-    induced_power: bool = option(
-        False, "Tell by its sources the power that each link gets, and that which flows through each joint"
-    )
-    reactions: tuple[str, ...] = option(
-        (),
-        "Tell the whole wrench that a joint carries by its causes, in the joint's axes, or those of AXES: "
-        "world or a body; may be repeated",
-        "--reaction",
-        metavar="JOINT[,AXES]",
-    )
-    trace: TraceChoices = field(default_factory=TraceChoices)
-
-    def __post_init__(self) -> None:
-        for flag, given, needed, there in (
-            ("--induced-sto", self.storage, "--induced", self.induced),
-            ("--induced-whole", self.induced_whole, "--induced", self.induced),
-        ):
-            if given and not there:
-                raise LinkwiseError(f"{flag} goes with {needed}; add it")
-
-
-@dataclass(frozen=True)
-class Request:
-    """Request of a log: how it is read and derived, what the robot bears in it, and what is written."""
-
-    reading: Reading = field(default_factory=Reading)
-    processing: Processing = field(default_factory=Processing)
-    outputs: Outputs = field(default_factory=Outputs)
-    loads: Loads = field(default_factory=Loads)
-    contacts: Contacts = field(default_factory=Contacts)
-    uncertain: Path | None = None
-    """File of how uncertain bodies are."""
 
 
 @dataclass(frozen=True)
@@ -312,7 +235,7 @@ def prepared(
         q = samples.q[start:stop]
         restarts = restart_times(outputs.trace.restart, phases, robot, times, motion, q)
         made = AskedTrace.of(outputs.trace, restarts, robot, motion)
-        how = reading, outputs.trace.torque_factor, processing.lowpass, progress, buffer
+        how = reading, outputs.trace.torque_factor, samples.rate, processing.lowpass, progress, buffer
         measured = measured_torques(opened, torques, robot, *how)
         traced = TracedRows.of(made, robot, borne, samples, measured and measured.some(start, stop))
     planned = InducedPlan(points, outputs.induced_whole)

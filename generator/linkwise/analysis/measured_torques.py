@@ -82,13 +82,15 @@ def measured_torques(
     robot: OpenedRobot,
     reading: Reading,
     factor: float,
+    rate: float,
     filtered: Lowpass | None,
     progress: Progress,
     buffer: Path | None,
 ) -> MeasuredTorques | None:
     """Return the torques of some joints, as evenly spaced and as much filtered as the motion; None without.
 
-    by_joint: the column of each joint; factor: what brings them to N m and N
+    by_joint: the column of each joint; factor: what brings them to N m and N; rate: that of
+    the motion, in Hz
     """
     if not by_joint:
         return None
@@ -103,5 +105,5 @@ def measured_torques(
         torque = rows[:, 1:]
         torque *= factor
         if filtered is not None:
-            lowpass(torque, 1.0 / float(np.mean(np.diff(rows[:, 0]))), filtered)
+            lowpass(torque, rate, filtered)
     return MeasuredTorques(tuple(map(robot.joints.index, by_joint)), columns, torque)

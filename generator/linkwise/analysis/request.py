@@ -1,0 +1,89 @@
+"""Request of a log: how it is read, what the robot bears in it, and what is told and written of it."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from linkwise.analysis.asked_trace import TraceChoices
+from linkwise.analysis.contacts import Contacts
+from linkwise.analysis.loads import Loads
+from linkwise.analysis.outputs import Format
+from linkwise.analysis.phases import Phase
+from linkwise.analysis.settings import Processing, Reading, Units
+from linkwise.errors import LinkwiseError
+from linkwise.option import option
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files to write, and their contents: the table's format, figures by name, whether to write the page."""
+
+    table: Format = option("parquet", "Format of the table; none for no table", "--format", is_key=False)
+    figures: tuple[str, ...] = option(
+        (),
+        "paper or causes, alone or with :JOINT, shares, power, energy, energy:PHASE, induced, induced:POINT,"
+        " reaction or trace, alone or with :JOINT, or contacts; may be repeated",
+        "--figure",
+        is_key=False,
+    )
+    page: bool = option(True, "Write report.html", is_key=False)
+    phases: tuple[Phase, ...] = option(
+        (),
+        "Part of the movement that the figure causes holds against the rest: WHAT is a load or contact,"
+        " a column COLUMN>VALUE of the log, or FROM..TO in s; may be repeated",
+        "--phase",
+        metavar="NAME/REST=WHAT",
+        read=lambda texts: tuple(map(Phase.of, texts)),
+    )
+    power_terms: bool = option(False, "Write power by cause and order too")
+    """True to add power by cause and order: as many columns again as torques have."""
+    induced: tuple[str, ...] = option(
+        (),
+        "Tell an acceleration by its sources: FRAME or FRAME,X,Y,Z in m, joints, or centre-of-mass; may "
+        "be repeated",
+        metavar="POINT",
+    )
+    induced_whole: bool = option(
+        False, "Tell weights, and all that velocities do, as one source each, not by link and joint"
+    )
+    storage: str = option(
+        "",
+        "Also write what --induced tells as OpenSim's storage files, NAME_POINT.sto",
+        "--induced-sto",
+        metavar="NAME",
+        is_key=False,
+    )
+    storage_units: Units = option(
+        "rad", "Unit of their angles; rad if not given", "--sto-units", needs="--induced-sto", is_key=False
+    )
+    induced_power: bool = option(
+        False, "Tell by its sources the power that each link gets, and that which flows through each joint"
+    )
+    reactions: tuple[str, ...] = option(
+        (),
+        "Tell the whole wrench that a joint carries by its causes, in the joint's axes, or those of AXES: "
+        "world or a body; may be repeated",
+        "--reaction",
+        metavar="JOINT[,AXES]",
+    )
+    trace: TraceChoices = field(default_factory=TraceChoices)
+
+    def __post_init__(self) -> None:
+        for flag, given, needed, there in (
+            ("--induced-sto", self.storage, "--induced", self.induced),
+            ("--induced-whole", self.induced_whole, "--induced", self.induced),
+        ):
+            if given and not there:
+                raise LinkwiseError(f"{flag} goes with {needed}; add it")
+
+
+@dataclass(frozen=True)
+class Request:
+    """Request of a log: how it is read and derived, what the robot bears in it, and what is written."""
+
+    reading: Reading = field(default_factory=Reading)
+    processing: Processing = field(default_factory=Processing)
+    outputs: Outputs = field(default_factory=Outputs)
+    loads: Loads = field(default_factory=Loads)
+    contacts: Contacts = field(default_factory=Contacts)
+    uncertain: Path | None = None
+    """File of how uncertain bodies are."""
