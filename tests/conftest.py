@@ -39,6 +39,8 @@ SHARED: dict[str, Path] = {}
 """Packages of the session, by robot."""
 LARGEST = 1024
 """MB that a process of tests may hold when it is through with a file of tests."""
+COMPILES = "test_modules.py"
+"""File of tests after which torch's compilers leave most fragments of memory."""
 needs_compiler = needs("gcc")
 
 
@@ -102,8 +104,11 @@ def pytest_configure() -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with studies, which take longest: the last file to begin would run alone."""
-    items.sort(key=lambda item: item.path.parent.name != "study")
+    """Begin with what torch compiles, in whose fragments of memory later files find room, then studies.
+
+    These take longest: the last file to begin would run alone.
+    """
+    items.sort(key=lambda item: 0 if item.path.name == COMPILES else 1 if item.path.parent.name == "study" else 2)
 
 
 def pytest_collection_finish() -> None:
