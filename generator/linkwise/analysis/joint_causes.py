@@ -93,8 +93,7 @@ class CauseCertainty(NamedTuple):
     """How certain the causes' net torques are, (causes, joints) each."""
 
     deviation: Array
-    """Standard deviation of the mean magnitude over all samples, at most, in the joint's unit; 0 where none is
-    known."""
+    """Standard deviation of the mean magnitude over all samples at most, in the joint's unit; else 0."""
     unsure: Mask
     """True where the net torque has no certain sign even where it is largest, next to nothing left out."""
 

@@ -31,25 +31,29 @@ class Bands:
     def __init__(self, result: AnalysisResult, curves: Sequence[Index], pieces: int = PIECES) -> None:
         """Find the bands over all samples; each curve is given by the numbers of the rows that it sums."""
         sums = SumDeviations(result.rows, curves)
-        self._place = {int(at): place for place, at in enumerate(sums.known)}
+        self.curves: list[int] = sums.known.tolist()
+        """Numbers of the curves that have a band."""
+        self.time, self.low, self.high = np.empty(0), np.empty((0, 0)), np.empty((0, 0))
         self._exact = sums.exact
-        if self._place:
+        if self.curves:
             found = drawn_curves(result, lambda part: _edges(*sums(part.values)), pieces)
-            count = len(self._place)
-            self._time, self._low, self._high = found.middle, found.least[:count], found.greatest[count:]
+            count = len(self.curves)
+            self.time, self.low, self.high = found.middle, found.least[:count], found.greatest[count:]
 
     def __len__(self) -> int:
-        return len(self._place)
+        return len(self.curves)
 
     def __getitem__(self, curve: int) -> Band | None:
         """Return the band of a curve, by its number; None where no deviation is known."""
-        at = self._place.get(curve)
-        return None if at is None else Band(self._time, self._low[at], self._high[at])
+        if curve not in self.curves:
+            return None
+        at = self.curves.index(curve)
+        return Band(self.time, self.low[at], self.high[at])
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What a figure says of its bands; nothing where it has none."""
-        if not self._place:
+        if not self.curves:
             return ()
         most = "" if self._exact else f"; {SUMMED}"
         return (f"Bands are one standard deviation to either side{most}.",)

@@ -204,7 +204,7 @@ def _bars(axis: Any, parts: list[SharePart]) -> list[Any]:
     wholes = np.sum([part.sizes for part in parts], axis=0)
     wholes[wholes == 0.0] = 1.0
     starts = np.zeros(len(wholes))
-    bars, ends = [], []
+    bars, ends = [], [100.0]
     for number, part in enumerate(parts):
         widths = 100 * part.sizes / wholes
         bar = axis.barh(
@@ -222,16 +222,22 @@ def _bars(axis: Any, parts: list[SharePart]) -> list[Any]:
         for text in axis.bar_label(bar, labels, label_type="center", color="white", fontsize=8):
             if text.get_text():
                 text.set_bbox(box)
-        rows = np.flatnonzero(part.unsure)
-        axis.barh(
-            rows, widths[rows], left=starts[rows], height=0.64, fc="none", ec=INK, hatch=UNSURE_HATCH, lw=0
-        )
+        if part.unsure.any():
+            _hatch(axis, part.unsure, starts, widths)
         starts = starts + widths
         bars.append(bar)
-        ends.append(_whiskers(axis, starts, 100 * part.spreads / wholes, number))
-    axis.set_xlim(0, max(100, *ends))
+        if part.spreads.any():
+            ends.append(_whiskers(axis, starts, 100 * part.spreads / wholes, number))
+    axis.set_xlim(0, max(ends))
     axis.grid(False)
     return bars
+
+
+def _hatch(axis: Any, unsure: Mask, starts: Array, widths: Array) -> None:
+    """Hatch the bars of causes without a certain sign."""
+    rows = np.flatnonzero(unsure)
+    look = {"facecolor": "none", "edgecolor": INK, "hatch": UNSURE_HATCH, "linewidth": 0}
+    axis.barh(rows, widths[rows], left=starts[rows], height=0.64, **look)
 
 
 def _whiskers(axis: Any, ends: Array, spreads: Array, number: int) -> float:
