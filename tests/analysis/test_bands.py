@@ -14,6 +14,7 @@ from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.result import Totals
 from linkwise.analysis.result_quantities import QUANTITIES
 from linkwise.analysis.result_rows import ResultRows
+from linkwise.analysis.show.bands import FAINT
 from linkwise.analysis.show.page import page_data
 from linkwise.analysis.show.page_certainty import assumptions
 from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
@@ -43,12 +44,15 @@ def told_for(result: Analysis, names: tuple[str, ...], patch: pytest.MonkeyPatch
         values.append(np.broadcast_to(0.1 * largest, (len(largest), len(result.time))))
     every = np.concatenate(values)
     totals = Totals(np.abs(every).mean(axis=1), np.abs(every).max(axis=1))
-    return replace(result, rows=ResultRows(rows.axes, rows.points, tuple(places)), values=every, totals=totals)
+    return replace(
+        result, rows=ResultRows(rows.axes, rows.points, tuple(places)), values=every, totals=totals
+    )
 
 
 def halves(panel: Any) -> list[Any]:
     """Return half the heights of a panel's bands at all samples, in the order of drawing."""
-    edges = [band.get_xy()[:-1, 1].reshape(2, -1) for band in panel.patches]
+    bands = [patch for patch in panel.patches if patch.get_alpha() == FAINT]
+    edges = [band.get_xy()[:-1, 1].reshape(2, -1) for band in bands]
     return [(high[::-1] - low) / 2 for low, high in edges]
 
 
@@ -80,21 +84,19 @@ def test_whiskers_of_shares_are_mean_deviations_and_never_below_those_of_sums(re
 
 def test_hatched_are_net_torques_that_two_deviations_leave_open_where_largest(result: Analysis) -> None:
     pytest.importorskip("matplotlib")
-    rough = told_for(replace(result, rows=result.rows), (), pytest.MonkeyPatch())
-    values = rough.values.copy()
-    rows = [row for row, (name, _) in enumerate(rough.rows.places) if name.startswith("sd/")]
-    values[rows] *= 3.0
-    figure = replace(rough, values=values).figure("shares")
+    values = result.values.copy()
+    values[[row for row, (name, _) in enumerate(result.rows.places) if name.startswith("sd/")]] *= 3.0
+    figure = replace(result, values=values).figure("shares")
     hatched = {
         (round(bar.get_y() + 0.32), round(bar.get_x(), 6))
         for bar in figure.axes[0].patches
         if bar.get_hatch() == "\\" * 6
     }
     expected, start = set(), np.zeros(3)
-    terms: list[tuple[Any, Any]] = [(rough.dense("tau_gravity"), 3 * rough.dense("sd/tau_gravity"))]
+    terms: list[tuple[Any, Any]] = [(result.dense("tau_gravity"), 3 * result.dense("sd/tau_gravity"))]
     for k in range(3):
         for name in ("tau_qdd", "tau_qd"):
-            terms.append((rough.dense(name)[..., k], 3 * rough.dense(f"sd/{name}")[..., k]))
+            terms.append((result.dense(name)[..., k], 3 * result.dense(f"sd/{name}")[..., k]))
     nets = [net.sum(-1) for net, _ in terms]
     most = np.max([np.abs(net).max(axis=0) for net in nets], axis=0)
     whole = np.sum([np.abs(net).mean(axis=0) for net in nets], axis=0)
@@ -116,7 +118,7 @@ def test_the_figure_of_causes_has_a_band_and_whiskers(result: Analysis) -> None:
     (band,) = halves(figure.axes[0])
     np.testing.assert_allclose(band, result["sd/tau/joint3"], rtol=1e-12)
     means, squares = (
-        [one for one in panel.containers if hasattr(one, "has_xerr")][0].lines[2][0].get_segments()
+        next(one for one in panel.containers if hasattr(one, "has_xerr")).lines[2][0].get_segments()
         for panel in figure.axes[1:3]
     )
     spread, labels = result["sd/tau_gravity/joint3/link3"], figure.axes[1].get_yticklabels()
@@ -143,22 +145,18 @@ def test_whatever_has_a_deviation_has_a_band(
     several = () if quantity in ("tau_qd",) else (quantity,)
     told = told_for(result, several, monkeypatch)
     drawn = told.figure(figure)
-    panels = [panel for panel in drawn.axes if panel.patches and halves_or_none(panel)]
-    assert panels, figure
+    panels = [panel for panel in drawn.axes if any(patch.get_alpha() == FAINT for patch in panel.patches)]
+    assert panels
     assert "one standard deviation" in drawn.get_supxlabel()
     if column:
-        found = [half for panel in panels for half in halves(panel) if len(half) == len(told.time)]
+        found = [half for panel in panels for half in halves(panel)]
         spread = told[f"sd/{column}"]
         assert any(np.allclose(half, spread, rtol=1e-9) for half in found)
     else:
-        assert "one standard deviation" not in (replace_without(told).figure(figure)).get_supxlabel()
+        assert "one standard deviation" not in without(told).figure(figure).get_supxlabel()
 
 
-def halves_or_none(panel: Any) -> bool:
-    return any(getattr(band, "get_alpha", lambda: None)() == 0.2 for band in panel.patches)
-
-
-def replace_without(result: Analysis) -> Analysis:
+def without(result: Analysis) -> Analysis:
     """Return a result without any deviation."""
     kept = [row for row, (name, _) in enumerate(result.rows.places) if not name.startswith("sd/")]
     rows = ResultRows(result.rows.axes, result.rows.points, tuple(result.rows.places[row] for row in kept))
@@ -187,14 +185,22 @@ def unpacked_bands(result: Analysis, key: str) -> tuple[Any, Any, Any]:
     bands = curves["bands"]
     time = np.frombuffer(base64.b64decode(bands["time"]), "<f8")
     at = bands["curves"].index(curves["keys"].index(key))
-    low, high = (np.frombuffer(base64.b64decode(bands[e]), "<f4").reshape(-1, len(time)) for e in ("low", "high"))
+    low, high = (
+        np.frombuffer(base64.b64decode(bands[e]), "<f4").reshape(-1, len(time)) for e in ("low", "high")
+    )
     return time, low[at], high[at]
 
 
 def test_assumptions_are_told_and_those_that_nobody_knew_of_too() -> None:
     links = [{"name": name, "mass": 0.1, "centre": [0.01] * 3, "radii": 0.0} for name in "abc"]
     links[1]["mass"], links[2]["centre"] = 0.025, [0.01, 0.0, 0.002]
-    record = {"file": "x.toml", "links": links, "body_mass": 0.05, "segments": ["a", "b"], "correlation": [[1]]}
+    record = {
+        "file": "x.toml",
+        "links": links,
+        "body_mass": 0.05,
+        "segments": ["a", "b"],
+        "correlation": [[1]],
+    }
     told = list(assumptions(record | {"certain": "axes", "motion": {"positions": 0.001, "unit": "rad"}}))
     assert told == [
         "Masses: ± 10 %; b ± 2.5 %.",
