@@ -1,4 +1,4 @@
-"""What figures and the page draw of deviations: bands, whiskers, hatches, and the words beside them."""
+"""Deviations in figures and on the page: bands, whiskers, hatches, and the words beside them."""
 
 import base64
 import json

@@ -90,7 +90,7 @@ def sizes(result: AnalysisResult, causes: Sequence[Cause]) -> Array:
 
 
 class CauseCertainty(NamedTuple):
-    """How certain the causes' net torques are, (causes, joints) each."""
+    """Certainty of the causes' net torques, (causes, joints) each."""
 
     deviation: Array
     """Standard deviation of the mean magnitude over all samples at most, in the joint's unit; else 0."""

@@ -52,7 +52,7 @@ class Bands:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a figure says of its bands; nothing where it has none."""
+        """Notes of a figure on its bands; none where it has none."""
         if not self.curves:
             return ()
         most = "" if self._exact else f"; {SUMMED}"

@@ -1,4 +1,4 @@
-"""What a page says of how certain its numbers are: a sentence, shares without a certain sign, assumptions."""
+"""Certainty of a page's numbers in words: a sentence, shares without a certain sign, and what was assumed."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
