@@ -14,6 +14,7 @@ from helpers import urdf_text
 from helpers.motion_logs import LEG, PLANAR3, smooth, write_csv
 from linkwise import generate, read_system, write_package
 from linkwise.analysis import Contact, Contacts, Payload, analyze
+from linkwise.analysis.certain_signs import plus_minus
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.payload import with_payloads
@@ -508,4 +509,59 @@ def test_a_browser_that_cannot_unpack_says_which_can(driver, result):
     driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", hidden)
     assert "Chrome or Edge 80, Firefox 113, Safari 16.4" in driver.find_element("id", "waiting").text
     assert not driver.find_element("tag name", "main").is_displayed()
+    assert driver.get_log("browser") == []
+
+
+def test_deviations_are_bands_numbers_hatches_and_a_list(driver, tmp_path):
+    (tmp_path / "bodies.toml").write_text(
+        'schema = 1\n[all]\nmass = "10 %"\ncentre = "60 mm"\nradii = "20 %"\n'
+    )
+    log = write_csv(tmp_path / "a.csv", smooth(200, 3))
+    result = analyze(log, PLANAR3, uncertain=tmp_path / "bodies.toml")
+    (tmp_path / "report.html").write_text(report(result), encoding="utf-8")
+    opened(driver, (tmp_path / "report.html").as_uri())
+    choose(driver, "joint", 0)
+    choose(driver, "link", 2)
+    bands = driver.execute_script(
+        "return document.getElementById('curves').data.filter((trace) => trace.meta === 'band')"
+        ".map((trace) => [trace.legendgroup, [...trace.y]])"
+    )
+    edges = dict(bands)
+    assert len(edges) == len(bands) == 8  # all causes, gravity, and two of each joint
+    low, high = np.reshape(edges["tau_qd 2"], (2, -1))
+    value, spread = result["tau_qd/joint1/link3/joint3"], result["sd/tau_qd/joint1/link3/joint3"]
+    np.testing.assert_allclose([low, high[::-1]], [value - spread, value + spread], rtol=1e-12)
+    choose(driver, "slider", 50)
+    cells = driver.execute_script(
+        "return [...document.querySelectorAll('#numbers td[data-value]')].map((td) =>"
+        "[JSON.parse(td.dataset.columns)[0], td.textContent])"
+    )
+    column = "tau_gravity/joint1/link3"
+    assert dict(cells)[column] == plus_minus(result[column][50], result[f"sd/{column}"][50])
+    open_now = [
+        abs(result[name][50]) < 2 * result[f"sd/{name}"][50]
+        for name in (f"tau_qdd/joint1/link3/joint{k}" for k in (1, 2, 3))
+    ]
+    texts = driver.execute_script("return document.getElementById('map').data[0].text[0]")
+    assert [text.endswith("?") for text in texts[1:4]] == open_now
+    signs = result.signs
+    assert driver.find_element("id", "certain-sentence").text == signs.sentence
+    assert (
+        f"{len(signs.uncertain)} of {len(signs.shares)} shares"
+        in driver.find_element("id", "certain-caption").text
+    )
+    more = driver.find_element("id", "every-unsure")
+    more.send_keys("\n")  # by keyboard
+    listed = driver.execute_script(
+        "return [...document.querySelectorAll('#unsure tbody tr')].map((row) => row.cells[3].textContent)"
+    )
+    assert listed == [f"{plus_minus(p.value, p.deviation)} {p.column.unit}" for p in signs.uncertain]
+    hatched = driver.execute_script(
+        "return document.getElementById('shares').data.filter((trace) => trace.marker.pattern"
+        " && trace.marker.pattern.size === 4).map((trace) => trace.name)"
+    )
+    words = {"tau_qdd": " acceleration", "tau_qd": " velocity"}
+    through = [p.column for p in signs.uncertain if p.column.link == 2]
+    assert set(hatched) == {f"joint{c.cause + 1}{words[c.quantity]}" for c in through if c.quantity in words}
+    assert "Masses: ± 10 %." in driver.find_element("id", "assumed").text
     assert driver.get_log("browser") == []

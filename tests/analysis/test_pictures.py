@@ -205,7 +205,7 @@ def test_figures_are_shown_in_a_notebook(analysis, monkeypatch):
 
 
 def test_many_causes_are_named_by_size_and_the_rest_is_one(analysis, monkeypatch):
-    monkeypatch.setattr("linkwise.analysis.show.causes_figure.MOST", 1)
+    monkeypatch.setattr("linkwise.analysis.show.cause_numbers.MOST", 1)
     rows, shown = bars(analysis.figure("causes:joint1"))
     assert rows[-1] == "motion of 2 others"
     means, _ = shown["the whole movement"]

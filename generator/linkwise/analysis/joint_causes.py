@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import MOTION, PASSIVE
-from linkwise.arrays import Array, Index
+from linkwise.analysis.row_sums import SumDeviations
+from linkwise.arrays import Array, Index, Mask
 
 MOTIONS: dict[str, tuple[str, ...]] = {
     "acceleration": MOTION[:1],
@@ -86,6 +87,33 @@ def sizes(result: AnalysisResult, causes: Sequence[Cause]) -> Array:
     for part in result.parts():
         total += [[np.abs(part.values[own].sum(axis=0)).sum() for own in some] for some in rows]
     return total / result.total
+
+
+class CauseCertainty(NamedTuple):
+    """Certainty of the causes' net torques, (causes, joints) each."""
+
+    deviation: Array
+    """Standard deviation of the mean magnitude over all samples at most, in the joint's unit; else 0."""
+    unsure: Mask
+    """True where the net torque has no certain sign even where it is largest, next to nothing left out."""
+
+
+def certainty(result: AnalysisResult, causes: Sequence[Cause]) -> CauseCertainty:
+    """Return how certain the net torque of each cause on every joint with torques is, (causes, joints)."""
+    shape = len(causes), len(result.robot.driven)
+    sums = SumDeviations(
+        result.rows, [cause.rows(result, i) for cause in causes for i in result.robot.driven]
+    )
+    for part in result.parts() if len(sums.known) else ():
+        sums.add(part.values)
+    joints = np.tile(np.arange(shape[1]), shape[0])
+    return CauseCertainty(sums.mean().reshape(shape), sums.unsure(joints).reshape(shape))
+
+
+def deviation_curves(result: AnalysisResult, causes: Sequence[Cause], i: int) -> Array:
+    """Return the standard deviation of each cause's torque on joint i at most, (causes, S); 0 without any."""
+    rows = (result.rows.deviations(cause.rows(result, i)) for cause in causes)
+    return np.array([result.values[some].sum(axis=0) for some in rows])
 
 
 def curves(result: AnalysisResult, causes: Sequence[Cause], i: int) -> Array:

@@ -30,6 +30,8 @@ from linkwise.escape import column_part
 
 Place = tuple[str, tuple[int, ...]]
 """A quantity, and the index along each of its axes."""
+DEVIATION = "sd/"
+"""Beginning of the name of a quantity that is the standard deviation of the one named behind it."""
 OVER_TIME = {"velocity": "/s", "acceleration": "/s²"}
 FIELD_OF = {"load": "cause", "share": "cause", "contact": "cause", "constraint": "cause", "component": "row"}
 FIELD_OF |= {"bearing": "point", "wrench": "row"}
@@ -151,6 +153,17 @@ class ResultRows:
                 numbers, at = numbers[asked], at[asked]
             found.append(numbers)
         return np.concatenate(found)
+
+    @cached_property
+    def _beside(self) -> dict[int, int]:
+        places = {place: row for row, place in enumerate(self.places) if place[0].startswith(DEVIATION)}
+        found = ((row, places.get((f"{DEVIATION}{name}", at))) for row, (name, at) in enumerate(self.places))
+        return {row: beside for row, beside in found if beside is not None} if places else {}
+
+    def deviations(self, numbers: Index) -> Index:
+        """Return the numbers of the rows with the standard deviations of rows, of those that have one."""
+        found = (self._beside.get(row) for row in numbers.tolist())
+        return np.array([row for row in found if row is not None], np.intp)
 
     def index(self, row: int, axis: str) -> int:
         """Return the index of a row along an axis of its quantity."""

@@ -4,184 +4,30 @@ Bars are the mean and the root mean square over each phase, the largest cause fi
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.analysis.joint_causes import Cause, causes_of, curves
-from linkwise.analysis.loads.placed import moving_joints
-from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.bands import ADDED, Bands, draw_band
+from linkwise.analysis.show.cause_numbers import CauseNumbers, asked_phases, cause_numbers
 from linkwise.analysis.show.drawn_curves import (
     drawn_curves,
     foot,
-    largest_few,
     new_figure,
     time_axis,
     write_note,
     write_title,
     zero_line,
 )
-from linkwise.arrays import Array, Mask
-from linkwise.errors import LinkwiseError
-from linkwise.escape import printable
+from linkwise.arrays import Array
 from linkwise.plotstyle import BLUE, INK, colour, drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True, eq=False)
-class ShownPhase:
-    """A phase, or the rest of the movement beside it; without a phase, the whole movement."""
-
-    label: str
-    placed: PlacedPhase | None = None
-    is_rest: bool = False
-
-    def on(self, result: AnalysisResult) -> Mask:
-        """Return which samples (S,) of a result, or a part of one, are in it."""
-        if self.placed is None:
-            return np.ones(len(result.time), dtype=np.bool_)
-        contacts = result.values[result.rows["contact"].rows]
-        return self.placed.on(result.robot, result.time, result.q, contacts) ^ self.is_rest
-
-
-def shown_phases(result: AnalysisResult, i: int) -> list[ShownPhase]:
-    """Return the phases of `asked_phases`, each followed by the rest of the movement if that is named."""
-    found = []
-    for phase in asked_phases(result, i):
-        found.append(ShownPhase(drawn(phase.name, 34), phase))
-        if phase.rest:
-            found.append(ShownPhase(drawn(phase.rest, 34), phase, is_rest=True))
-    return found
-
-
-def require_samples(
-    result: AnalysisResult, phases: list[ShownPhase], counts: Sequence[int]
-) -> list[ShownPhase]:
-    """Return the phases, or the whole movement where they distinguish nothing.
-
-    counts: number of samples of each phase
-
-    Raises LinkwiseError for a phase that was asked for and has no sample.
-    """
-    empty = [phase.label for phase, count in zip(phases, counts, strict=True) if not count]
-    if empty and result.phases:
-        span = f"{result.time[0]:.4g} and {result.time[-1]:.4g} s"
-        raise LinkwiseError(f"--phase: {empty[0]} has no sample between {span}")
-    return [ShownPhase("the whole movement")] if empty or not phases else phases
-
-
-def asked_phases(result: AnalysisResult, i: int) -> tuple[PlacedPhase, ...]:
-    """Return the phases that were given, else one while the only load or contact on joint i acts.
-
-    There is no phase if several act on it, or none.
-    """
-    if result.phases:
-        return result.phases
-    robot, tree = result.robot, result.robot.package.manifest.tree
-    loads = [one for one in result.loads if i in one.acts_on.joints]
-    held: list[int] = []
-    if robot.contacts is not None and tree is not None:
-        moved = [moving_joints(tree, robot.joint_of(one.frame)) for one in robot.contacts.contacts]
-        held = [number for number, joints in enumerate(moved) if i in joints]
-    if len(loads) + len(held) != 1:
-        return ()
-    if loads:
-        name = printable(f"load {loads[0].name}")
-        return (PlacedPhase(f"{name} acts", f"{name} does not act", load=loads[0]),)
-    name = printable(robot.ground.names[held[0]])
-    return (PlacedPhase(f"{name} stands", f"{name} does not stand", contact=held[0]),)
-
-
-MOST = 10
-"""Joints whose motions have bars of their own; all other motions are summed in one."""
-NOTHING = 1e-9
-"""Part of the largest cause below which a cause is only rounding."""
-
-
-@dataclass(frozen=True, eq=False)
-class PhaseNumbers:
-    """A phase, and the mean and root mean square of each row in it, (rows,)."""
-
-    phase: ShownPhase
-    mean: Array
-    rms: Array
-
-
-@dataclass(frozen=True, eq=False)
-class CauseNumbers:
-    """Causes of the joint's torque: all causes together in the first row, and then each."""
-
-    labels: tuple[str, ...]
-    phases: tuple[PhaseNumbers, ...]
-    apart: bool
-    """True if no two phases share a sample."""
-
-
-class _Tally:
-    """Running sums of curves and of their products, over the samples of a phase."""
-
-    def __init__(self, curves: int) -> None:
-        self.count, self.sums, self.products = 0, np.zeros(curves), np.zeros((curves, curves))
-
-    def __call__(self, values: Array) -> None:
-        self.count += values.shape[1]
-        self.sums += values.sum(axis=1)
-        self.products += values @ values.T
-
-    def mean(self, rows: Array) -> Array:
-        """Return the mean of sums of curves; rows (rows, curves) has ones for the curves of each sum."""
-        mean: Array = rows @ self.sums / self.count
-        return mean
-
-    def rms(self, rows: Array) -> Array:
-        """Return the root mean square of sums of curves, with rows as for `mean`."""
-        squares = np.einsum("ra,ab,rb->r", rows, self.products, rows)
-        root: Array = np.sqrt(np.maximum(squares, 0.0) / self.count)
-        return root
-
-
-def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
-    """Return the numbers of joint i over all samples; raise LinkwiseError for a phase without any."""
-    causes = causes_of(result, result.robot.plot_joints, drawn)
-    asked = shown_phases(result, i)
-    every, tallies = _Tally(1 + len(causes)), [_Tally(1 + len(causes)) for _ in asked]
-    peaks, apart = np.zeros(len(causes)), True
-    for part in result.parts():
-        values = np.concatenate([part.torque[:, [i]].T, curves(part, causes, i)])
-        on = [phase.on(part) for phase in asked]
-        np.maximum(peaks, np.abs(values[1:]).max(axis=1), out=peaks)
-        apart &= not on or int(np.sum(on, axis=0).max()) <= 1
-        for tally, here in zip(tallies, on, strict=True):
-            tally(values[:, here])
-        every(values)
-    shown = require_samples(result, asked, [tally.count for tally in tallies])
-    labels, rows = _rows(causes, every, peaks > NOTHING * peaks.max(initial=0.0))
-    found = zip(shown, tallies if shown == asked else [every], strict=True)
-    numbers = tuple(PhaseNumbers(phase, tally.mean(rows), tally.rms(rows)) for phase, tally in found)
-    return CauseNumbers(labels, numbers, apart)
-
-
-def _rows(causes: Sequence[Cause], every: _Tally, there: Array) -> tuple[tuple[str, ...], Array]:
-    """Return labels and rows, the largest cause over the movement first, small motions summed last."""
-    alone = np.eye(1 + len(causes))
-    sizes = every.rms(alone)[1:]
-    order = sorted(np.flatnonzero(there).tolist(), key=lambda at: -float(sizes[at]))
-    motions = [at for at in order if causes[at].is_motion]
-    small = [motions[at] for at in largest_few(sizes[motions], MOST)[1]]
-    named = [at for at in order if at not in small]
-    labels = ["all causes together", *(causes[at].label for at in named)]
-    rows = [alone[0], *(alone[1 + at] for at in named)]
-    if small:
-        labels.append(f"motion of {len(small)} others")
-        rows.append(alone[[1 + at for at in small]].sum(axis=0))
-    return tuple(labels), np.array(rows)
-
-
+WHISKERS = f"Whiskers are one standard deviation, at most: {ADDED}."
 GAP = 9.0
 """Total gap between a bar, its label and the panel's edge, in pixels of the figure."""
 
@@ -196,7 +42,7 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
     over_time = figure.add_subplot(grid[0, :])
     means = figure.add_subplot(grid[1, 0])
     sizes = figure.add_subplot(grid[1, 1], sharey=means)
-    _over_time(over_time, result, i, numbers)
+    bands = _over_time(over_time, result, i, numbers)
     _both_bars(means, sizes, numbers, result.robot.torque_units[i])
     over_time.legend(
         *means.get_legend_handles_labels(),
@@ -208,14 +54,16 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
     )
     write_title(figure, result, f"What loads {drawn(result.robot.joints[i], 40)}")
     told = [phase.told for phase in asked_phases(result, i)]
-    write_note(figure, " · ".join(["motion: acceleration and velocity together", *told, foot(result)]))
+    note = " · ".join(["motion: acceleration and velocity together", *told, foot(result)])
+    write_note(figure, *bands.notes, *([WHISKERS] if len(bands) else []), note)
     figure.draw_without_rendering()  # places the panels, so that labels have their final width
     for panel in (means, sizes):
         _make_room(panel)
     return figure
 
 
-def _over_time(panel: Any, result: AnalysisResult, i: int, numbers: CauseNumbers) -> None:
+def _over_time(panel: Any, result: AnalysisResult, i: int, numbers: CauseNumbers) -> Bands:
+    """Draw the torque with its band over phases in colour; return the band."""
     phases = [one.phase for one in numbers.phases]
 
     def curves(part: AnalysisResult) -> Any:
@@ -232,16 +80,19 @@ def _over_time(panel: Any, result: AnalysisResult, i: int, numbers: CauseNumbers
                 edges[start], edges[end], low, high, color=colour(at), alpha=0.16, linewidth=0, zorder=0
             )
     panel.plot(found.time[0], found.values[0], color=INK, linewidth=1.6)
+    bands = Bands(result, [result.rows.numbers("tau", joint=i)])
+    draw_band(panel, bands[0], INK)
     zero_line(panel)
     panel.set_title("all causes together")
     panel.set_ylabel(result.robot.torque_units[i])
     time_axis(panel, result)
+    return bands
 
 
 def _both_bars(means: Any, sizes: Any, numbers: CauseNumbers, unit: str) -> None:
     labels = [one.phase.label for one in numbers.phases]
-    _bars(means, labels, [one.mean.tolist() for one in numbers.phases])
-    _bars(sizes, labels, [one.rms.tolist() for one in numbers.phases])
+    _bars(means, labels, [(one.mean, one.mean_deviation) for one in numbers.phases])
+    _bars(sizes, labels, [(one.rms, one.rms_deviation) for one in numbers.phases])
     means.set_title(f"mean ({unit})")
     sizes.set_title(f"root mean square ({unit})")
     means.set_yticks(range(len(numbers.labels)), numbers.labels)
@@ -250,15 +101,19 @@ def _both_bars(means: Any, sizes: Any, numbers: CauseNumbers, unit: str) -> None
     sizes.tick_params(labelleft=False)
 
 
-def _bars(panel: Any, phases: list[str], numbers: list[list[float]]) -> None:
-    """Draw a group of bars for each cause, one bar for each phase, with its number at its end."""
+def _bars(panel: Any, phases: list[str], numbers: list[tuple[Array, Array]]) -> None:
+    """Draw a group of bars for each cause, one bar for each phase, with its number at its end.
+
+    numbers: values and their deviations, which are whiskers, by phase
+    """
     thick = 0.8 / len(phases)
-    most = max(abs(value) for values in numbers for value in values)
+    most = max(float(np.abs(values).max()) for values, _ in numbers)
     decimals = max(0, 2 - math.floor(math.log10(most))) if most > 0.0 else 0
-    for at, (phase, values) in enumerate(zip(phases, numbers, strict=True)):
+    for at, (phase, (values, deviations)) in enumerate(zip(phases, numbers, strict=True)):
         places = np.arange(len(values)) - 0.4 + (at + 0.5) * thick
         ink = colour(at) if len(phases) > 1 else BLUE
-        bars = panel.barh(places, values, height=0.9 * thick, color=ink, label=phase)
+        whiskers = {"xerr": deviations, "ecolor": INK, "capsize": 2} if deviations.any() else {}
+        bars = panel.barh(places, values, height=0.9 * thick, color=ink, label=phase, **whiskers)
         panel.bar_label(
             bars, [f"{round(value, decimals) + 0.0:.{decimals}f}" for value in values], padding=2, fontsize=7
         )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.bands import Band, Bands, draw_band
 from linkwise.analysis.show.drawn_curves import (
     drawn_curves,
     foot,
@@ -54,7 +55,7 @@ def energy(result: AnalysisResult, phase: int) -> "Figure":
     grid = figure.add_gridspec(2, 2, height_ratios=(len(lanes.shown), 0.36), width_ratios=(2.4, 1))
     left = figure.add_subplot(grid[0, 0])
     right = figure.add_subplot(grid[0, 1], sharey=left)
-    _energies(left, result, lanes)
+    bands = _energies(left, result, lanes)
     flows = segment_flows(result, every, SPANS)
     widest = draw_flows(left, flows, lanes)
     _name_lanes(left, lanes)
@@ -70,7 +71,7 @@ def energy(result: AnalysisResult, phase: int) -> "Figure":
     _legend(figure.add_subplot(grid[1, :]), right, bool(widest))
     write_title(figure, result, "How energy flows")
     tied = result.robot.constrained is not None
-    write_note(figure, _note(lanes, flows, widest, tied), foot(result))
+    write_note(figure, _note(lanes, flows, widest, tied), *bands.notes, foot(result))
     return figure
 
 
@@ -87,14 +88,20 @@ def _note(lanes: SegmentLanes, flows: SegmentFlows, widest: float, tied: bool) -
     return " · ".join(told)
 
 
-def _energies(panel: Any, result: AnalysisResult, lanes: SegmentLanes) -> None:
-    """Draw each segment's energy above its least, all by one scale, and mark the largest."""
+def _energies(panel: Any, result: AnalysisResult, lanes: SegmentLanes) -> Bands:
+    """Draw each segment's energy above its least, by one scale, and mark the largest; return the bands."""
     found = drawn_curves(result, lambda part: energies(part, lanes.every)[list(lanes.shown)])
     above = found.values - found.values.min(axis=1, keepdims=True)
     scale = TALLEST / max(float(above.max(initial=0.0)), 1e-300)
-    for base, time, values in zip(lanes.bases, found.time, above, strict=True):
+    least = found.values.min(axis=1)
+    rows = ("energy_kinetic", "energy_potential")
+    bands = Bands(result, [result.rows.numbers(*rows, link=lanes.every[at].links) for at in lanes.shown])
+    for number, (base, time, values) in enumerate(zip(lanes.bases, found.time, above, strict=True)):
         panel.fill_between(time, base, base + scale * values, color=AREA, linewidth=0, zorder=1)
         panel.plot(time, base + scale * values, color=EDGE, linewidth=1.3, zorder=2)
+        if band := bands[number]:
+            edges = (base + scale * (edge - least[number]) for edge in band[1:])
+            draw_band(panel, Band(band.time, *edges), EDGE)
         panel.plot(time[[0, -1]], [base, base], color=INK, linewidth=0.7, zorder=2)
         top = int(values.argmax())
         if not values[top] > NOTHING * above.max():
@@ -114,6 +121,7 @@ def _energies(panel: Any, result: AnalysisResult, lanes: SegmentLanes) -> None:
             zorder=6,
             path_effects=[extra("matplotlib.patheffects").withStroke(linewidth=2, foreground="white")],
         )
+    return bands
 
 
 def _name_lanes(panel: Any, lanes: SegmentLanes) -> None:

@@ -12,7 +12,6 @@ from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import (
     BY_POWER,
-    DEVIATION_OF,
     FORCES,
     GROUND,
     INDUCED,
@@ -21,11 +20,13 @@ from linkwise.analysis.result_quantities import (
     TORQUE_OF,
     TRACED,
 )
-from linkwise.analysis.result_rows import Column, ResultRows
+from linkwise.analysis.result_rows import DEVIATION, Column, ResultRows
 from linkwise.analysis.show.induced_figure import induced_panels
+from linkwise.analysis.show.page_certainty import certainty_data
 from linkwise.analysis.show.page_curves import (
     CurveSums,
     at_instants,
+    band_data,
     curve_data,
     encoded,
     packed,
@@ -64,9 +65,14 @@ def view(result: AnalysisResult) -> dict[str, str]:
     }
 
 
-OFF_PAGE = (*TORQUE_OF, *FORCES, *GROUND, *INDUCED, *BY_POWER, *REACTIONS, *TRACED, *DEVIATION_OF)
+OFF_PAGE = (*TORQUE_OF, *FORCES, *GROUND, *INDUCED, *BY_POWER, *REACTIONS, *TRACED)
 """Quantities that a page does not hold: power, the product of two that it holds, power by source, and those
 of contacts; of what `sourced` shows it holds sums."""
+
+
+def is_on_page(quantity: str) -> bool:
+    """Return whether a page holds a quantity; it holds the standard deviations of those that it does."""
+    return quantity.removeprefix(DEVIATION) not in OFF_PAGE
 
 
 def sourced(result: AnalysisResult) -> list[SourcedPanels]:
@@ -81,7 +87,7 @@ def sourced(result: AnalysisResult) -> list[SourcedPanels]:
 
 def numbers_on_page(rows: ResultRows, shown: Sequence[SourcedPanels] = ()) -> int:
     """Return the count of numbers per sample on a page."""
-    return sum(name not in OFF_PAGE for name, _ in rows.places) + sum(one.count for one in shown)
+    return sum(is_on_page(name) for name, _ in rows.places) + sum(one.count for one in shown)
 
 
 def page_data(result: AnalysisResult) -> str:
@@ -94,14 +100,15 @@ def page_data(result: AnalysisResult) -> str:
     left out.
     """
     robot, by_source, sums = result.robot, sourced(result), CurveSums(result)
-    pieces = page_pieces(len(sums.keys) + sum(one.count for one in by_source))
+    drawn = len(sums.keys) + sum(one.count for one in by_source)
+    pieces = page_pieces(drawn if result.uncertain is None else 2 * drawn)
     stride = stride_for(result.total, numbers_on_page(result.rows, by_source), NUMBERS, SAMPLES)
     instants = replace(result, values=at_instants(result, stride))
     force, pressed = _largest_forces(result)
     shown = [
         at
         for at, c in enumerate(result.columns)
-        if c.quantity not in OFF_PAGE and (c.joint is None or c.joint in robot.driven)
+        if is_on_page(c.quantity) and (c.joint is None or c.joint in robot.driven)
     ]
     data = {
         "robot": printable(robot.name),
@@ -129,6 +136,7 @@ def page_data(result: AnalysisResult) -> str:
         "unstored": robot.is_unstored,
         "gravityColour": GRAVITY,
         "bodies": _bodies(instants),
+        "certain": certainty_data(result),
         "largestForce": force,
         "loads": _loads(instants),
         "reactions": _reactions(instants, pressed),
@@ -149,7 +157,7 @@ def _column(column: Column, driven: Sequence[int]) -> dict[str, Any]:
         "unit": column.unit,
         "i": place(column.joint),
         "j": column.link,
-        "k": place(column.cause) if column.quantity in MOTION else column.cause,
+        "k": place(column.cause) if column.quantity.removeprefix(DEVIATION) in MOTION else column.cause,
     }
 
 
@@ -248,6 +256,7 @@ def _reactions(result: AnalysisResult, largest: Array) -> list[dict[str, str]]:
 def _sourced(result: AnalysisResult, shown: SourcedPanels, pieces: int | None) -> dict[str, Any]:
     """Return panels, and the curves of their sources, (panels, samples) each, or thinned to pieces."""
     return {
+        "bands": band_data(shown.bands(result, pieces or result.total)),
         "name": printable(shown.title),
         "rows": [{"name": printable(name), "unit": unit} for name, unit in shown.panels],
         "curves": [

@@ -8,6 +8,8 @@ import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import MOTION, PASSIVE, QUANTITIES
+from linkwise.analysis.row_sums import RowSums, SumDeviations
+from linkwise.analysis.show.bands import Bands
 from linkwise.analysis.show.drawn_curves import DrawnCurves, drawn_curves, piece_size
 from linkwise.arrays import Array
 from linkwise.extras import extra
@@ -56,14 +58,12 @@ class CurveSums:
                     for some in dict.fromkeys((link if name == "tau_link" else None, link)):
                         rows.setdefault((kind, place[index["joint"]], cause, some), []).append(row)
         self.keys = tuple(rows)
-        self._rows = np.array([row for some in rows.values() for row in some], dtype=np.intp)
-        counts = np.array([len(some) for some in rows.values()], dtype=np.intp)
-        self._starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.intp)
+        self.rows = [np.array(some, np.intp) for some in rows.values()]
+        self._sums = RowSums(self.rows)
 
     def __call__(self, part: AnalysisResult) -> Array:
         """Return the curves (curves, S) of a part of the result."""
-        sums: Array = np.add.reduceat(part.values[self._rows], self._starts, axis=0)
-        return sums
+        return self._sums(part.values)
 
 
 def page_pieces(curves: int) -> int:
@@ -75,12 +75,15 @@ def curve_data(result: AnalysisResult, sums: CurveSums, pieces: int, is_thinned:
     """Return the mean and largest magnitude of each curve, by its key, and if thinned its points.
 
     The mean and the largest magnitude are over all samples. The points of a curve that is drawn whole are the
-    samples on the page. The instant of the largest torque by motion is included, too.
+    samples on the page. The instant of the largest torque by motion is included, too, and where deviations
+    are known those of the means, which curves have no certain sign, and if thinned their bands.
     """
+    spread = SumDeviations(result.rows, sums.rows)
     mean, peak = np.zeros((2, len(sums.keys)))
     moving = result.rows.numbers(*MOTION)
     most, busiest = 0.0, float(result.time[0])
     for part in result.parts():
+        spread.add(part.values)
         sizes = np.abs(sums(part))
         mean += sizes.sum(axis=1) / result.total
         np.maximum(peak, sizes.max(axis=1), out=peak)
@@ -94,7 +97,21 @@ def curve_data(result: AnalysisResult, sums: CurveSums, pieces: int, is_thinned:
         "busiest": busiest,
         "piece": piece_size(result.total, pieces) if is_thinned else 1,
         "points": point_data(result, drawn_curves(result, sums, pieces), pieces) if is_thinned else None,
+        "deviation": spread.mean().tolist(),
+        "unsure": spread.unsure([key[1] for key in sums.keys]).tolist(),
+        "bands": band_data(Bands(result, sums.rows, pieces)) if is_thinned else None,
     }
+
+
+def band_data(bands: Bands) -> dict[str, Any] | None:
+    """Return the edges of bands, float32, and which curves have one; None without any.
+
+    The times are those in the middle of each piece.
+    """
+    if not len(bands):
+        return None
+    low, high = (encoded(edge, "<f4") for edge in (bands.low, bands.high))
+    return {"curves": bands.curves, "time": encoded(bands.time), "low": low, "high": high}
 
 
 def point_data(result: AnalysisResult, found: DrawnCurves, pieces: int) -> dict[str, str]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.bands import Bands, draw_band
 from linkwise.analysis.show.drawn_curves import (
     drawn_curves,
     foot,
@@ -110,31 +111,15 @@ def own_joints(result: AnalysisResult) -> tuple[int, ...]:
 
 
 def _draw(axis: Any, result: AnalysisResult, panel: _Panel) -> None:
-    found = drawn_curves(result, lambda part: part.values[[row for row, _ in panel.lines]])
-    for (_, at), time, values in zip(panel.lines, found.time, found.values, strict=True):
+    rows = [row for row, _ in panel.lines]
+    found = drawn_curves(result, lambda part: part.values[rows])
+    bands = Bands(result, [np.array([row]) for row in rows])
+    for number, ((_, at), time, values) in enumerate(zip(panel.lines, found.time, found.values, strict=True)):
         axis.plot(time, values, **_style(at))
-    _bands(axis, result, panel)
+        draw_band(axis, bands[number], colour(at))
     zero_line(axis)
     axis.set_title(panel.title)
     axis.set_ylabel(panel.symbol, fontsize=11, parse_math=True)
-
-
-def _bands(axis: Any, result: AnalysisResult, panel: _Panel) -> None:
-    """Draw one standard deviation to either side of the curves that have one."""
-    rows = result.rows
-    beside = {place: row for row, place in enumerate(rows.places)}
-    found = [
-        (row, beside.get((f"sd/{rows.places[row][0]}", rows.places[row][1])), at) for row, at in panel.lines
-    ]
-    banded = [(row, deviation, at) for row, deviation, at in found if deviation is not None]
-    values, deviations = ([one[side] for one in banded] for side in (0, 1))
-    if banded:
-        low = drawn_curves(result, lambda part: part.values[values] - part.values[deviations])
-        high = drawn_curves(result, lambda part: part.values[values] + part.values[deviations])
-        for number, (_, _, at) in enumerate(banded):
-            time = np.concatenate([low.time[number], high.time[number][::-1]])
-            edge = np.concatenate([low.values[number], high.values[number][::-1]])
-            axis.fill(time, edge, color=colour(at), alpha=0.2, linewidth=0)
 
 
 def _style(at: int) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult, Work
+from linkwise.analysis.show.bands import Bands, draw_band
 from linkwise.analysis.show.drawn_curves import (
     drawn_curves,
     foot,
@@ -39,7 +40,7 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     height = 0.9 + (0.34 if len(givers) <= MANY else 0.26) * len(givers)
     figure = new_figure(8.4, 3.4 + height)
     curves, bars = figure.subplots(2, 1, height_ratios=(2.4, height))
-    _curves(curves, result, joints)
+    bands = _curves(curves, result, joints)
     targets = [drawn(name) for name in (*robot.plot_links, *result.load_labels)]
     _bars(bars, _every_work(result, list(robot.driven)), targets)
     into = "links and loads" if result.loads else "links"
@@ -50,17 +51,22 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     bars.grid(axis="y", visible=False)
     _legend(bars, "link or load" if result.loads else "link")
     write_title(figure, result)
-    write_note(figure, foot(result))
+    write_note(figure, *bands.notes, foot(result))
     return figure
 
 
-def _curves(panel: Any, result: AnalysisResult, joints: list[str]) -> None:
-    """Draw the joints that give and take most in colour, and the others thin and grey behind them."""
+def _curves(panel: Any, result: AnalysisResult, joints: list[str]) -> Bands:
+    """Draw the joints that give and take most in colour, with bands, and the others thin and grey behind.
+
+    Returns the bands.
+    """
     driven, work = list(result.robot.driven), result.joint_work
     named, rest = largest_few((work.given + work.taken)[driven], MOST)
     found = drawn_curves(result, lambda part: part.joint_power.T[driven])
+    bands = Bands(result, [result.rows.numbers("power", joint=driven[i]) for i in named])
     for at, i in enumerate(named):
         panel.plot(found.time[i], found.values[i], label=joints[i], color=colour(at), linestyle=dash(at))
+        draw_band(panel, bands[at], colour(at))
     for at, i in enumerate(rest):
         label = f"{len(rest)} others" if at == 0 else None
         panel.plot(found.time[i], found.values[i], label=label, color=REST, linewidth=0.7, zorder=1.5)
@@ -69,6 +75,7 @@ def _curves(panel: Any, result: AnalysisResult, joints: list[str]) -> None:
     panel.set_ylabel("W")
     time_axis(panel, result)
     _legend(panel, "joint")
+    return bands
 
 
 def _every_work(result: AnalysisResult, driven: list[int]) -> Work:

@@ -1,16 +1,21 @@
 """Figure of what loads each joint over the whole movement, as stacked bars: gravity, loads, motions."""
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.analysis.joint_causes import Cause, are_motions_whole, causes_of, sizes
+from linkwise.analysis.certain_signs import DEVIATIONS
+from linkwise.analysis.joint_causes import Cause, are_motions_whole, causes_of, certainty, sizes
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.bands import ADDED
 from linkwise.analysis.show.drawn_curves import new_figure, write_title
-from linkwise.arrays import Array
-from linkwise.plotstyle import BLUE, GRAVITY, SKY, VERMILION, drawn, tone
+from linkwise.arrays import Array, Mask
+from linkwise.escape import printable
+from linkwise.extras import extra
+from linkwise.plotstyle import BLUE, GRAVITY, INK, SKY, VERMILION, drawn, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,10 +37,31 @@ class SharePart:
 
     label: str
     sizes: Array
+    spreads: Array
+    """Standard deviations of the sizes at most, (joints,); 0 where none is known."""
+    unsure: Mask
+    """True for joints on which the net torque has no certain sign, (joints,)."""
     fill: str
     hatch: str = ""
     names: tuple[str, ...] = ()
     """Name of the cause at each joint, where it differs from joint to joint."""
+
+    def name(self, i: int) -> str:
+        """Return the name of the cause at the i-th joint that is drawn."""
+        return f"{self.names[i]} motion" if self.names else self.label
+
+
+@dataclass(frozen=True, eq=False)
+class _Sized:
+    """A cause; of its net torques on joints mean sizes, their deviations, and which signs are unsure."""
+
+    cause: Cause
+    sizes: Array
+    spreads: Array
+    unsure: Mask
+
+    def part(self, fill: str, hatch: str) -> SharePart:
+        return SharePart(self.cause.label, self.sizes, self.spreads, self.unsure, fill, hatch)
 
 
 def share_parts(result: AnalysisResult) -> tuple[list[SharePart], list[SharePart]]:
@@ -45,48 +71,50 @@ def share_parts(result: AnalysisResult) -> tuple[list[SharePart], list[SharePart
     """
     robot = result.robot
     causes = causes_of(result, robot.plot_joints, drawn, together=are_motions_whole(result))
-    found = list(zip(causes, sizes(result, causes), strict=True))
-    moving = [(cause, size) for cause, size in found if cause.is_motion]
-    fixed = [(cause, size) for cause, size in found if not cause.is_motion]
+    certain = certainty(result, causes)
+    found = list(map(_Sized, causes, sizes(result, causes), certain.deviation, certain.unsure))
+    moving = [one for one in found if one.cause.is_motion]
+    fixed = [one for one in found if not one.cause.is_motion]
     return _fixed(result, fixed), _few(result, moving) if len(robot.driven) > MANY else _each(result, moving)
 
 
-def _fixed(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
+def _fixed(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
     """Return parts for gravity or shares with names, loads, and joints' own torques."""
-    own = [cause for cause, _ in found if cause.kind == "own"]
-    named = [cause for cause, _ in found if cause.kind == "named"][1:]  # the first is grey
-    tones = [*own, *(cause for cause, _ in found if cause.kind == "load"), *named]  # in the page's order
+    causes = [one.cause for one in found]
+    own = [cause for cause in causes if cause.kind == "own"]
+    named = [cause for cause in causes if cause.kind == "named"][1:]  # the first is grey
+    tones = [*own, *(cause for cause in causes if cause.kind == "load"), *named]  # in the page's order
     out = []
-    for cause, values in found:
-        if cause.kind == "named" and cause not in named:
-            out.append(SharePart(cause.label, values, GRAVITY))
+    for one in found:
+        if one.cause.kind == "named" and one.cause not in named:
+            out.append(one.part(GRAVITY, ""))
         else:
-            fill = tone(len(result.robot.driven) + tones.index(cause))
-            out.append(SharePart(cause.label, values, fill, HATCHES[cause.kind]))
+            fill = tone(len(result.robot.driven) + tones.index(one.cause))
+            out.append(one.part(fill, HATCHES[one.cause.kind]))
     return out
 
 
-def _each(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
+def _each(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
     """Return a part for every motion, or for its acceleration and its velocity."""
     place = {k: at for at, k in enumerate(result.robot.driven)}
-    return [
-        SharePart(cause.label, values, tone(place[cause.number or 0]), HATCHES[cause.kind])
-        for cause, values in found
-    ]
+    return [one.part(tone(place[one.cause.number or 0]), HATCHES[one.cause.kind]) for one in found]
 
 
-def _few(result: AnalysisResult, found: Sequence[tuple[Cause, Array]]) -> list[SharePart]:
+def _few(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
     """Return parts for many joints: each one's own motion, the largest other one, and the sum of the rest."""
     driven, names = result.robot.driven, result.robot.plot_joints
-    by = np.array([size for _, size in found]).T
-    own = by.diagonal()
+    by, spreads, unsure = (
+        np.array([getattr(one, what) for one in found]).T for what in ("sizes", "spreads", "unsure")
+    )
     others = by * (1.0 - np.eye(len(driven)))
-    largest = others.max(axis=1)
-    first = tuple(drawn(names[driven[k]]) for k in others.argmax(axis=1))
+    at = np.arange(len(driven)), others.argmax(axis=1)
+    first = tuple(drawn(names[driven[k]]) for k in at[1])
+    rest, rest_spread = (one.sum(axis=1) - one.diagonal() - one[at] for one in (by, spreads))
+    nothing = np.zeros(len(driven), np.bool_)
     return [
-        SharePart("its own motion", own, VERMILION),
-        SharePart(LARGEST, largest, BLUE, names=first),
-        SharePart(REST, others.sum(axis=1) - largest, SKY),
+        SharePart("its own motion", by.diagonal(), spreads.diagonal(), unsure.diagonal(), VERMILION),
+        SharePart(LARGEST, by[at], spreads[at], unsure[at], BLUE, names=first),
+        SharePart(REST, rest, rest_spread, nothing, SKY),
     ]
 
 
@@ -95,9 +123,10 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     robot = result.robot
     fixed, movement = share_parts(result)
     every = [*fixed, *movement]
+    notes = _notes(result, every)
     rows = -(-len(every) // 3)
     row = 0.42 if len(movement) > 3 else 0.3
-    figure = new_figure(8.4, 1.3 + row * len(robot.driven) + 0.2 * rows)
+    figure = new_figure(8.4, 1.1 + row * len(robot.driven) + 0.2 * rows + 0.13 * len(notes))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 3))
     bars = _bars(left, every)
     _bars(right, movement)
@@ -114,17 +143,51 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     for axis in (left, right):
         axis.set_xlabel("mean size of the net torque, % of all")
     write_title(figure, result, "What loads each joint")
+    unsure = [_unsure_patch()] if any(part.unsure.any() for part in every) else []
     figure.legend(
-        bars,
-        [part.label for part in every],
+        [*bars, *unsure],
+        [*(part.label for part in every), *([UNSURE] if unsure else [])],
         loc="outside lower center",
         ncols=3,
         handlelength=2,
         fontsize=8,
-        title=LEANING if robot.tree is not None else None,
+        title="\n".join(notes) or None,
         title_fontsize=7,
+        alignment="left",
     )
     return figure
+
+
+UNSURE = "no certain sign"
+UNSURE_HATCH = "\\\\\\\\\\\\"
+WIDE = 140
+"""Letters of a line of notes."""
+SHOWN = 8
+"""Causes without a certain sign that are listed."""
+
+
+def _unsure_patch() -> Any:
+    return extra("matplotlib.patches").Patch(
+        facecolor="white", edgecolor=INK, hatch=UNSURE_HATCH, linewidth=0.0
+    )
+
+
+def _notes(result: AnalysisResult, parts: Sequence[SharePart]) -> list[str]:
+    """Return what rests on the file's masses, what whiskers are, and which causes have no certain sign."""
+    found = LEANING.split("\n") if result.robot.tree is not None else []
+    if not any(part.spreads.any() for part in parts):
+        return found
+    joints = [drawn(result.robot.plot_joints[i]) for i in result.robot.driven]
+    unsure = [
+        f"{part.name(i)} on {joints[i]}" for part in parts for i in np.flatnonzero(part.unsure).tolist()
+    ]
+    told = ", ".join(unsure[:SHOWN]) + (f" and {len(unsure) - SHOWN} more" if len(unsure) > SHOWN else "")
+    found += [
+        f"A whisker at the end of a part is one standard deviation of its mean size, at most: {ADDED}.",
+        f"No certain sign, where largest less than {DEVIATIONS:g} standard deviations: {told or 'none'}.",
+        *map(printable, result.signs.lines),
+    ]
+    return [line for note in found for line in textwrap.wrap(note, WIDE)]
 
 
 def _name_beside(axis: Any, part: SharePart) -> None:
@@ -141,8 +204,8 @@ def _bars(axis: Any, parts: list[SharePart]) -> list[Any]:
     wholes = np.sum([part.sizes for part in parts], axis=0)
     wholes[wholes == 0.0] = 1.0
     starts = np.zeros(len(wholes))
-    bars = []
-    for part in parts:
+    bars, ends = [], [100.0]
+    for number, part in enumerate(parts):
         widths = 100 * part.sizes / wholes
         bar = axis.barh(
             range(len(widths)),
@@ -159,8 +222,27 @@ def _bars(axis: Any, parts: list[SharePart]) -> list[Any]:
         for text in axis.bar_label(bar, labels, label_type="center", color="white", fontsize=8):
             if text.get_text():
                 text.set_bbox(box)
+        if part.unsure.any():
+            _hatch(axis, part.unsure, starts, widths)
         starts = starts + widths
         bars.append(bar)
-    axis.set_xlim(0, 100)
+        if part.spreads.any():
+            ends.append(_whiskers(axis, starts, 100 * part.spreads / wholes, number))
+    axis.set_xlim(0, max(ends))
     axis.grid(False)
     return bars
+
+
+def _hatch(axis: Any, unsure: Mask, starts: Array, widths: Array) -> None:
+    """Hatch the bars of causes without a certain sign."""
+    rows = np.flatnonzero(unsure)
+    look = {"facecolor": "none", "edgecolor": INK, "hatch": UNSURE_HATCH, "linewidth": 0}
+    axis.barh(rows, widths[rows], left=starts[rows], height=0.64, **look)
+
+
+def _whiskers(axis: Any, ends: Array, spreads: Array, number: int) -> float:
+    """Draw a deviation to either side of bars' ends, at a height of its own; return how far they reach."""
+    rows = np.flatnonzero(spreads)
+    heights = rows + 0.17 * (number % 3 - 1)
+    axis.errorbar(ends[rows], heights, xerr=spreads[rows], fmt="none", ecolor=INK, elinewidth=0.9, capsize=2)
+    return float((ends + spreads).max(initial=0.0))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.bands import Bands, draw_band
 from linkwise.analysis.show.drawn_curves import (
     PIECES,
     DrawnCurves,
@@ -98,6 +99,10 @@ class SourcedPanels:
         count = len(self.panels)
         return [(one, found.only(slice(at * count, (at + 1) * count))) for at, one in enumerate(self.sources)]
 
+    def bands(self, result: AnalysisResult, pieces: int = PIECES) -> Bands:
+        """Return the bands of the curves, source by source and, of each, panel by panel."""
+        return Bands(result, [rows for one in self.sources for rows in one.rows], pieces)
+
 
 def largest_alone(
     result: AnalysisResult, every: Sequence[SourceCurve], most: int
@@ -131,15 +136,16 @@ def _drawn(result: AnalysisResult, shown: SourcedPanels) -> "Figure":
     figure = new_figure(8.4, 1.2 + 1.6 * len(shown.panels))
     panels = figure.subplots(len(shown.panels), 1, sharex=True, squeeze=False)[:, 0]
     joints, loads = len(result.robot.driven), len(result.load_labels)
-    curves = shown.curves(result)
+    curves, bands, count = shown.curves(result), shown.bands(result), len(shown.panels)
     for at, (panel, (name, unit)) in enumerate(zip(panels, shown.panels, strict=True)):
-        for source, found in curves:
+        for number, (source, found) in enumerate(curves):
             label, look = drawn(source.label, 34), source.look(joints, loads)
             panel.plot(found.time[at], found.values[at], label=label, **look)
+            draw_band(panel, bands[number * count + at], look["color"])
         zero_line(panel)
         panel.set_ylabel(f"{drawn(name)} ({unit})")
     panels[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8, handlelength=2.6)
     time_axis(panels[-1], result)
     write_title(figure, result, drawn(shown.title, 70))
-    write_note(figure, *shown.notes, foot(result))
+    write_note(figure, *shown.notes, *bands.notes, foot(result))
     return figure

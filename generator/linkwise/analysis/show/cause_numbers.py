@@ -1,0 +1,176 @@
+"""Numbers of the causes of one joint's torque in each phase of a movement: means and root mean squares."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from linkwise.analysis.joint_causes import Cause, causes_of, curves, deviation_curves
+from linkwise.analysis.loads.placed import moving_joints
+from linkwise.analysis.phases import PlacedPhase
+from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.drawn_curves import largest_few
+from linkwise.arrays import Array, Mask
+from linkwise.errors import LinkwiseError
+from linkwise.escape import printable
+from linkwise.plotstyle import drawn
+
+
+@dataclass(frozen=True, eq=False)
+class ShownPhase:
+    """A phase, or the rest of the movement beside it; without a phase, the whole movement."""
+
+    label: str
+    placed: PlacedPhase | None = None
+    is_rest: bool = False
+
+    def on(self, result: AnalysisResult) -> Mask:
+        """Return which samples (S,) of a result, or a part of one, are in it."""
+        if self.placed is None:
+            return np.ones(len(result.time), dtype=np.bool_)
+        contacts = result.values[result.rows["contact"].rows]
+        return self.placed.on(result.robot, result.time, result.q, contacts) ^ self.is_rest
+
+
+def shown_phases(result: AnalysisResult, i: int) -> list[ShownPhase]:
+    """Return the phases of `asked_phases`, each followed by the rest of the movement if that is named."""
+    found = []
+    for phase in asked_phases(result, i):
+        found.append(ShownPhase(drawn(phase.name, 34), phase))
+        if phase.rest:
+            found.append(ShownPhase(drawn(phase.rest, 34), phase, is_rest=True))
+    return found
+
+
+def require_samples(
+    result: AnalysisResult, phases: list[ShownPhase], counts: Sequence[int]
+) -> list[ShownPhase]:
+    """Return the phases, or the whole movement where they distinguish nothing.
+
+    counts: number of samples of each phase
+
+    Raises LinkwiseError for a phase that was asked for and has no sample.
+    """
+    empty = [phase.label for phase, count in zip(phases, counts, strict=True) if not count]
+    if empty and result.phases:
+        span = f"{result.time[0]:.4g} and {result.time[-1]:.4g} s"
+        raise LinkwiseError(f"--phase: {empty[0]} has no sample between {span}")
+    return [ShownPhase("the whole movement")] if empty or not phases else phases
+
+
+def asked_phases(result: AnalysisResult, i: int) -> tuple[PlacedPhase, ...]:
+    """Return the phases that were given, else one while the only load or contact on joint i acts.
+
+    There is no phase if several act on it, or none.
+    """
+    if result.phases:
+        return result.phases
+    robot, tree = result.robot, result.robot.package.manifest.tree
+    loads = [one for one in result.loads if i in one.acts_on.joints]
+    held: list[int] = []
+    if robot.contacts is not None and tree is not None:
+        moved = [moving_joints(tree, robot.joint_of(one.frame)) for one in robot.contacts.contacts]
+        held = [number for number, joints in enumerate(moved) if i in joints]
+    if len(loads) + len(held) != 1:
+        return ()
+    if loads:
+        name = printable(f"load {loads[0].name}")
+        return (PlacedPhase(f"{name} acts", f"{name} does not act", load=loads[0]),)
+    name = printable(robot.ground.names[held[0]])
+    return (PlacedPhase(f"{name} stands", f"{name} does not stand", contact=held[0]),)
+
+
+MOST = 10
+"""Joints whose motions have bars of their own; all other motions are summed in one."""
+NOTHING = 1e-9
+"""Part of the largest cause below which a cause is only rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseNumbers:
+    """A phase, and the mean and root mean square of each row in it, (rows,); of both deviations at most."""
+
+    phase: ShownPhase
+    mean: Array
+    rms: Array
+    mean_deviation: Array
+    rms_deviation: Array
+
+
+@dataclass(frozen=True, eq=False)
+class CauseNumbers:
+    """Causes of the joint's torque: all causes together in the first row, and then each."""
+
+    labels: tuple[str, ...]
+    phases: tuple[PhaseNumbers, ...]
+    apart: bool
+    """True if no two phases share a sample."""
+
+
+class _Tally:
+    """Running sums of curves and of their products, over the samples of a phase."""
+
+    def __init__(self, curves: int) -> None:
+        self.count, self.sums, self.products = 0, np.zeros(curves), np.zeros((curves, curves))
+
+    def __call__(self, values: Array) -> None:
+        self.count += values.shape[1]
+        self.sums += values.sum(axis=1)
+        self.products += values @ values.T
+
+    def mean(self, rows: Array) -> Array:
+        """Return the mean of sums of curves; rows (rows, curves) has ones for the curves of each sum."""
+        mean: Array = rows @ self.sums / self.count
+        return mean
+
+    def rms(self, rows: Array) -> Array:
+        """Return the root mean square of sums of curves, with rows as for `mean`."""
+        squares = np.einsum("ra,ab,rb->r", rows, self.products, rows)
+        root: Array = np.sqrt(np.maximum(squares, 0.0) / self.count)
+        return root
+
+
+def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
+    """Return the numbers of joint i over all samples; raise LinkwiseError for a phase without any."""
+    causes = causes_of(result, result.robot.plot_joints, drawn)
+    asked = shown_phases(result, i)
+    (every, *tallies), (spread, *spreads) = (
+        [_Tally(1 + len(causes)) for _ in range(1 + len(asked))] for _ in range(2)
+    )
+    torque = result.rows.deviations(result.rows.numbers("tau", joint=i))
+    peaks, apart = np.zeros(len(causes)), True
+    for part in result.parts():
+        values = np.concatenate([part.torque[:, [i]].T, curves(part, causes, i)])
+        on = [phase.on(part) for phase in asked]
+        beside = np.concatenate([[part.values[torque].sum(axis=0)], deviation_curves(part, causes, i)])
+        np.maximum(peaks, np.abs(values[1:]).max(axis=1), out=peaks)
+        apart &= not on or int(np.sum(on, axis=0).max()) <= 1
+        for tally, own, here in zip(tallies, spreads, on, strict=True):
+            tally(values[:, here])
+            own(beside[:, here])
+        every(values)
+        spread(beside)
+    shown = require_samples(result, asked, [tally.count for tally in tallies])
+    labels, rows = _rows(causes, every, peaks > NOTHING * peaks.max(initial=0.0))
+    found = zip(tallies, spreads, strict=True) if shown == asked else [(every, spread)]
+    numbers = (
+        PhaseNumbers(phase, tally.mean(rows), tally.rms(rows), own.mean(rows), own.rms(rows))
+        for phase, (tally, own) in zip(shown, found, strict=True)
+    )
+    return CauseNumbers(labels, tuple(numbers), apart)
+
+
+def _rows(causes: Sequence[Cause], every: _Tally, there: Array) -> tuple[tuple[str, ...], Array]:
+    """Return labels and rows, the largest cause over the movement first, small motions summed last."""
+    alone = np.eye(1 + len(causes))
+    sizes = every.rms(alone)[1:]
+    order = sorted(np.flatnonzero(there).tolist(), key=lambda at: -float(sizes[at]))
+    motions = [at for at in order if causes[at].is_motion]
+    small = [motions[at] for at in largest_few(sizes[motions], MOST)[1]]
+    named = [at for at in order if at not in small]
+    labels = ["all causes together", *(causes[at].label for at in named)]
+    rows = [alone[0], *(alone[1 + at] for at in named)]
+    if small:
+        labels.append(f"motion of {len(small)} others")
+        rows.append(alone[[1 + at for at in small]].sum(axis=0))
+    return tuple(labels), np.array(rows)
