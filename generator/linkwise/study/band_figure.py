@@ -33,8 +33,8 @@ HATCHED = {
     "new": "hatched: ± sd of a new subject's truth,\nspread and uncertainty together",
 }
 """Kinds of bands, as a legend calls them."""
-EDGE = 0.6
-"""Width of a hatched band's edge in points."""
+EDGE = 0.5
+"""Width of a hatched band's lines in points."""
 HATCHES = ("////", "\\\\\\\\", "||||", "----")
 """Hatches of levels, so that two that overlap are told apart."""
 
@@ -64,7 +64,8 @@ def band_figures(
         for number, (figure, panels) in enumerate(zip(figures, drawn_of, strict=True), 1)
     ]
     for figure, panels, name in zip(figures, drawn_of, file_names(map(file_name, names)), strict=True):
-        with styled():
+        with styled() as matplotlib:
+            matplotlib.rcParams["hatch.linewidth"] = EDGE
             drawing = _drawn(figure, panels)
             for kind in FORMATS:
                 yield f"{name}.{kind}", saved(drawing, kind)
@@ -130,11 +131,11 @@ def _drawn(figure: PaperFigure, panels: Sequence[BandPanel]) -> Any:
     if len(panels[0].levels) > 1:
         axes[0].legend(title=drawn(figure.by), fontsize=8, handlelength=2.5)
     if figure.hatched != "none" and any(panel.uncertain for panel in panels):
-        _legend_of_bands(drawing, figure)
+        _legend_of_bands(drawing, figure, across)
     return drawing
 
 
-def _legend_of_bands(drawing: Any, figure: PaperFigure) -> None:
+def _legend_of_bands(drawing: Any, figure: PaperFigure, across: int) -> None:
     """Say below all panels which band is which."""
     patch = extra("matplotlib.patches").Patch
     kinds = [(patch(facecolor=INK, alpha=0.2, linewidth=0), FILLED[figure.band])] if figure.band in FILLED else []
@@ -142,7 +143,7 @@ def _legend_of_bands(drawing: Any, figure: PaperFigure) -> None:
         (patch(fill=False, edgecolor=INK, hatch=HATCHES[0], linewidth=EDGE), HATCHED[figure.hatched])
     )
     handles, texts = zip(*kinds, strict=True)
-    drawing.legend(handles, texts, loc="outside lower left", ncols=len(kinds), fontsize=8, handlelength=2.5)
+    drawing.legend(handles, texts, loc="outside lower left", ncols=across, fontsize=8, handlelength=2.5)
 
 
 def _panel(axis: Any, panel: BandPanel, figure: PaperFigure) -> None:

@@ -14,6 +14,7 @@ With S subjects, subject s of n_s trials, trial t of c_t cycles, at each point o
 that go together has at most the root mean square of their deviations, by Cauchy and Schwarz.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ import numpy as np
 
 from linkwise.arrays import Array
 from linkwise.study.deviation_columns import RANDOM, WHOLE
+from linkwise.study.ledger import TrialRecord
 from linkwise.study.spread import Spread, by_subject
 from linkwise.study.summary import TrialSummary
 
@@ -50,6 +52,25 @@ class Deviations:
 
 SD_COLUMNS = ("sd_within", "sd_systematic", "sd_random", "sd_mean", "sd_new")
 """Names of deviations in the table of mean curves."""
+
+
+TOGETHER = (
+    f"errors that {RANDOM}… tells are new in each cycle, and the spread between subjects has them already; all"
+    " others are the same in all trials of all subjects: no number of them averages these out, and the spread"
+    " between subjects has none of them"
+)
+"""Assumption by which deviations of trials go together."""
+
+
+def assumptions(records: Sequence[TrialRecord]) -> dict[str, object]:
+    """Return what was assumed, as plain data: of the trials, and of how they go together; empty if nothing."""
+    found: dict[str, tuple[list[str], dict[str, object]]] = {}
+    for record in records:
+        if record.uncertain is not None:
+            own, _ = found.setdefault(json.dumps(record.uncertain), ([], dict(record.uncertain)))
+            own.append(record.name)
+    assumed = [{"trials": own, **told} for own, told in found.values()]
+    return {"together": TOGETHER, "assumed": assumed} if found else {}
 
 
 def have_deviations(trials: Sequence[TrialSummary]) -> bool:
