@@ -82,8 +82,8 @@ def panels_of(
     ]
     if figure.hatched in ("mean", "new") and not any(panel.uncertain for panel in panels):
         raise LinkwiseError(
-            f"[[figure]]: 'hatched' is {figure.hatched!r}, and no curve has deviations; give all trials the key"
-            " 'uncertain', or leave it out"
+            f"[[figure]]: 'hatched' is {figure.hatched!r}, and no curve has deviations; give all trials the"
+            " key 'uncertain', or leave it out"
         )
     return panels
 
@@ -138,7 +138,9 @@ def _drawn(figure: PaperFigure, panels: Sequence[BandPanel]) -> Any:
 def _legend_of_bands(drawing: Any, figure: PaperFigure, across: int) -> None:
     """Say below all panels which band is which."""
     patch = extra("matplotlib.patches").Patch
-    kinds = [(patch(facecolor=INK, alpha=0.2, linewidth=0), FILLED[figure.band])] if figure.band in FILLED else []
+    kinds = (
+        [(patch(facecolor=INK, alpha=0.2, linewidth=0), FILLED[figure.band])] if figure.band in FILLED else []
+    )
     kinds.append(
         (patch(fill=False, edgecolor=INK, hatch=HATCHES[0], linewidth=EDGE), HATCHED[figure.hatched])
     )

@@ -1,8 +1,8 @@
 """Standard deviations within trials, by what is uncertain, and together with the spread between subjects.
 
-A trial's curve, as it is told, is its truth and two errors, X_t = truth_t + e + n_t. The systematic e, of bodies,
-is the same in all trials, and no number of them averages it out; n_t, of noise of motion, is new in each cycle.
-With S subjects, subject s of n_s trials, trial t of c_t cycles, at each point of the cycle:
+A trial's curve, as it is told, is its truth and two errors, X_t = truth_t + e + n_t. The systematic e, of
+bodies, is the same in all trials, and no number of them averages it out; n_t, of noise of motion, is new in
+each cycle. With S subjects, subject s of n_s trials, trial t of c_t cycles, at each point of the cycle:
 
     systematic² = mean over s of mean over t of (sd² − random²)      sd, random: root mean squares over cycles
     random²     = mean over s of mean over t of random²
@@ -55,15 +55,15 @@ SD_COLUMNS = ("sd_within", "sd_systematic", "sd_random", "sd_mean", "sd_new")
 
 
 TOGETHER = (
-    f"errors that {RANDOM}… tells are new in each cycle, and the spread between subjects has them already; all"
-    " others are the same in all trials of all subjects: no number of them averages these out, and the spread"
-    " between subjects has none of them"
+    f"errors that {RANDOM}… tells are new in each cycle, and the spread between subjects has them already;"
+    " all others are the same in all trials of all subjects: no number of them averages these out, and the"
+    " spread between subjects has none of them"
 )
 """Assumption by which deviations of trials go together."""
 
 
 def assumptions(records: Sequence[TrialRecord]) -> dict[str, object]:
-    """Return what was assumed, as plain data: of the trials, and of how they go together; empty if nothing."""
+    """Return what was assumed of trials, and of how they go together, as plain data; empty if nothing."""
     found: dict[str, tuple[list[str], dict[str, object]]] = {}
     for record in records:
         if record.uncertain is not None:

@@ -76,8 +76,8 @@ class Comparison:
 class PaperFigure:
     """A figure of mean curves with bands, one for each level of a factor.
 
-    `band` is what is filled, between subjects; `hatched` the deviation by what is uncertain, where there is one:
-    within a trial, of the mean, or of the truth of a new subject.
+    `band` is what is filled, between subjects; `hatched` the deviation by what is uncertain, where there is
+    one: within a trial, of the mean, or of the truth of a new subject.
     """
 
     columns: tuple[str, ...]

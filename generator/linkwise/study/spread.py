@@ -76,7 +76,8 @@ def groups_of(trials: Sequence[TrialSummary]) -> dict[Group, list[TrialSummary]]
 def spread(trials: Sequence[TrialSummary], values: Mapping[str, Array]) -> Spread:
     """Return the spread over subjects of arrays by trial."""
     own = {
-        subject: [values[trial.name] for trial in some] for subject, some in by_subject(trials, values).items()
+        subject: [values[trial.name] for trial in some]
+        for subject, some in by_subject(trials, values).items()
     }
     each = np.stack([np.mean(some, axis=0) for some in own.values()])
     return Spread(tuple(own), np.stack([one for some in own.values() for one in some]), each)
