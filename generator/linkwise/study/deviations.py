@@ -29,20 +29,20 @@ from linkwise.study.summary import TrialSummary
 
 @dataclass(frozen=True, eq=False)
 class Deviations:
-    """Standard deviations of a group's curve, arrays (points,); NaN is what a single subject cannot tell."""
+    """Standard deviations by which a group's curve may be off, (points,); NaN where one subject cannot tell."""
 
     systematic: Array
-    """Of one curve, by what errs alike in all trials."""
+    """Deviation of one curve by what errs alike in all trials."""
     random: Array
-    """Of one cycle's curve, by what is new in each."""
+    """Deviation of one cycle's curve by what is new in each."""
     mean: Array
-    """Of the mean: between subjects, divided by their number, and what is systematic."""
+    """Deviation of the mean, by the spread between subjects and by what is systematic."""
     new: Array
-    """Of the true curve of one more subject, about that mean."""
+    """Deviation of the true curve of one more subject, about that mean."""
 
     @property
     def within(self) -> Array:
-        """Of one cycle's curve, by all that is uncertain."""
+        """Deviation of one cycle's curve by all that is uncertain."""
         return np.hypot(self.systematic, self.random)
 
     def rows(self, over: str = "") -> dict[str, Array]:

@@ -128,7 +128,7 @@ class StudyMark:
     files: tuple[str, ...]
     """Names of the files in the folder, besides trials."""
     uncertain: Mapping[str, object]
-    """What was assumed of what is uncertain; empty where nothing is."""
+    """Assumptions about what is uncertain; empty where nothing is."""
 
     @classmethod
     def begun(cls, plan: StudyPlan, files: Sequence[str]) -> "StudyMark":

@@ -41,7 +41,7 @@ class TrialRecord:
     outputs: Mapping[str, int]
     """Bytes of the other files of its folder, by name."""
     uncertain: Mapping[str, object] | None
-    """What was assumed of what is uncertain; none where nothing is."""
+    """Assumptions about what is uncertain; none where nothing is."""
 
     def text(self) -> str:
         """Return the record as JSON."""
