@@ -238,3 +238,14 @@ def test_a_study_without_deviations_has_no_columns_of_them_and_draws_none(tmp_pa
     )
     assert not [name for name in curve_table(tmp_path / "out").columns if "sd_" in name]
     assert json.loads((tmp_path / "out/study.json").read_text())["uncertain"] == {}
+
+
+def test_a_record_that_no_study_writes_is_damaged(tmp_path: Path) -> None:
+    file = write_study(tmp_path, HEAD, "pages = false\n", CHOICES, TRIALS, trials=1)
+    run_study(file, tmp_path / "out", Here())
+    mark = tmp_path / "out/study.json"
+    former = json.loads(mark.read_text())
+    former["uncertain"] = {"a": [[[[[[[[[1]]]]]]]]]}
+    mark.write_text(json.dumps(former))
+    with pytest.raises(LinkwiseError, match=r"study\.json is damaged: uncertain\.a\[0\].* is not a number"):
+        run_study(file, tmp_path / "out", Here())

@@ -29,7 +29,7 @@ from linkwise.study.summary import TrialSummary
 
 @dataclass(frozen=True, eq=False)
 class Deviations:
-    """Standard deviations by which a group's curve may be off, (points,); NaN where one subject cannot tell."""
+    """Standard deviations of a group's curve, (points,) each; NaN where one subject cannot tell."""
 
     systematic: Array
     """Deviation of one curve by what errs alike in all trials."""
