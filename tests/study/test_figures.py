@@ -100,3 +100,39 @@ def test_means_without_cycles_are_dots_with_their_deviation(drawn_of: Any) -> No
         np.testing.assert_array_equal(line.get_xdata(), at)
         (bar,) = axis.containers[at].lines[2][0].get_segments()
         np.testing.assert_allclose(bar[:, 1], means.mean() + np.array([-1, 1]) * means.std(ddof=1))
+
+
+def with_deviations(deviation: float) -> list[TrialSummary]:
+    """The trials, each of one cycle, with a deviation of so much beside the curve."""
+    found = trials()
+    for trial in found:
+        trial.curves["sd/tau/hip"] = np.full(3, deviation)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("hatched", "of_slow", "said"),
+    [
+        ("within", np.full(3, 0.5), "± sd within a trial"),
+        ("mean", np.sqrt(np.array([2, 2, 12.5]) / 2 + 0.25), "± sd of the mean"),
+        ("new", np.sqrt(np.array([2, 2, 12.5]) * 1.5 + 0.25), "± sd of a new subject's truth"),
+    ],
+)
+def test_what_is_uncertain_is_hatched_beside_the_spread(
+    drawn_of: Any, hatched: Any, of_slow: Any, said: str
+) -> None:
+    axis, _ = drawn_of(PaperFigure(("tau/hip",), "condition", hatched=hatched), with_deviations(0.5))
+    filled, uncertain = axis.collections[:2]
+    assert filled.get_hatch() is None
+    assert uncertain.get_hatch() != axis.collections[3].get_hatch()
+    np.testing.assert_allclose(band_of(axis, 1), np.array([[2, 3, 5.5]]) + np.outer([-1, 1], of_slow))
+    (legend,) = axis.figure.legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts[0] == "filled: ± sd between subjects"
+    assert said in texts[1]
+
+
+def test_nothing_is_hatched_where_it_is_left_out(drawn_of: Any) -> None:
+    axis, _ = drawn_of(PaperFigure(("tau/hip",), "condition", hatched="none"), with_deviations(0.5))
+    assert [band.get_hatch() for band in axis.collections] == [None, None]
+    assert not axis.figure.legends

@@ -67,6 +67,10 @@ def of_subjects(out: Path, factor: str | None, column: str) -> dict[str, Any]:
     return {level: each.loc[level] for level in each.index.unique("level")}
 
 
+def test_nothing_is_hatched_without_what_is_uncertain(page: Any) -> None:
+    assert not page.find_element("id", "hatched").is_displayed()
+
+
 def test_it_opens_with_the_column_that_it_says(page: Any) -> None:
     chosen = "return document.getElementById('column').selectedOptions[0].text"
     assert page.execute_script(chosen) == page.find_element("id", "bands-title").text != ""
@@ -215,6 +219,65 @@ def test_numbers_have_the_digits_by_which_they_differ(
     run_study(file, tmp_path / "out", Here())
     opened(driver, (tmp_path / "out/study.html").as_uri())
     assert f"36.97–37.01 % ({said})" in driver.find_element("id", "tests").text
+
+
+@pytest.fixture(scope="module")
+def uncertain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study of uncertain bodies."""
+    folder: Path = tmp_path_factory.mktemp("uncertain")
+    choices = CHOICES + 'uncertain = "bodies.toml"\n'
+    file = write_study(folder, HEAD, QUICK, choices, CYCLES, TRIALS, subjects=3, trials=2)
+    (folder / "bodies.toml").write_text('schema = 1\n[all]\nmass = "10 %"\ncentre = "20 mm"\n')
+    run_study(file, folder / "out", Here())
+    return folder / "out"
+
+
+def test_what_is_uncertain_is_hatched_apart_from_the_spread(driver: Any, uncertain: Path) -> None:
+    opened(driver, (uncertain / "study.html").as_uri())
+    every = "return [...document.getElementById('column').options].map((option) => option.textContent)"
+    names = driver.execute_script(every)
+    assert not [name for name in names if name.startswith("sd")]
+    table = pd.read_parquet(uncertain / "curves.parquet").set_index(["condition", "column"])
+    bands = (
+        "return document.getElementById('bands').data.filter((one) => one.x.length > 1)"
+        ".map((one) => [one.fillpattern?.shape ?? '', Array.from(one.y)])"
+    )
+    legend = "return document.getElementById('bands').data.map((one) => one.name).filter(Boolean)"
+    for column in ("tau/joint2", "tau/joint1/link3"):
+        choose(driver, "column", names.index(column))
+        for hatched, said in (
+            ("within", "within a trial"),
+            ("mean", "of the mean"),
+            ("new", "of a new subject"),
+        ):
+            choose(driver, "hatched", hatched)
+            shown = driver.execute_script(bands)
+            for at, condition in enumerate(("fast", "slow")):
+                rows = table.loc[(condition, column)]
+                (_, _), (filled, most), (_, low), (pattern, high), (_, mean) = shown[5 * at : 5 * at + 5]
+                assert (filled, pattern) == ("", "/\\"[at])
+                scale = 1e-6 * np.abs(rows["max"]).max()
+                np.testing.assert_allclose(most, rows["mean"] + rows["std"], atol=scale)
+                for edge, side in ((low, -1), (high, 1)):
+                    expected = rows["mean"] + side * rows[f"sd_{hatched}"]
+                    np.testing.assert_allclose(edge, expected, atol=scale)
+                np.testing.assert_allclose(mean, rows["mean"], atol=scale)
+            told = driver.execute_script(legend)
+            assert told[2] == "filled: ± sd between subjects"
+            assert said in told[3]
+            alike = "the same in all trials" in driver.find_element("id", "bands-caption").text
+            assert alike == (hatched != "within")
+    choose(driver, "column", names.index("q/joint1"))
+    assert driver.execute_script(legend) == ["fast", "slow"]
+    assert driver.get_log("browser") == []
+
+
+def test_a_page_with_deviations_fits_a_phone(driver: Any, uncertain: Path) -> None:
+    size = {"width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": True}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    opened(driver, (uncertain / "study.html").as_uri())
+    assert driver.execute_script("return document.documentElement.scrollWidth") == 390
+    driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
 def test_it_fits_a_phone(page: Any) -> None:

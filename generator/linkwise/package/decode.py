@@ -22,6 +22,8 @@ T = TypeVar("T")
 
 DIGITS = 16
 """Most digits of a whole number; no count or index has more, and Python takes long over many."""
+DEEPEST = 8
+"""Most lists and objects in each other, in plain data of any kind."""
 IN_TOML = {"a finite number": "a number", "a string": "a text", "an object": "a table"}
 """Names in messages about TOML of what has other names in those about JSON."""
 
@@ -123,6 +125,8 @@ def _value(kind: Any, data: Any, place: str, strict: bool = True) -> Any:
     if origin in (Mapping, dict):
         require(isinstance(data, dict), place, "an object", data)
         return {key: _value(inner[1], item, f"{place}.{_key(key)}", strict) for key, item in data.items()}
+    if kind is object:  # plain data of any kind
+        return _option(data, place, DEEPEST)
     return _option(data, place) if kind is Any else _scalar(kind, data, place, strict)
 
 
@@ -153,8 +157,10 @@ def _scalar(kind: Any, data: Any, place: str, strict: bool = True) -> Any:
     return data
 
 
-def _option(data: Any, place: str, nested: bool = True) -> Any:
+def _option(data: Any, place: str, deeper: int = 1) -> Any:
     """Return the option of a command: null, true, false, a number, text, or a list or object of such.
+
+    deeper: how many lists and objects may lie in each other
 
     Raises ValueError, which names the place, for anything else.
     """
@@ -165,10 +171,10 @@ def _option(data: Any, place: str, nested: bool = True) -> Any:
         return data
     if isinstance(data, str):
         return _scalar(str, data, place)
-    require(nested, place, "a number, a string, true, false or null")
+    require(deeper > 0, place, "a number, a string, true, false or null")
     if isinstance(data, list):
-        return [_option(item, f"{place}[{n}]", False) for n, item in enumerate(data)]
-    return {key: _option(item, f"{place}.{_key(key)}", False) for key, item in data.items()}
+        return [_option(item, f"{place}[{n}]", deeper - 1) for n, item in enumerate(data)]
+    return {key: _option(item, f"{place}.{_key(key)}", deeper - 1) for key, item in data.items()}
 
 
 def _key(name: str) -> str:

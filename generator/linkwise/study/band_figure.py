@@ -1,4 +1,7 @@
-"""Figures for a paper, by level of a factor: mean curves over the cycle with bands, or means by subject."""
+"""Figures for a paper, by level of a factor: mean curves over the cycle with bands, or means by subject.
+
+A filled band is of the spread between subjects, a hatched one of what is uncertain.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -6,12 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names
 from linkwise.extras import extra
 from linkwise.plotstyle import INK, colour, dash, drawn, saved, styled
 from linkwise.study.comparisons import Compared
-from linkwise.study.patterns import fitting
+from linkwise.study.deviation_columns import fitting_values
+from linkwise.study.deviations import Deviations, deviations
 from linkwise.study.plan import PaperFigure
 from linkwise.study.spread import Spread, columns_of_trials, spread, values_of
 from linkwise.study.summary import TrialSummary
@@ -21,6 +26,17 @@ MOST = 12
 FORMATS = ("svg", "pdf")
 WIDE, HIGH = 3.4, 2.3
 """Width and height of a panel in inches; two stand side by side."""
+FILLED = {"deviation": "filled: ± sd between subjects", "range": "filled: range of subjects"}
+HATCHED = {
+    "within": "hatched: ± sd within a trial,\nby what is uncertain",
+    "mean": "hatched: ± sd of the mean,\nspread and uncertainty together",
+    "new": "hatched: ± sd of a new subject's truth,\nspread and uncertainty together",
+}
+"""Kinds of bands, as a legend calls them."""
+EDGE = 0.5
+"""Width of a hatched band's lines in points."""
+HATCHES = ("////", "\\\\\\\\", "||||", "----")
+"""Hatches of levels, so that two that overlap are told apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +47,8 @@ class BandPanel:
     unit: str
     levels: dict[str, Spread]
     tests: tuple[Compared, ...]
+    uncertain: dict[str, Deviations]
+    """Deviations by level, of curves that have some."""
 
 
 def band_figures(
@@ -38,7 +56,7 @@ def band_figures(
 ) -> Iterator[tuple[str, bytes]]:
     """Yield the name and content of all figures, each as SVG and as PDF.
 
-    Raises LinkwiseError for unknown columns.
+    Raises LinkwiseError for unknown columns, and for deviations that are asked for and are not there.
     """
     drawn_of = [panels_of(figure, trials, tests) for figure in figures]
     names = [
@@ -46,7 +64,8 @@ def band_figures(
         for number, (figure, panels) in enumerate(zip(figures, drawn_of, strict=True), 1)
     ]
     for figure, panels, name in zip(figures, drawn_of, file_names(map(file_name, names)), strict=True):
-        with styled():
+        with styled() as matplotlib:
+            matplotlib.rcParams["hatch.linewidth"] = EDGE
             drawing = _drawn(figure, panels)
             for kind in FORMATS:
                 yield f"{name}.{kind}", saved(drawing, kind)
@@ -57,32 +76,43 @@ def panels_of(
 ) -> list[BandPanel]:
     """Return a panel for each column of a figure."""
     known = columns_of_trials(trials)
-    return [
-        BandPanel(name, known[name], _levels(figure, trials, name), _about(figure, name, tests))
+    panels = [
+        BandPanel(name, known[name], *_levels(figure, trials, name, tests))
         for name in figure_columns(figure, known)
     ]
+    if figure.hatched in ("mean", "new") and not any(panel.uncertain for panel in panels):
+        raise LinkwiseError(
+            f"[[figure]]: 'hatched' is {figure.hatched!r}, and no curve has deviations; give all trials the"
+            " key 'uncertain', or leave it out"
+        )
+    return panels
 
 
 def figure_columns(figure: PaperFigure, names: Iterable[str]) -> list[str]:
     """Return those of the columns `names` that a figure shows.
 
-    Raises LinkwiseError for unknown columns, and for too many.
+    Raises LinkwiseError for unknown columns, for deviations as columns of their own, and for too many.
     """
-    found = fitting("[[figure]]", names, figure.columns)
+    found = fitting_values("[[figure]]", names, figure.columns)
     if len(found) > MOST:
         raise LinkwiseError(f"[[figure]]: {len(found)} columns; {MOST} are legible, so give fewer")
     return found
 
 
-def _levels(figure: PaperFigure, trials: Sequence[TrialSummary], name: str) -> dict[str, Spread]:
+def _levels(
+    figure: PaperFigure, trials: Sequence[TrialSummary], name: str, tests: Sequence[Compared]
+) -> tuple[dict[str, Spread], tuple[Compared, ...], dict[str, Deviations]]:
+    """Return the spread of a column at each level, tests, and deviations at each level that has them."""
     found: dict[str, list[TrialSummary]] = {}
     for trial in trials:
         found.setdefault(trial.labels[figure.by] if figure.by else "", []).append(trial)
-    return {
+    levels = {
         level: spread(members, values)
         for level, members in found.items()
         if (values := values_of(members, name))
     }
+    uncertain = {level: deviations(found[level], name, one) for level, one in levels.items()}
+    return levels, _about(figure, name, tests), {k: one for k, one in uncertain.items() if one is not None}
 
 
 def _about(figure: PaperFigure, name: str, tests: Sequence[Compared]) -> tuple[Compared, ...]:
@@ -95,20 +125,37 @@ def _drawn(figure: PaperFigure, panels: Sequence[BandPanel]) -> Any:
     drawing = extra("matplotlib.figure").Figure(figsize=(WIDE * across, HIGH * down), layout="constrained")
     axes = drawing.subplots(down, across, squeeze=False).ravel()
     for axis, panel in zip(axes, panels, strict=False):
-        _panel(axis, panel, figure.band)
+        _panel(axis, panel, figure)
     for axis in axes[len(panels) :]:
         axis.set_axis_off()
     if len(panels[0].levels) > 1:
         axes[0].legend(title=drawn(figure.by), fontsize=8, handlelength=2.5)
+    if figure.hatched != "none" and any(panel.uncertain for panel in panels):
+        _legend_of_bands(drawing, figure, across)
     return drawing
 
 
-def _panel(axis: Any, panel: BandPanel, band: str) -> None:
+def _legend_of_bands(drawing: Any, figure: PaperFigure, across: int) -> None:
+    """Say below all panels which band is which."""
+    patch = extra("matplotlib.patches").Patch
+    kinds = (
+        [(patch(facecolor=INK, alpha=0.2, linewidth=0), FILLED[figure.band])] if figure.band in FILLED else []
+    )
+    kinds.append(
+        (patch(fill=False, edgecolor=INK, hatch=HATCHES[0], linewidth=EDGE), HATCHED[figure.hatched])
+    )
+    handles, texts = zip(*kinds, strict=True)
+    drawing.legend(handles, texts, loc="outside lower left", ncols=across, fontsize=8, handlelength=2.5)
+
+
+def _panel(axis: Any, panel: BandPanel, figure: PaperFigure) -> None:
     for number, (level, found) in enumerate(panel.levels.items()):
         if found.each.shape[1] == 1:
             _dots(axis, number, level, found)
         else:
-            _curve(axis, number, level, found, band)
+            _curve(axis, number, level, found, figure.band)
+            if level in panel.uncertain and figure.hatched != "none":
+                _hatched(axis, number, found, getattr(panel.uncertain[level], figure.hatched))
     axis.set_title(drawn(panel.column, 48), fontsize=9)
     axis.set_ylabel(panel.unit)
     if next(iter(panel.levels.values())).each.shape[1] == 1:
@@ -132,6 +179,13 @@ def _curve(axis: Any, number: int, level: str, found: Spread, band: str) -> None
         else (found.mean - found.deviation, found.mean + found.deviation)
     )
     axis.fill_between(percent, low, high, color=colour(number), alpha=0.2, linewidth=0)
+
+
+def _hatched(axis: Any, number: int, found: Spread, deviation: Array) -> None:
+    percent = np.linspace(0, 100, found.each.shape[1])
+    edge, hatch = colour(number), HATCHES[number % len(HATCHES)]
+    low, high = found.mean - deviation, found.mean + deviation
+    axis.fill_between(percent, low, high, facecolor="none", edgecolor=edge, hatch=hatch, linewidth=EDGE)
 
 
 def _dots(axis: Any, number: int, level: str, found: Spread) -> None:

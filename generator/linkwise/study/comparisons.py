@@ -11,7 +11,7 @@ from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import one_line
 from linkwise.extras import extra
-from linkwise.study.patterns import fitting
+from linkwise.study.deviation_columns import fitting_values
 from linkwise.study.plan import Comparison
 from linkwise.study.spread import Spread, columns_of_trials, spread, values_of
 from linkwise.study.summary import TrialSummary
@@ -66,8 +66,11 @@ def compared(
 
 
 def compared_columns(comparison: Comparison, names: Iterable[str]) -> list[str]:
-    """Return those of the columns `names` that are compared; raise LinkwiseError for unknown ones."""
-    return fitting("[[compare]]", names, comparison.columns)
+    """Return those of the columns `names` that are compared, deviations left out.
+
+    Raises LinkwiseError for unknown columns, and for a pattern that fits deviations alone.
+    """
+    return fitting_values("[[compare]]", names, comparison.columns)
 
 
 def _of_column(comparison: Comparison, trials: Sequence[TrialSummary], name: str, unit: str) -> Compared:

@@ -18,6 +18,7 @@ from linkwise.analysis.logs.checks import named_once
 from linkwise.arrays import Array, Index, Mask
 from linkwise.errors import LinkwiseError, within
 from linkwise.extras import extra
+from linkwise.study.deviation_columns import is_deviation
 from linkwise.study.ledger import CURVES
 from linkwise.study.paths import opened_here
 from linkwise.study.plan import Cycles, StudyPlan
@@ -102,12 +103,14 @@ class CycleSink:
 
     Blocks have columns in rows, the time first; spans ascend; take(number, points, samples) receives
     points (columns, points), and the samples from end to end (columns, samples), the time among them; a
-    cubic spline through samples is what there is between them
+    cubic spline through samples is what there is between them, of columns `squared` the root of that through
+    their squares: a deviation has a kink where it is 0, and would come out negative beside it
     """
 
     spans: Sequence[Span]
     points: int
     take: Callable[[int, Array, Array], None]
+    squared: Sequence[int] = ()
     _kept: list[Array] = field(default_factory=list)
     _next: int = 0
 
@@ -138,12 +141,20 @@ class CycleSink:
                 there = there[:, first:]
                 break
             part: Any = there[:, first : last + MARGIN]
-            spline = extra("scipy.interpolate").CubicSpline(part[0], part, axis=1)
-            points = spline(np.linspace(start, end, self.points))
+            points = self._between(part, np.linspace(start, end, self.points))
             inside = part[:, (part[0] > start) & (part[0] < end)]
             self.take(self._next, points, np.concatenate([points[:, :1], inside, points[:, -1:]], axis=1))
             self._next += 1
         self._kept = [there.copy()]
+
+    def _between(self, samples: Array, time: Array) -> Array:
+        """Return what samples (columns, samples) are at other times, (columns, points)."""
+        squared = list(self.squared)
+        smooth = samples.copy()
+        smooth[squared] **= 2
+        points: Array = extra("scipy.interpolate").CubicSpline(samples[0], smooth, axis=1)(time)
+        points[squared] = np.sqrt(np.maximum(points[squared], 0.0))
+        return points
 
 
 class TrialCycles:
@@ -166,7 +177,8 @@ class TrialCycles:
         self._moments = RunningMoments(len(self._names) * self._points)
         with within(job.source):
             spans = [] if plan.cycles is None else cycle_spans(plan.cycles, job, plan.trials[0].name)
-        self.sink = CycleSink(spans, self._points, self._take)
+        squared = [at for at, name in enumerate(self._names) if is_deviation(name)]
+        self.sink = CycleSink(spans, self._points, self._take, squared)
 
     @property
     def count(self) -> int:

@@ -18,6 +18,7 @@ from linkwise.package.decode import filled, known_keys, toml_value
 from linkwise.robot import Options
 from linkwise.robot.readers.toml.table import tables
 from linkwise.study.cycles import written_cycles
+from linkwise.study.deviations import SD_COLUMNS
 from linkwise.study.paths import is_address, require_there, resolved
 from linkwise.study.patterns import expanded
 from linkwise.study.plan import OF_FILES, SUBJECT, Comparison, Cycles, PaperFigure, StudyPlan, Trial
@@ -37,7 +38,7 @@ COLUMNS = (
         "subjects",
         "trials",
     ),
-    *(f"{over}{name}" for over in ("", "trials_") for name in STATISTICS),
+    *(f"{over}{name}" for over in ("", "trials_") for name in (*STATISTICS, *SD_COLUMNS)),
 )
 """Names of columns of tables, besides the factors."""
 TOP = [

@@ -127,19 +127,26 @@ class StudyMark:
     """Hash of everything that `files` depend on; empty while they are not made."""
     files: tuple[str, ...]
     """Names of the files in the folder, besides trials."""
+    uncertain: Mapping[str, object]
+    """Assumptions about what is uncertain; empty where nothing is."""
 
     @classmethod
     def begun(cls, plan: StudyPlan, files: Sequence[str]) -> "StudyMark":
         """Return the mark of a study at work, whose folder has files of a former run."""
-        return cls(plan.name, "begun", plan.factors, _trials(plan), {}, "", tuple(files))
+        return cls(plan.name, "begun", plan.factors, _trials(plan), {}, "", tuple(files), {})
 
     @classmethod
     def done(
-        cls, plan: StudyPlan, broken: Sequence[TrialOutcome], key: str, files: Sequence[str]
+        cls,
+        plan: StudyPlan,
+        broken: Sequence[TrialOutcome],
+        key: str,
+        files: Sequence[str],
+        uncertain: Mapping[str, object],
     ) -> "StudyMark":
         """Return the mark of a study whose trials are done or broken."""
         reasons = {one.name: one.reason for one in broken}
-        return cls(plan.name, "done", plan.factors, _trials(plan), reasons, key, tuple(files))
+        return cls(plan.name, "done", plan.factors, _trials(plan), reasons, key, tuple(files), uncertain)
 
     @classmethod
     def read(cls, out: Path) -> "StudyMark | None":
@@ -152,7 +159,10 @@ class StudyMark:
         if not is_file(path):
             return None
         try:
-            mark = decode(cls, parse_json(read_back(path)), "")
+            data = parse_json(read_back(path))
+            if isinstance(data, dict):
+                data.setdefault("uncertain", {})  # that of an earlier linkwise has no such entry
+            mark = decode(cls, data, "")
             for name in mark.files:
                 is_plain = is_inside(name) and "/" not in name
                 require(is_plain and is_of_study(name), f"{name!r} among 'files'", "a name of a study's file")

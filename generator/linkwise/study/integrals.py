@@ -11,8 +11,8 @@ import numpy as np
 from linkwise.analysis.integrals import parted_integrals
 from linkwise.analysis.result_rows import Column
 from linkwise.arrays import Array, Index
+from linkwise.study.deviation_columns import fitting_values, is_deviation
 from linkwise.study.ledger import CYCLES
-from linkwise.study.patterns import fitting
 from linkwise.study.plan import StudyPlan
 from linkwise.study.summary import RunningMoments
 from linkwise.study.tables import CYCLE, TrialTable, kept_columns
@@ -27,14 +27,15 @@ AT_ONCE = 4096
 def integrated_columns(plan: StudyPlan, columns: Sequence[Column]) -> list[int]:
     """Return the numbers of columns that are integrated over cycles: those asked for, or of power and kept.
 
-    Raises LinkwiseError for a pattern that fits none.
+    Deviations are not among them. Raises LinkwiseError for a pattern that fits none, or deviations alone.
     """
     if plan.cycles is None:
         return []
     if not plan.cycles.integrals:
-        return [at for at in kept_columns(columns, plan.columns) if columns[at].unit == "W"]
+        kept = kept_columns(columns, plan.columns)
+        return [at for at in kept if columns[at].unit == "W" and not is_deviation(columns[at].name)]
     numbers = {column.name: at for at, column in enumerate(columns) if column.name != "time"}
-    return [numbers[name] for name in fitting("[cycles]: 'integrals'", numbers, plan.cycles.integrals)]
+    return [numbers[name] for name in fitting_values("[cycles]: 'integrals'", numbers, plan.cycles.integrals)]
 
 
 def integral_columns(plan: StudyPlan, columns: Sequence[Column]) -> list[Column]:

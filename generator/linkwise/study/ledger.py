@@ -40,6 +40,8 @@ class TrialRecord:
     warnings: tuple[str, ...]
     outputs: Mapping[str, int]
     """Bytes of the other files of its folder, by name."""
+    uncertain: Mapping[str, object] | None
+    """Assumptions about what is uncertain; none where nothing is."""
 
     def text(self) -> str:
         """Return the record as JSON."""

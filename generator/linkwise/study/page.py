@@ -1,6 +1,6 @@
 """`study.html`: bands of a study's groups, its tests, and links to each trial's own page."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
@@ -12,6 +12,7 @@ from linkwise.escape import printable, script_data
 from linkwise.plotstyle import COLOURS, ON_DARK
 from linkwise.render import render
 from linkwise.study.comparisons import Compared
+from linkwise.study.deviation_columns import RANDOM, WHOLE, is_deviation
 from linkwise.study.folder import TRIALS
 from linkwise.study.ledger import PAGE, TrialRecord
 from linkwise.study.plan import StudyPlan
@@ -35,16 +36,26 @@ def study_page(
 ) -> str:
     """Return the page as HTML; its links are relative to the study's folder."""
     columns, left_out = _columns(trials)
+    curves = {name for one in trials for name in one.curves}
+    beside = [one for name in columns for one in _beside(curves, name)]
+    places = {name: at for at, name in enumerate((*columns, *beside))}
     labels = {trial.name: dict(trial.labels) for trial in plan.trials}
     data = {
         "name": printable(plan.name),
         "factors": list(plan.factors),
         "points": 1 if plan.cycles is None else plan.cycles.points,
         "columns": [
-            {"name": printable(name), "unit": unit, "isCurve": any(name in one.curves for one in trials)}
+            {
+                "name": printable(name),
+                "unit": unit,
+                "isCurve": name in curves,
+                "sd": places.get(f"{WHOLE}{name}", -1),
+                "random": places.get(f"{RANDOM}{name}", -1),
+            }
             for name, unit in columns.items()
         ],
-        "values": encoded(_values(trials, list(columns)), "<f4"),
+        "width": len(places),
+        "values": encoded(_values(trials, list(places)), "<f4"),
         "trials": [_trial(trial, folders[trial.name]) for trial in trials],
         "broken": [
             {"name": printable(one.name), "labels": labels[one.name], "reason": printable(one.reason)}
@@ -59,17 +70,27 @@ def study_page(
 
 
 def _columns(trials: Sequence[TrialSummary]) -> tuple[dict[str, str], str]:
-    """Return columns by name with their units, torques first, and a note on those left out."""
-    known = columns_of_trials(trials)
+    """Return columns by name with their units, torques first, and a note on those left out.
+
+    Deviations stand beside their columns, and take places of these.
+    """
+    known = {name: unit for name, unit in columns_of_trials(trials).items() if not is_deviation(name)}
     points = max((len(curve) for trial in trials for curve in trial.curves.values()), default=1)
     most = max(1, NUMBERS // (points * len(trials)))
     order = sorted(
         known, key=lambda name: next((k for k, start in enumerate(FIRST) if name.startswith(start)), 2)
     )
-    kept = {name: known[name] for name in order[:most]}
+    curves = {name for one in trials for name in one.curves}
+    wide = np.cumsum([1 + len(_beside(curves, name)) for name in order])
+    kept = {name: known[name] for name in order[: max(1, int(np.searchsorted(wide, most, side="right")))]}
     if len(kept) == len(known):
         return kept, ""
     return kept, f"{len(kept)} of {len(known)} quantities are on this page; curves.parquet has all of them."
+
+
+def _beside(curves: Container[str], name: str) -> list[str]:
+    """Return the deviation of a column's curve and its random part, as far as curves have them."""
+    return [whole for beside in (WHOLE, RANDOM) if (whole := f"{beside}{name}") in curves]
 
 
 def _values(trials: Sequence[TrialSummary], names: Sequence[str]) -> Array:

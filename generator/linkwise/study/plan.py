@@ -74,12 +74,17 @@ class Comparison:
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """A figure of mean curves with bands, one for each level of a factor."""
+    """A figure of mean curves with bands, one for each level of a factor.
+
+    `band` is what is filled, between subjects; `hatched` the deviation by what is uncertain, where there is
+    one: within a trial, of the mean, or of the truth of a new subject.
+    """
 
     columns: tuple[str, ...]
     by: str = ""
     name: str = ""
     band: Literal["deviation", "range", "none"] = "deviation"
+    hatched: Literal["within", "mean", "new", "none"] = "within"
 
     def __post_init__(self) -> None:
         if not self.columns:

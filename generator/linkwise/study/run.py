@@ -18,6 +18,7 @@ from linkwise.output import passing_folder, require_writable, write_files
 from linkwise.progress import Progress, silent
 from linkwise.study.band_figure import figure_columns
 from linkwise.study.comparisons import compared_columns
+from linkwise.study.deviations import assumptions
 from linkwise.study.file import read_study
 from linkwise.study.folder import StudyMark, held_study, refuse_unless_study, sweep_trials, trial_folders
 from linkwise.study.inputs import trial_here
@@ -106,7 +107,8 @@ def _done(
     broken = tuple(sorted((one for one in outcomes if one.reason), key=lambda one: one.name))
     failed = {one.name for one in broken}
     done = tuple(trial.name for trial in plan.trials if trial.name not in failed)
-    key = _key(plan, folders, done, broken)
+    records = [record for name in done if (record := TrialRecord.read(folders[name])) is not None]
+    key = _key(plan, records, broken)
     there = former.files_in(out) if former else ()
     if (
         former
@@ -119,7 +121,7 @@ def _done(
         return StudyOutcome(plan, done, 0, 0, broken, warnings, there)
     content, lacking = study_files(plan, {name: folders[name] for name in done}, broken, progress)
     # What is missing, such as a library, may be there next time; until then it is reported each time.
-    mark = StudyMark.done(plan, broken, "" if lacking else key, list(content))
+    mark = StudyMark.done(plan, broken, "" if lacking else key, list(content), assumptions(records))
     files = write_files(out, {**content, MARK: mark.text()})
     for file in set(there) - set(files):
         file.unlink(missing_ok=True)
@@ -127,12 +129,9 @@ def _done(
     return StudyOutcome(plan, done, len(outcomes) - len(broken), samples, broken, told, files)
 
 
-def _key(
-    plan: StudyPlan, folders: Mapping[str, Path], done: Sequence[str], broken: Sequence[TrialOutcome]
-) -> str:
+def _key(plan: StudyPlan, records: Sequence[TrialRecord], broken: Sequence[TrialOutcome]) -> str:
     """Return the hash of all that tables, tests, figures and the page depend on."""
-    records = [TrialRecord.read(folders[name]) for name in done]
-    keys = [record.key for record in records if record is not None]
+    keys = [record.key for record in records]
     return sha256(json.dumps([repr(plan), keys, repr(broken), fingerprint()]).encode()).hexdigest()
 
 

@@ -1,6 +1,6 @@
 """Means, deviations and ranges over subjects; a subject's value is the mean of its trials."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +34,11 @@ class Spread:
         return _deviation(self.each)
 
     @property
+    def trials_deviation(self) -> Array:
+        """Standard deviation over trials, whosever they are; NaN for one trial."""
+        return _deviation(self.every)
+
+    @property
     def rows(self) -> dict[str, Array]:
         """Mean, deviation and range over subjects, then over all trials of any subject."""
         return {
@@ -42,7 +47,7 @@ class Spread:
             "min": self.each.min(axis=0),
             "max": self.each.max(axis=0),
             "trials_mean": self.every.mean(axis=0),
-            "trials_std": _deviation(self.every),
+            "trials_std": self.trials_deviation,
             "trials_min": self.every.min(axis=0),
             "trials_max": self.every.max(axis=0),
         }
@@ -70,12 +75,21 @@ def groups_of(trials: Sequence[TrialSummary]) -> dict[Group, list[TrialSummary]]
 
 def spread(trials: Sequence[TrialSummary], values: Mapping[str, Array]) -> Spread:
     """Return the spread over subjects of arrays by trial."""
-    by_subject: dict[str, list[Array]] = {}
+    own = {
+        subject: [values[trial.name] for trial in some]
+        for subject, some in by_subject(trials, values).items()
+    }
+    each = np.stack([np.mean(some, axis=0) for some in own.values()])
+    return Spread(tuple(own), np.stack([one for some in own.values() for one in some]), each)
+
+
+def by_subject(trials: Sequence[TrialSummary], names: Container[str]) -> dict[str, list[TrialSummary]]:
+    """Return the trials of these names by their subject, in the order in which subjects occur."""
+    found: dict[str, list[TrialSummary]] = {}
     for trial in trials:
-        if trial.name in values:
-            by_subject.setdefault(trial.labels[SUBJECT], []).append(values[trial.name])
-    each = np.stack([np.mean(some, axis=0) for some in by_subject.values()])
-    return Spread(tuple(by_subject), np.stack([one for some in by_subject.values() for one in some]), each)
+        if trial.name in names:
+            found.setdefault(trial.labels[SUBJECT], []).append(trial)
+    return found
 
 
 def columns_of_trials(trials: Sequence[TrialSummary]) -> dict[str, str]:

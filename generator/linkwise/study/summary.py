@@ -9,6 +9,7 @@ import numpy as np
 
 from linkwise.analysis.logs.checks import read_as
 from linkwise.arrays import Array
+from linkwise.study.deviation_columns import is_deviation
 from linkwise.study.ledger import CURVES, SUMMARY
 from linkwise.study.paths import require_own
 from linkwise.study.plan import StudyPlan
@@ -27,7 +28,7 @@ class TrialSummary:
     units: dict[str, str]
     statistics: dict[str, Array]
     curves: dict[str, Array]
-    """Mean curve of each column, (points,); empty without cycles."""
+    """Mean curve of each column, (points,), of deviations the root mean square; empty without cycles."""
     cycles: int
 
     @classmethod
@@ -41,7 +42,9 @@ class TrialSummary:
         cycles = 0
         if (folder / CURVES).exists():
             with _arrays(folder / CURVES) as data:
-                curves = dict(zip(data["names"].tolist(), data["curves"][0], strict=True))
+                names, (mean, std) = data["names"].tolist(), data["curves"]
+                squared = np.array([is_deviation(name) for name in names])[:, None]
+                curves = dict(zip(names, np.where(squared, np.hypot(mean, std), mean), strict=True))
                 cycles = int(data["cycles"])
         return cls(name, dict(labels), units, statistics, curves, cycles)
 

@@ -12,12 +12,16 @@ import numpy as np
 from linkwise.analysis.result_rows import Column
 from linkwise.arrays import Array, Index
 from linkwise.extras import extra
+from linkwise.study.deviation_columns import is_deviation
+from linkwise.study.deviations import SD_COLUMNS, deviations, have_deviations, trial_deviations
 from linkwise.study.patterns import fitting
 from linkwise.study.spread import Spread, columns_of_trials, groups_of, spread
 from linkwise.study.summary import STATISTICS, TrialSummary
 
 CYCLE, PERCENT = "cycle", "percent"
 
+OVER = ("", "trials_")
+"""Beginnings of the names of columns over subjects, and over trials."""
 AT_ONCE = 50_000
 """Rows of a table that are written at a time."""
 
@@ -107,21 +111,39 @@ def group_rows(trials: Sequence[TrialSummary]) -> Iterator[dict[str, Any]]:
 
 
 def curve_rows(trials: Sequence[TrialSummary], points: int) -> Iterator[dict[str, Any]]:
-    """Yield, for each group and column, its curve over subjects, one point a row."""
+    """Yield, for each group and column, its curve over subjects, one point a row.
+
+    Deviations are no rows but columns of their own, if any trial has some: NaN where a trial of the group has
+    none.
+    """
     percent = np.linspace(0, 100, points)
+    unknown = {f"{over}{name}": np.full(points, np.nan) for over in OVER for name in SD_COLUMNS}
+    beside = unknown if have_deviations(trials) else {}
     for group, members in groups_of(trials).items():
         for name, unit in columns_of_trials(members).items():
             there = {one.name: one.curves[name] for one in members if name in one.curves}
-            if not there:
+            if not there or is_deviation(name):
                 continue
             found = spread(members, there)
             about, rows = {**dict(group), "column": name, "unit": unit, **_counts(found)}, found.rows
+            rows |= beside | _deviation_rows(members, name, found)
             for at, place in enumerate(percent):
                 yield (
                     about
                     | {"percent": float(place)}
                     | {key: float(values[at]) for key, values in rows.items()}
                 )
+
+
+def _deviation_rows(members: Sequence[TrialSummary], name: str, found: Spread) -> dict[str, Array]:
+    """Return deviations over subjects, then over trials; none where a trial has none."""
+    some = deviations(members, name, found), trial_deviations(members, name, found)
+    return {
+        key: values
+        for over, one in zip(OVER, some, strict=True)
+        if one is not None
+        for key, values in one.rows(over).items()
+    }
 
 
 def _counts(found: Spread) -> dict[str, int]:

@@ -130,6 +130,7 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         seconds,
         warnings,
         outputs_in(draft),
+        analysis.uncertain,
     )
 
 
