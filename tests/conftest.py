@@ -108,7 +108,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
     These take longest: the last file to begin would run alone.
     """
-    items.sort(key=lambda item: 0 if item.path.name == COMPILES else 1 if item.path.parent.name == "study" else 2)
+
+    def turn(item: pytest.Item) -> int:
+        return 0 if item.path.name == COMPILES else 1 if item.path.parent.name == "study" else 2
+
+    items.sort(key=turn)
 
 
 def pytest_collection_finish() -> None:

@@ -25,6 +25,8 @@ from linkwise.extras import extra
 
 FORGOTTEN = 1e-6
 """Fraction of a filter's initial transient that is left behind the padding."""
+LONGEST_MEMORY = 1 << 16
+"""Most samples that a filter remembers."""
 
 
 def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536, flag: str = "--cutoff") -> None:
@@ -39,7 +41,7 @@ def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536, flag: s
         raise LinkwiseError(
             f"{flag} {settings.cutoff:g} Hz is not below half the sampling rate of {rate:g} Hz; lower it"
         )
-    sos = signal.butter(settings.order, settings.cutoff, fs=rate, output="sos")
+    sos = _sections(rate, settings)
     try:
         rest = signal.sosfilt_zi(sos)[:, :, None]
     except np.linalg.LinAlgError:  # its poles round to 1
@@ -78,9 +80,24 @@ def padding_length(sos: Array, samples: int) -> int:
         raise LinkwiseError(
             f"{samples} samples are too few for the filter's padding of {least}; lower --filter-order"
         )
+    return min(max(least, _decay(sos, samples)), samples - 1)
+
+
+def filter_memory(rate: float, settings: Lowpass) -> int:
+    """Return the number of samples after which the filter has forgotten one, at `rate` Hz."""
+    return _decay(_sections(rate, settings), LONGEST_MEMORY)
+
+
+def _decay(sos: Array, otherwise: int) -> int:
+    """Return the number of samples after which a transient is gone; otherwise: of one that stays."""
     slowest = max(abs(np.roots(section[3:])).max() for section in sos)
-    decay = math.ceil(math.log(FORGOTTEN) / math.log(slowest)) if slowest < 1.0 else samples
-    return min(max(least, decay), samples - 1)
+    return math.ceil(math.log(FORGOTTEN) / math.log(slowest)) if slowest < 1.0 else otherwise
+
+
+def _sections(rate: float, settings: Lowpass) -> Array:
+    """Return the sections of second order of one pass."""
+    found: Array = extra("scipy.signal").butter(settings.order, settings.cutoff, fs=rate, output="sos")
+    return found
 
 
 def _passed(sos: Array, x: Array, state: Array) -> tuple[Array, Array]:

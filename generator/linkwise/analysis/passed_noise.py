@@ -6,7 +6,7 @@ positions x. Noise of these, independent from sample to sample with deviation si
     sigma^2 G_t        G_t = [A_t; B_t; C_t] [A_t; B_t; C_t]^T
 
 What the filter takes away, x - A x, has the variance sigma^2 (1 - 2 A_tt + |A_t|^2), by which noise is
-estimated from it. The sums are what filter and derivatives make of single ones: of all samples of a short log,
+estimated from it. The sums are what filter and derivatives make of single ones: of all samples of a short log
 and of a long one near its ends and in its middle, between which they are the same.
 """
 
