@@ -10,12 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from linkwise.analysis.result_quantities import DEVIATION_OF, MOTION
+from linkwise.analysis.result_quantities import DEVIATION_OF, MOTION, TERMS
 from linkwise.analysis.result_rows import Column, ResultRows
 from linkwise.arrays import Array, Index
 
 DEVIATIONS = 2.0
 """Standard deviations at which a sign counts as certain: one normal value in 44 is further off that way."""
+TORQUES = ("tau", "tau_link", *TERMS)
+"""Torques whose largest magnitudes are looked for."""
 SMALL = 1e-3
 """Part of a joint's largest torque below which no share of it is listed."""
 
@@ -53,7 +55,7 @@ class LargestTorques:
         numbers = [
             (rows[torque].numbers, rows[name].numbers)
             for name, torque in DEVIATION_OF.items()
-            if name in rows
+            if name in rows and torque in TORQUES
         ]
         none: Index = np.zeros(0, np.intp)
         self._rows = rows

@@ -1,24 +1,38 @@
-"""Rows of a result that hold standard deviations of torques, where bodies are uncertain.
+"""Rows of a result that hold standard deviations, where bodies, motion or loads are uncertain.
 
-A deviation stands for each τ_i, τ_ij and share of it by acceleration, velocity and gravity. Springs, damping,
-friction, armature and loads, which are part of τ_i too, count as certain.
+What bodies do to torques of an open tree, and to their powers, is known exactly from regressors; everything
+else by perturbing what is uncertain, see `perturbed_rows`. All three are independent of each other.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from linkwise_runtime.certainty.share_deviations import ShareDeviations, share_deviations
 
+from linkwise.analysis.loads.placed import LoadShift
 from linkwise.analysis.opened_robot import OpenedRobot
-from linkwise.analysis.result_quantities import DEVIATION_OF
-from linkwise.analysis.result_rows import Place, ResultRows
+from linkwise.analysis.perturbed_robots import perturbed_robots
+from linkwise.analysis.perturbed_rows import AT_ONCE, Direction, variances
+from linkwise.analysis.result_quantities import DEVIATION_OF, NOISE_OF, OF_BODIES, OF_LOADS, TORQUE_OF
+from linkwise.analysis.result_rows import Place
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.term_rows import TermArrays
-from linkwise.analysis.uncertain_file import UncertainRobot
-from linkwise.arrays import Array
+from linkwise.analysis.uncertain_file import is_closed_form
+from linkwise.analysis.uncertain_inputs import UncertainInputs
+from linkwise.arrays import Array, Index
+
+if TYPE_CHECKING:
+    from linkwise.analysis.torques import Decomposer
+
+Motion = tuple[Array, Array, Array]
+"""q, qd and qdd, (S, n) each."""
+
+
+Some = slice | Index
+"""Rows, as a slice where they follow each other."""
 
 
 @dataclass(frozen=True)
@@ -26,42 +40,131 @@ class DeviationRows:
     """Fills the rows of deviations; none where nothing is uncertain."""
 
     robot: OpenedRobot
-    uncertain: UncertainRobot | None
+    uncertain: UncertainInputs
     convention: Convention
     sources: TermArrays
     """Places of the rows of τ_ij and its terms among packed values, in the order of rows."""
 
-    def places(self, torques: Sequence[Place]) -> Iterator[Place]:
-        """Yield the place of a deviation for each of these torques that has one."""
-        if self.uncertain is not None:
-            for deviation, torque in DEVIATION_OF.items():
-                yield from ((deviation, at) for name, at in torques if name == torque)
+    def places(self, others: Sequence[Place]) -> Iterator[Place]:
+        """Yield the place of a deviation for each of these rows that has one, then of its part by motion."""
+        wanted, given = self._wanted, self.uncertain
+        apart = given.motion is not None and (given.bodies is not None or any(given.loads))
+        for of in (DEVIATION_OF, NOISE_OF) if apart else (DEVIATION_OF,):
+            for deviation, quantity in of.items():
+                if quantity in wanted:
+                    yield from ((deviation, at) for name, at in others if name == quantity)
+
+    @property
+    def _wanted(self) -> frozenset[str]:
+        """Quantities that what is uncertain makes uncertain."""
+        given, every = self.uncertain, frozenset(DEVIATION_OF.values())
+        if given.motion is not None:
+            return every
+        found = OF_BODIES if given.bodies is not None else frozenset()
+        return found | (OF_LOADS if any(given.loads) else frozenset())
 
     @cached_property
-    def deviations(self) -> ShareDeviations:
-        """Deviations of the robot's shares, packed."""
-        assert self.uncertain is not None
-        return share_deviations(self.robot.model.backend, self.uncertain.bodies)
+    def _exact(self) -> ShareDeviations | None:
+        """Deviations of the shares of an open tree by its bodies, packed."""
+        given, robot = self.uncertain.bodies, self.robot
+        if given is None or not is_closed_form(robot):
+            return None
+        return share_deviations(robot.model.backend, given)
 
-    def fill(self, out: Array, rows: ResultRows, q: Array, qd: Array, qdd: Array) -> None:
-        """Fill the rows in `out` (rows, S) for motion (S, n)."""
-        if self.uncertain is None:
+    @cached_property
+    def _bodies(self) -> Sequence[tuple[OpenedRobot, OpenedRobot]]:
+        """Robots whose bodies are off by one standard deviation, one way and the other."""
+        given = self.uncertain.bodies
+        return () if given is None else perturbed_robots(self.robot, given)
+
+    def fill(self, out: Array, decomposer: "Decomposer", time: Array, motion: Motion) -> None:
+        """Fill the rows of deviations in `out` (rows, S), whose other rows are filled.
+
+        motion: q, qd and qdd (S, n) in which ties close
+        """
+        rows = decomposer.rows
+        names = [name for name in DEVIATION_OF if name in rows]
+        if not names:
             return
-        _, motion = self.robot.model.door.read({"q": q, "qd": qd, "qdd": qdd})
-        found: Any = self.deviations.packed(motion, with_sums=False)
+        plain = replace(decomposer, deviations=replace(self, uncertain=UncertainInputs()))
+        into, every = rows.numbers(*names), rows.numbers(*(DEVIATION_OF[name] for name in names))
+        of = together(every)
+        apart = rows.numbers(*(name for name in NOISE_OF if name in rows))
+        exact = {} if self._exact is None else self._of_bodies(self._exact, plain, motion)
+        left = np.array([DEVIATION_OF[name] not in exact for name in names for _ in rows[name].numbers])
+        left &= self.uncertain.bodies is not None
+        for at in range(0, len(time), AT_ONCE):
+            some = slice(at, at + AT_ONCE)
+            q, qd, qdd = motion
+            here: tuple[Array, Motion] = time[some], (q[some], qd[some], qdd[some])
+            values = out[of, some]
+            found = variances(values, self._moved(plain, *here, of))
+            if len(apart):
+                out[apart, some] = np.sqrt(found)
+            found += variances(values, self._loaded(plain, *here, of))
+            if left.any():
+                found[left] += variances(values[left], self._carried(plain, *here, every[left]))
+            out[into, some] = found
+        for name, deviations in exact.items():
+            out[rows.numbers(f"sd/{name}")] += deviations**2
+        out[into] = np.sqrt(out[into])
+
+    def _moved(self, plain: "Decomposer", time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
+        """Yield the directions of motion, along which rows `of` are known."""
+        noise = self.uncertain.motion
+        moves = () if noise is None else noise.directions(time)
+        for number, move in enumerate(moves):
+
+            def rows(size: float, move: Motion = move) -> Array:
+                return plain.values(time, *(a + size * d for a, d in zip(motion, move, strict=True)))[of]
+
+            yield Direction(rows, is_linear=3 * number >= 2 * len(moves))
+
+    def _loaded(self, plain: "Decomposer", time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
+        """Yield the directions of loads."""
+        for e, spread in enumerate(self.uncertain.loads):
+            for shift in () if spread is None else spread.directions():
+
+                def rows(size: float, e: int = e, shift: LoadShift = shift) -> Array:
+                    off = LoadShift(*(size * a for a in shift))
+                    return plain.with_load_off(e, off).values(time, *motion)[of]
+
+                yield Direction(rows)
+
+    def _carried(self, plain: "Decomposer", time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
+        """Yield the directions of bodies."""
+        for two in self._bodies:
+
+            def rows(size: float, two: tuple[OpenedRobot, OpenedRobot] = two) -> Array:
+                return plain.with_robot(two[0 if size > 0 else 1]).values(time, *motion)[of]
+
+            yield Direction(rows, 1.0)
+
+    def _of_bodies(self, exact: ShareDeviations, plain: "Decomposer", motion: Motion) -> dict[str, Array]:
+        """Return deviations by bodies of an open tree, (rows, S), by the quantity that they are of."""
+        rows, (_, qd, qdd) = plain.rows, motion
+        _, at = self.robot.model.door.read(dict(zip(("q", "qd", "qdd"), motion, strict=True)))
+        found: Any = exact.packed(at, with_sums=False)
         c2, c1, gravity, torque, whole = (np.asarray(a) for a in found[:5])
         twice = 2.0 if self.convention == "gradient" else 1.0
-        rows.put(out, "sd/tau", whole)
-        for name, values, places, motions in (
-            ("sd/tau_link", torque, self.sources.torque, None),
-            ("sd/tau_qdd", c2, self.sources.acceleration, np.abs(qdd)),
-            ("sd/tau_qd", c1, self.sources.velocity, twice * np.abs(qd)),
-            ("sd/tau_gravity", gravity, self.sources.gravity, None),
+        answers = {"tau": whole[:, rows["tau"].at[:, 0]].T}
+        for name, values, places, moves in (
+            ("tau_link", torque, self.sources.torque, None),
+            ("tau_qdd", c2, self.sources.acceleration, qdd),
+            ("tau_qd", c1, self.sources.velocity, twice * qd),
+            ("tau_gravity", gravity, self.sources.gravity, None),
         ):
-            entries = rows[name]
-            causes = None if motions is None else entries.at[:, 2].tolist()
-            for number, (row, place) in enumerate(zip(out[entries.rows], places, strict=True)):
-                if motions is None or causes is None:
-                    row[:] = values[:, place]
-                else:
-                    np.multiply(values[:, place], motions[:, causes[number]], out=row)
+            answers[name] = values[:, places].T
+            if moves is not None:
+                answers[name] = answers[name] * np.abs(moves[:, rows[name].at[:, 2]]).T
+        for power, of in TORQUE_OF.items():
+            if of in answers and power in rows:
+                answers[power] = answers[of] * np.abs(qd[:, rows[power].at[:, 0]]).T
+        return answers
+
+
+def together(numbers: Index) -> Some:
+    """Return rows as a slice where they follow each other."""
+    if len(numbers) and (np.diff(numbers) == 1).all():
+        return slice(int(numbers[0]), int(numbers[-1]) + 1)
+    return numbers

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from linkwise.analysis.column_matching import with_columns
 from linkwise.analysis.contacts.times import contact_times, switch_columns
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.induced_points import InducedPlan, induced_points
+from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.loads.read import placed_loads
 from linkwise.analysis.logs import Log, open_log
 from linkwise.analysis.measured_torques import measured_torques, torque_columns
@@ -26,12 +27,15 @@ from linkwise.analysis.request import Request
 from linkwise.analysis.result import AnalysisResult, WholeMovement
 from linkwise.analysis.result_rows import Column
 from linkwise.analysis.samples import Samples, read_samples
-from linkwise.analysis.settings import Reading, choices
+from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import draw
 from linkwise.analysis.stream import Sink, span_of, stream
 from linkwise.analysis.torques import Decomposer, ToldBeside
 from linkwise.analysis.traced_rows import TracedRows
 from linkwise.analysis.uncertain_file import UncertainRobot, read_uncertain
+from linkwise.analysis.uncertain_inputs import UncertainInputs
+from linkwise.analysis.uncertain_loads import LoadSpread
+from linkwise.analysis.uncertain_motion import LONGEST, MotionNoise, motion_noise
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
@@ -92,7 +96,7 @@ class Job:
     closed: ClosedLog | None = None
     """Largest violation of a constraint by positions of the log, where joints are tied."""
     phases: tuple[PlacedPhase, ...] = ()
-    uncertain: UncertainRobot | None = None
+    uncertain: UncertainInputs = field(default_factory=UncertainInputs)
 
     def run(self, sink: Sink, progress: Progress) -> WholeMovement:
         """Analyse every sample, handing the blocks to `sink`."""
@@ -113,7 +117,7 @@ class Job:
             "induced": [point.name for point in self.decomposer.rows.points],
             "trace": None if self.decomposer.traced is None else self.decomposer.traced.record(),
             "reactions": [joint.name for joint in self.decomposer.reactions.borne],
-            "uncertain": None if self.uncertain is None else self.uncertain.record(),
+            "uncertain": self.uncertain.record(),
         }
 
     @property
@@ -138,7 +142,15 @@ class Job:
         """
         robot = self.decomposer.robot
         poles = pole_warnings(robot.tree, robot.joints, self.analysed)
-        warnings = (*self.samples.warnings, *self._twice_borne(), *self._fed(), *poles, *self._never_on(done))
+        found = self.uncertain.warnings
+        warnings = (
+            *self.samples.warnings,
+            *found,
+            *self._twice_borne(),
+            *self._fed(),
+            *poles,
+            *self._never_on(done),
+        )
         return Analysis(
             **vars(done),
             robot=robot,
@@ -156,7 +168,7 @@ class Job:
             closed=self.closed,
             times=self.decomposer.times,
             phases=self.phases,
-            uncertain=None if self.uncertain is None else self.uncertain.record(),
+            uncertain=self.uncertain.record(),
             traced=None if self.decomposer.traced is None else self.decomposer.traced.record(),
         )
 
@@ -219,6 +231,7 @@ def prepared(
     samples, closed = _samples(opened, robot, reading, (*beside, *torques.values()), progress, buffer)
     with within(str(log)):
         start, stop = span_of(samples, processing)
+        raw = samples.q[:LONGEST].copy() if uncertain is not None else samples.q[:0]
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
         slips = tuple(slip_warnings(samples, robot.constrained, processing))
@@ -239,9 +252,32 @@ def prepared(
         measured = measured_torques(opened, torques, robot, *how)
         traced = TracedRows.of(made, robot, borne, samples, measured and measured.some(start, stop))
     planned = InducedPlan(points, outputs.induced_whole)
-    told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, uncertain)
+    inputs = _uncertain(asked.uncertain, uncertain, raw, samples, processing, robot, borne)
+    told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, inputs)
     decomposer = Decomposer.of(robot, processing.convention, borne, times, told)
-    return Job(log.name, asked, samples, decomposer, closed, phases, uncertain)
+    return Job(log.name, asked, samples, decomposer, closed, phases, inputs)
+
+
+def _uncertain(
+    file: Path | None,
+    stated: UncertainRobot | None,
+    raw: Array,
+    samples: Samples,
+    processing: Processing,
+    robot: OpenedRobot,
+    loads: Sequence[PlacedLoad],
+) -> UncertainInputs:
+    """Return all that is uncertain of a log; raw: its first positions, as they were before the filter."""
+    if stated is None:
+        return UncertainInputs()
+    noise: MotionNoise | None = None
+    spreads: tuple[LoadSpread | None, ...] = (None,) * len(loads)
+    with within(str(file)):
+        if stated.motion is not None:
+            noise = motion_noise(stated.motion, raw, samples, processing, robot)
+        if stated.loads is not None:
+            spreads = stated.loads.placed(loads, robot)
+    return UncertainInputs(stated, noise, spreads, tuple(load.name for load in loads))
 
 
 def _samples(

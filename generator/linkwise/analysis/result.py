@@ -258,7 +258,7 @@ class AnalysisResult(WholeMovement):
             parts.append(printable(f"contacts {listed(self.robot.contacts.names)}"))
         parts += [f"loads filtered at {cutoff:g} Hz" for cutoff in cutoffs]
         if self.uncertain is not None:
-            parts.append(printable(f"bodies uncertain as {self.uncertain['file']} says"))
+            parts.append(printable(f"uncertain as {self.uncertain['file']} says"))
             parts += map(printable, self.signs.lines)
         return " · ".join(parts)
 

@@ -28,13 +28,13 @@ TORQUE_OF = {
 POWER, POWER_TERMS = tuple(TORQUE_OF)[:3], tuple(TORQUE_OF)[3:]
 """Power of joints, and parts of it that are in a result only on request; contacts have power of their own, as
 they slip."""
-DEVIATION_OF = {f"sd/{torque}": torque for torque in ("tau", "tau_link", *MOTION, "tau_gravity")}
-"""Standard deviations where bodies are uncertain, and the torques that they are of."""
 FORCE_OF = {torque: torque.replace("tau", "force", 1) for torque in (*PASSIVE, "tau_load")}
 """Constraint forces due to the torques that stand beside those of the links, by torque."""
 FORCES = ("force", "force_link", *FORCE_OF.values())
 GROUND = ("contact", "slip", "force_measured", "tau_as_loads", "power_contact")
 """Quantities of contacts beside the constraint forces."""
+CERTAIN = ("time", "contact", "force_measured", "tau_as_loads", "qd_from", "tau_from", "kinetic_from")
+"""Quantities without deviations: times, what is on, what was measured, what is traced."""
 LOSSES = ("acc_spring", "acc_damping", "acc_friction")
 """Shares of passive torques in an acceleration, in the order of `passive_torque`."""
 
@@ -220,22 +220,15 @@ TABLE = {
     "reaction_friction": ("", "wrench that the joint carries as ties bear joints' own Coulomb friction"),
     "reaction_armature": ("", "wrench that the joint carries as ties bear joints' own armatures"),
     "reaction_load": ("reaction_loads bearing wrench load", "wrench that the joint carries of the load"),
-    "sd/tau": ("", "standard deviation of the joint torque, by the bodies of all links together"),
-    "sd/tau_link": ("", "standard deviation of the partial torque: on the joint, through the link"),
-    "sd/tau_qdd": (
-        "",
-        "standard deviation of the torque on the joint, through the link, by the cause's acceleration",
-    ),
-    "sd/tau_qd": (
-        "",
-        "standard deviation of the torque on the joint, through the link, by the cause's velocity",
-    ),
-    "sd/tau_gravity": ("", "standard deviation of the torque on the joint, through the link, by gravity"),
 }
 """Quantities, in the order of a Dataset: the array there with its axes, and the meaning.
 
 An array without a name is called as in packages, or stands beside others of BY_SOURCE.
 """
+DEVIATION_OF = {f"sd/{name}": name for name in TABLE if name not in CERTAIN}
+"""Standard deviations, and the quantities that they are of."""
+NOISE_OF = {f"sd-motion/{name}": name for name in DEVIATION_OF.values()}
+"""Parts of these by noise of motion, where it is not alone, and the quantities that they are of."""
 BY_SOURCE = {
     "force": (
         "constraint_force_by_source constraint",
@@ -305,6 +298,10 @@ class ResultQuantity:
 def _array(name: str) -> Quantity:
     if name in OF_PACKAGES:
         return OF_PACKAGES[name]
+    for of, suffix in ((DEVIATION_OF, "sd"), (NOISE_OF, "motion_sd")):
+        if name in of:
+            own = _array(of[name])
+            return own._replace(name=f"{own.name}_{suffix}", meaning=f"standard deviation of: {own.meaning}")
     first, _, source = name.partition("_")
     beside = ("source", source) if source in PASSIVE_KINDS else None
     text, meaning = TABLE[name] if beside is None else BY_SOURCE[first]
@@ -313,7 +310,12 @@ def _array(name: str) -> Quantity:
 
 
 QUANTITIES: Mapping[str, ResultQuantity] = {
-    name: ResultQuantity(name, meaning, _array(name)) for name, (_, meaning) in TABLE.items()
+    **{name: ResultQuantity(name, meaning, _array(name)) for name, (_, meaning) in TABLE.items()},
+    **{
+        name: ResultQuantity(name, f"standard deviation{by} of: {TABLE[of][1]}", _array(name))
+        for every, by in ((DEVIATION_OF, ""), (NOISE_OF, " by noise of motion"))
+        for name, of in every.items()
+    },
 }
 """All quantities by name, in the order of a Dataset."""
 REACTION_OF = {torque: torque.replace("tau", "reaction", 1) for torque in PASSIVE}
@@ -341,3 +343,15 @@ WORKS: Mapping[str, Quantity] = {
     for name, (power, meaning) in OVER_MOVEMENT.items()
 }
 """Work over the whole movement."""
+OF_BODIES = frozenset(
+    name
+    for name in DEVIATION_OF.values()
+    if name.partition("_")[0] in ("force", "energy", "gain", "flow", "acc", "reaction")
+) | {*OF_RIGID, "tau", "tau_link", *(power for power, torque in TORQUE_OF.items() if torque in OF_RIGID)}
+OF_BODIES |= {"power", "power_link", "power_contact"}
+"""Quantities that bodies make uncertain."""
+OF_LOADS = frozenset(name for name in OF_BODIES if name not in OF_RIGID and not name.startswith("energy")) | {
+    "tau_load",
+    "power_load",
+}
+"""Quantities that loads make uncertain."""

@@ -16,7 +16,7 @@ from linkwise.analysis.deviation_rows import DeviationRows
 from linkwise.analysis.induced_points import InducedPlan
 from linkwise.analysis.induced_power import PowerShares
 from linkwise.analysis.induced_shares import InducedShares
-from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.loads.placed import LoadShift, PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.reaction_forces import ReactionForces
 from linkwise.analysis.result_quantities import PASSIVE, QUANTITIES, TERMS, TORQUE_OF
@@ -24,12 +24,14 @@ from linkwise.analysis.result_rows import QuantityRows, ResultRows, torque_place
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.term_rows import TermArrays, term_rows
 from linkwise.analysis.traced_rows import ExtendedBlock, TracedRows
-from linkwise.analysis.uncertain_file import UncertainRobot
+from linkwise.analysis.uncertain_inputs import UncertainInputs
 from linkwise.analysis.verify import Closure, residual, worst_of
-from linkwise.arrays import Array
+from linkwise.arrays import Array, Index
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 
+TURNED = 128
+"""Samples that are turned at once."""
 Sum = tuple[int, int, list[int]]
 """Joint and row of a torque, and the rows of what it is the sum of."""
 
@@ -47,8 +49,8 @@ class ToldBeside(NamedTuple):
     """True to tell by source the power of links, and that which flows through joints."""
     traced: TracedRows | None = None
     """Velocities that are traced to their sources."""
-    uncertain: UncertainRobot | None = None
-    """Uncertainty of bodies; None where torques have no deviations."""
+    uncertain: UncertainInputs = UncertainInputs()
+    """Uncertainty of bodies, motion and loads."""
 
 
 NOTHING_BESIDE = ToldBeside()
@@ -115,9 +117,9 @@ class Decomposer:
         velocities = [at for at in places if at[0] == "tau_qd"]
         every = [*places, *power.places, *reactions.places]
         every += [] if traced is None else traced.places(velocities)
-        sources = TermArrays(*([row[-1] for row in some] for some in of_robot))
+        sources = TermArrays(*(np.array([row[-1] for row in some], np.intp) for some in of_robot))
         deviations = DeviationRows(robot, told.uncertain, convention, sources)
-        every += deviations.places(places)
+        every += deviations.places(every)
         bearings, origins = [joint.name for joint in told.borne], () if traced is None else traced.origins
         rows = ResultRows.of(robot, every, loads, points, bearings, origins)
         parts = _sums(rows, "tau_link", *TERMS)
@@ -134,11 +136,36 @@ class Decomposer:
         robot = self.robot.at(time, inputs)
         if robot is self.robot:
             return self
+        return self.with_robot(robot)
+
+    def with_robot(self, robot: OpenedRobot) -> "Decomposer":
+        """Return the decomposer of another robot of the same joints and links."""
         sources = replace(self.induced.sources, robot=robot)
-        induced = replace(self.induced, robot=robot, sources=sources)
-        power = replace(self.power, robot=robot, sources=replace(self.power.sources, robot=robot))
-        forces = replace(self.forces, robot=robot)
-        return replace(self, robot=robot, induced=induced, power=power, forces=forces)
+        return replace(
+            self,
+            robot=robot,
+            induced=replace(self.induced, robot=robot, sources=sources),
+            power=replace(self.power, robot=robot, sources=replace(self.power.sources, robot=robot)),
+            forces=replace(self.forces, robot=robot),
+            reactions=replace(self.reactions, robot=robot),
+        )
+
+    def with_load_off(self, e: int, shift: LoadShift) -> "Decomposer":
+        """Return the decomposer in which load e is off by a shift."""
+        loads = tuple(replace(load, shift=shift) if e == at else load for at, load in enumerate(self.loads))
+        return replace(
+            self,
+            loads=loads,
+            power=replace(self.power, loads=loads),
+            forces=replace(self.forces, loads=loads),
+            reactions=replace(self.reactions, loads=loads),
+        )
+
+    def values(self, time: Array, q: Array, qd: Array, qdd: Array) -> Array:
+        """Return all rows but those of a trace and of deviations, (rows, S); arguments are as of `fill`."""
+        out = np.empty((len(self.rows), len(time)))
+        self._fill(out, time, self._consistent(time, q, qd, qdd))
+        return out
 
     def fill(self, out: Array, time: Array, q: Array, qd: Array, qdd: Array) -> Closure:
         """Fill `out` (rows, S) from time (S,) and q, qd, qdd (S, n); return how well it closes.
@@ -146,7 +173,15 @@ class Decomposer:
         Where joints are tied, the motion of the independent ones counts. Raises LinkwiseError, with the time,
         where ties cannot be closed or joints do not follow.
         """
-        q, qd, qdd = self._consistent(time, q, qd, qdd)
+        motion = self._consistent(time, q, qd, qdd)
+        closure, partial = self._fill(out, time, motion)
+        closure |= self._closure(out, partial)
+        self.deviations.fill(out, self, time, motion)
+        return closure
+
+    def _fill(self, out: Array, time: Array, motion: tuple[Array, Array, Array]) -> tuple[Closure, Array]:
+        """Fill `out` but for deviations; return the errors of induced parts, and tau_ij before contacts."""
+        q, qd, qdd = motion
         packed: Any = self.robot.model.packed(q, qd, qdd)
         standing = self._standing(time, q)
         unborne, free = packed, self.robot.model.inverse_dynamics(q, qd, qdd)
@@ -155,8 +190,8 @@ class Decomposer:
             packed = self.terms.left(packed, standing, q.shape[1])
         out[0] = time
         rows, sources = self.rows, self.sources
-        for name, motion in zip(("q", "qd", "qdd"), (q, qd, qdd), strict=True):
-            rows.put(out, name, motion)
+        for name, moved in zip(("q", "qd", "qdd"), motion, strict=True):
+            rows.put(out, name, moved)
         rows.put(out, "tau", _left(standing, free))
         self._add_passive(out, standing, q, qd, qdd)
         self._add_loads(out, standing, time, q)
@@ -167,16 +202,15 @@ class Decomposer:
             rows.put(out, "tau_share", self.robot.model.named_shares(q, qd))
         else:
             _spread(out, rows["tau_gravity"], packed.gravity, sources.gravity)
-        self.forces.fill(out, rows, standing, time, (q, qd, qdd), partial)
-        closure = self._closure(out, partial) | self.induced.fill(out, unborne, standing, q, qd, qdd)
-        self.reactions.fill(out, rows, standing, time, (q, qd, qdd))
-        closure |= self.power.fill(out, unborne, standing, time, (q, qd, qdd))
+        self.forces.fill(out, rows, standing, time, motion, partial)
+        closure = self.induced.fill(out, unborne, standing, q, qd, qdd)
+        self.reactions.fill(out, rows, standing, time, motion)
+        closure |= self.power.fill(out, unborne, standing, time, motion)
         if self.convention == "gradient":
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
             rows.put(out, "tau_qd", _left(standing, velocity))
         self._fill_power(out, qd)
-        self.deviations.fill(out, rows, q, qd, qdd)
-        return closure
+        return closure, partial
 
     def trace(
         self, out: Array, block: ExtendedBlock, state: TraceState | None
@@ -203,11 +237,8 @@ class Decomposer:
         """Fill the powers P = τ q̇_i from the torques."""
         for name, torque in TORQUE_OF.items():
             if name in self.rows:
-                powers, torques = self.rows[name], self.rows[torque]
-                for power, values, i in zip(
-                    out[powers.rows], out[torques.rows], powers.at[:, 0].tolist(), strict=True
-                ):
-                    np.multiply(values, qd[:, i], out=power)
+                powers = self.rows[name]
+                out[powers.rows] = out[self.rows[torque].rows] * qd.T[powers.at[:, 0]]
 
     def _dense(self, torque: Array, n: int) -> Array:
         """Return tau_ij (S, n, N) from packed values, before contacts carry any; empty without contacts."""
@@ -290,18 +321,19 @@ def _sums(rows: ResultRows, whole: str, *parts: str) -> tuple[Sum, ...]:
 
 
 def _spread(
-    out: Array, entries: QuantityRows, values: Array, places: list[int], motion: Array | None = None
+    out: Array, entries: QuantityRows, values: Array, places: Index, motion: Array | None = None
 ) -> None:
     """Fill rows with the packed values (S, values) at these places, times the cause's motion (S, n) if given.
 
-    It goes row by row, which is faster than at once: no array is made in between.
+    It goes by a few samples, which stay in the nearest cache while they are turned.
     """
-    if motion is None:
-        for row, place in zip(out[entries.rows], places, strict=True):
-            row[:] = values[:, place]
-        return
-    for row, place, k in zip(out[entries.rows], places, entries.at[:, 2].tolist(), strict=True):
-        np.multiply(values[:, place], motion[:, k], out=row)
+    causes = None if motion is None else entries.at[:, 2]
+    for at in range(0, len(values), TURNED):
+        some = slice(at, at + TURNED)
+        found = values[some].T[places]
+        if motion is not None:
+            found *= motion[some].T[causes]
+        out[entries.rows, some] = found
 
 
 def _left(standing: Standing | None, torque: Array) -> Array:

@@ -1,4 +1,4 @@
-"""File that says how uncertain a robot's bodies are: deviations of masses, centres, radii and lengths.
+"""File that says how uncertain a robot's bodies, a log's motion and loads are.
 
 schema = 1
 [all]                        # every link, unless its own table says otherwise
@@ -17,10 +17,10 @@ links = ["upper_arm", "forearm"]
 [correlation]                # of these links' own errors of mass
 links = ["upper_arm", "forearm"]
 matrix = [[1.0, 0.5], [0.5, 1.0]]
+
+[motion], [loads] and [load.NAME] are those of `uncertain_motion` and `uncertain_loads`.
 """
 
-import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,17 +29,20 @@ from typing import Any
 import numpy as np
 from linkwise_runtime.certainty.share_deviations import share_deviations
 from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies, checked_correlation
-from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.stated_sd import place_of, stated
+from linkwise.analysis.uncertain_loads import StatedLoads, read_loads
+from linkwise.analysis.uncertain_motion import StatedNoise, read_motion
 from linkwise.arrays import Array
 from linkwise.bounded_file import toml_data
 from linkwise.errors import LinkwiseError, within
-from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.package.decode import known_keys
 
-TOP = ("schema", "all", "link", "joint", "body_mass", "correlation")
+OF_BODIES = ("all", "link", "joint", "body_mass", "correlation")
+"""Tables about the robot's bodies."""
+TOP = ("schema", *OF_BODIES, "motion", "loads", "load")
 PART, LENGTH = {"%": 0.01}, {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 MASS = {"%": 0.01, "kg": 1.0}
 OF_LINKS = {"mass": MASS, "centre": LENGTH, "radii": PART}
@@ -48,36 +51,36 @@ UNITS = OF_LINKS | {"length": LENGTH}
 """Units of each key, with that of joints."""
 NOT_MODELLED = {
     "axis": "axes of joints count as certain",
-    "motion": "motion counts as certain",
-    "loads": "loads count as certain",
     "preset": "there are no presets; write the numbers of your source",
 }
 """Keys that others might expect, and what is so."""
-CERTAIN = "motion, loads, axes of joints, springs, damping, friction, armature"
-"""All that counts as certain."""
+CERTAIN = "axes of joints, springs, damping, friction, armature"
+"""What counts as certain on every path."""
 LARGEST = 1.0
 """Largest deviation as a part: with more, one normal mass in six is negative."""
-QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([%a-z]+)\s*")
 
 
 @dataclass(frozen=True, eq=False)
 class UncertainRobot:
-    """Uncertainty of the bodies of a robot, as a file says it."""
+    """Uncertainty of a robot's bodies, its motion and its loads, as a file says it."""
 
     file: str
     """Name of the file."""
-    bodies: UncertainBodies
+    bodies: UncertainBodies | None
+    motion: StatedNoise | None
+    loads: StatedLoads | None
     links: tuple[str, ...]
     joints: tuple[str, ...]
     """Joints of the tree."""
 
     def record(self) -> dict[str, Any]:
-        """Return what was assumed as plain data: parts of masses and of radii, centres in m."""
+        """Return what was assumed of bodies as plain data: parts of masses and of radii, centres in m."""
         given = self.bodies
+        if given is None:
+            return {}
         masses, centres, radii = (np.asarray(a).tolist() for a in given[:3])
         told = zip(self.links, masses, centres, radii, strict=True)
         return {
-            "file": self.file,
             "links": [
                 {"name": name, "mass": mass, "centre": centre, "radii": longer}
                 for name, mass, centre, longer in told
@@ -93,18 +96,16 @@ class UncertainRobot:
                 for name, length in zip(self.joints, np.asarray(given.lengths).tolist(), strict=True)
             ],
             "correlation": None if given.correlation is None else np.asarray(given.correlation).tolist(),
-            "certain": CERTAIN,
         }
 
 
 def read_uncertain(path: Path, robot: OpenedRobot) -> UncertainRobot:
-    """Return what a file says of a robot's bodies.
+    """Return what a file says of a robot's bodies, motion and loads.
 
     Raises LinkwiseError, which names file, table and key, for what cannot be read, for deviations and
-    correlations that cannot be, for a link that is not there, and for a robot whose deviations are not
-    modelled: energies written by hand, tied joints, contacts, payloads, the back end autograd.
+    correlations that cannot be, for a link that is not there, and for a robot the deviations of whose bodies
+    are not modelled: energies written by hand, the back end autograd.
     """
-    refuse_unmodelled(robot)
     with within(str(path)):
         require_file(path)
         data = toml_data(path)
@@ -112,25 +113,45 @@ def read_uncertain(path: Path, robot: OpenedRobot) -> UncertainRobot:
             if key in NOT_MODELLED:
                 raise LinkwiseError(f"{key!r} is not modelled: {NOT_MODELLED[key]}; leave it out")
         known_keys("the file", data, TOP)
+        stated = [key for key in TOP[1:] if key in data]
+        if not stated:
+            raise LinkwiseError("nothing is uncertain; give [all], [link.NAME], [motion] or [loads]")
+        motion = read_motion(data["motion"], robot) if "motion" in data else None
+        loads = None
+        if "loads" in data or "load" in data:
+            loads = read_loads(data.get("loads"), data.get("load", {}))
+    bodies = _checked_bodies(path, data, robot) if set(stated) & set(OF_BODIES) else None
+    links = robot.links[: _count(robot)]
+    return UncertainRobot(path.name, bodies, motion, loads, links, robot.tree_joints)
+
+
+def _checked_bodies(path: Path, data: Mapping[str, Any], robot: OpenedRobot) -> UncertainBodies:
+    """Return what a file says of bodies."""
+    refuse_unmodelled(robot)
+    with within(str(path)):
         bodies = _bodies(data, robot)
-        try:
-            share_deviations(robot.model.backend, bodies)
-        except ValueError as error:
-            raise LinkwiseError(str(error)) from None
-    return UncertainRobot(path.name, bodies, robot.links, robot.tree_joints)
+        if is_closed_form(robot):
+            try:
+                share_deviations(robot.model.backend, bodies)
+            except ValueError as error:
+                raise LinkwiseError(str(error)) from None
+        elif np.any(bodies.lengths):
+            raise LinkwiseError(
+                "lengths count where joints are not tied, nothing is held and nothing is carried; leave"
+                " length out, or --contact and --payload"
+            )
+    return bodies
+
+
+def is_closed_form(robot: OpenedRobot) -> bool:
+    """Return whether what bodies do to a robot's torques is known from regressors: of an open tree alone."""
+    return robot.constrained is None and robot.contacts is None and not robot.payloads
 
 
 def refuse_unmodelled(robot: OpenedRobot) -> None:
-    """Raise LinkwiseError for a robot whose shares have no deviations here."""
+    """Raise LinkwiseError for a robot whose bodies cannot be uncertain here."""
     reasons = {
         f"the links of {robot.name} are energies, which do not say what bodies they have": robot.tree is None,
-        f"joints of {robot.name} are tied, whose shares have no deviations yet": robot.constrained
-        is not None,
-        "what contacts leave to the joints has no deviations yet; leave --contact out": robot.contacts
-        is not None,
-        "payloads have no deviations yet; leave --payload out, or describe the load as a link": bool(
-            robot.payloads
-        ),
         "autograd has no regressors; take --backend numpy, torch or native": robot.backend == "autograd",
     }
     for reason, holds in reasons.items():
@@ -152,8 +173,9 @@ def _bodies(data: Mapping[str, Any], robot: OpenedRobot) -> UncertainBodies:
     usual = known_keys("[all]", data.get("all", {}), UNITS)
     own = _named(data, "link", robot.links, OF_LINKS, robot)
     found: dict[str, list[Any]] = {key: [] for key in OF_LINKS}
-    assert robot.tree is not None
-    for name, body in zip(robot.links, robot.tree.links, strict=True):
+    assert robot.package.manifest.tree is not None  # as `refuse_unmodelled` has seen
+    bodies = robot.package.manifest.tree.links
+    for name, body in zip(robot.links[: _count(robot)], bodies, strict=True):
         table = own.get(name, {})
         for key in OF_LINKS:
             place = f"[link.{name}]" if key in table else "[all]"
@@ -179,7 +201,7 @@ def _named(
     if not isinstance(tables, dict):
         raise LinkwiseError(f"{what} must hold tables by name; head each [{what}.NAME]")
     for name, table in tables.items():
-        _place(f"[{what}.{name}]", what, name, names, robot)
+        place_of(f"[{what}.{name}]", what, name, names, robot)
         known_keys(f"[{what}.{name}]", table, keys)
     return tables
 
@@ -190,9 +212,10 @@ def _lengths(data: Mapping[str, Any], usual: Mapping[str, Any], robot: OpenedRob
     That of all is for joints that are off the origin of what carries them: several axes in one place would
     else each have an error of its own.
     """
-    assert robot.tree is not None
+    tree = robot.package.manifest.tree
+    assert tree is not None  # as `refuse_unmodelled` has seen
     own, found = _named(data, "joint", robot.tree_joints, ("length",), robot), []
-    for name, joint in zip(robot.tree_joints, robot.tree.joints, strict=True):
+    for name, joint in zip(robot.tree_joints, tree.joints, strict=True):
         table = own.get(name, {})
         given = table.get("length", usual.get("length") if any(joint.translation) else None)
         place = f"[joint.{name}]" if "length" in table else "[all]"
@@ -208,10 +231,10 @@ def _deviation(place: str, key: str, given: Any, mass: float, link: str) -> Any:
             raise LinkwiseError(
                 f'{place}: {key} has {len(several)} numbers; give "10 mm", or three for x, y, z'
             )
-        return [0.0 if one is None else _quantity(place, key, one)[0] for one in several]
+        return [0.0 if one is None else stated(place, key, one, UNITS[key])[0] for one in several]
     if given is None:
         return 0.0
-    value, unit = _quantity(place, key, given)
+    value, unit = stated(place, key, given, UNITS[key])
     if unit == "kg":
         if not mass > 0:
             raise LinkwiseError(f"{place}: {link!r} has no mass in the robot's file; give a part of it, in %")
@@ -226,15 +249,15 @@ def _deviation(place: str, key: str, given: Any, mass: float, link: str) -> Any:
 def _body_mass(data: Mapping[str, Any], robot: OpenedRobot) -> tuple[float, Array]:
     """Return the deviation of the body mass, and ones for its links."""
     if "body_mass" not in data:
-        return 0.0, np.zeros(len(robot.links))
+        return 0.0, np.zeros(_count(robot))
     place = "[body_mass]"
     table = known_keys(place, data["body_mass"], ("sd", "links"))
     if "sd" not in table:
         raise LinkwiseError(f'{place} needs sd, such as "2 %"')
-    value, _ = _quantity(place, "sd", table["sd"], PART)
+    value, _ = stated(place, "sd", table["sd"], PART)
     if value > LARGEST:
         raise LinkwiseError(f"{place}: sd is {table['sd']}; give 100 % at most")
-    segments = np.zeros(len(robot.links))
+    segments = np.zeros(_count(robot))
     segments[_links(place, table["links"], robot) if "links" in table else slice(None)] = 1.0
     return value, segments
 
@@ -256,7 +279,7 @@ def _correlation(data: Mapping[str, Any], robot: OpenedRobot) -> Array | None:
         own = checked_correlation([robot.links[j] for j in numbers], rows)
     except ValueError as error:
         raise LinkwiseError(f"{place}: {error}") from None
-    whole = np.eye(len(robot.links))
+    whole = np.eye(_count(robot))
     whole[np.ix_(numbers, numbers)] = own
     return whole
 
@@ -265,32 +288,12 @@ def _links(place: str, given: Any, robot: OpenedRobot) -> list[int]:
     """Return the numbers of links that are listed by name."""
     if not isinstance(given, list) or not given or not all(isinstance(name, str) for name in given):
         raise LinkwiseError(f"{place} needs links, a list of their names")
-    found = [_place(place, "link", name, robot.links, robot) for name in given]
+    found = [place_of(place, "link", name, robot.links, robot) for name in given]
     if len(set(found)) < len(found):
         raise LinkwiseError(f"{place}: links names one twice; name each once")
     return found
 
 
-def _place(place: str, what: str, name: str, names: Sequence[str], robot: OpenedRobot) -> int:
-    """Return the number of a link or a joint."""
-    if name not in names:
-        near = listed(nearest_first(name, names))
-        raise LinkwiseError(f"{place}: {robot.name} has no {what} {name!r}; its {what}s are {near}")
-    return names.index(name)
-
-
-def _quantity(
-    place: str, key: str, given: Any, units: Mapping[str, float] | None = None
-) -> tuple[float, str]:
-    """Return a deviation in SI units, parts for %, and the unit as it is written."""
-    known: Sequence[str] = tuple(units or UNITS[key])
-    found = QUANTITY.fullmatch(given) if isinstance(given, str) else None
-    if found is None or found[2] not in known:
-        example = {"mm": '"10 mm"', "%": '"10 %"'}[known[0]]
-        raise LinkwiseError(
-            f"{place}: {key} is {given!r}; write a number and its unit, {' or '.join(known)}, as in {example}"
-        )
-    value = float(found[1])
-    if value < 0 or not math.isfinite(value):
-        raise LinkwiseError(f"{place}: {key} is {given}; a standard deviation is 0 or more, and finite")
-    return value * (units or UNITS[key])[found[2]], found[2]
+def _count(robot: OpenedRobot) -> int:
+    """Return the number of links of the robot's file: payloads, which come last, are certain."""
+    return len(robot.links) - len(robot.payloads)

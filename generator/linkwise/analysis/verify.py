@@ -1,7 +1,7 @@
 """Checks of a result: its parts sum to the whole, and an independent recursion agrees."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
@@ -68,7 +68,7 @@ class Closure:
 
     def __or__(self, other: "Closure") -> "Closure":
         """Return the larger of both, error by error."""
-        a, b = asdict(self), asdict(other)
+        a, b = vars(self), vars(other)
         return Closure(**{name: _larger(a[name], b[name]) for name in a})
 
     def check(self) -> None:

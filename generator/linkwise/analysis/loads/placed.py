@@ -30,6 +30,17 @@ class Wrench(NamedTuple):
     place: Array
 
 
+class LoadShift(NamedTuple):
+    """Change of a load in the axes in which it is given, (3,) each: in N, of its free moment in N·m, in m."""
+
+    force: Array = np.zeros(3)
+    moment: Array = np.zeros(3)
+    point: Array = np.zeros(3)
+
+
+NO_SHIFT = LoadShift()
+
+
 @dataclass(frozen=True)
 class LoadFrame:
     """Frame on which a load acts, and the frames in which its numbers are given, None for the world."""
@@ -60,13 +71,18 @@ class PlacedLoad:
     """Cutoff in Hz of the low-pass filter that was applied, None for none."""
     warnings: tuple[str, ...] = ()
     """Warnings about the file; each names it."""
+    shift: LoadShift = NO_SHIFT
+    """What is added to every row, as errors are."""
 
     def wrench(self, time: Array, q: Array, pose: Pose) -> Wrench:
         """Return the wrench that acts at instants (S,) with the robot at q (S, n)."""
         rows, load_frame = self._at(time), self.acts_on
         force, moment, point = rows[:, FORCE], rows[:, MOMENT], rows[:, POINT]
         if load_frame.in_world:
-            return Wrench(force, moment - np.cross(point, force), point)
+            moment = moment - np.cross(point, force)
+        force, moment, point = (a + b for a, b in zip((force, moment, point), self.shift, strict=True))
+        if load_frame.in_world:
+            return Wrench(force, moment, point)
         if load_frame.axes is not None:
             turn = pose(load_frame.axes, q)[:, :3, :3]
             force, moment = (np.einsum("sab,sb->sa", turn, a) for a in (force, moment))
