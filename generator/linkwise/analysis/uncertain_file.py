@@ -17,12 +17,15 @@ links = ["upper_arm", "forearm"]
 [correlation]                # of these links' own errors of mass
 links = ["upper_arm", "forearm"]
 matrix = [[1.0, 0.5], [0.5, 1.0]]
+
+`covariance_table` says what stands in [covariance].
 """
 
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,15 +34,16 @@ from linkwise_runtime.certainty.share_deviations import share_deviations
 from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies, checked_correlation
 from linkwise_runtime.chosen_names import nearest_first
 
+from linkwise.analysis.covariance_table import covariance_of
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.arrays import Array
-from linkwise.bounded_file import toml_data
+from linkwise.bounded_file import MIB, toml_data
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.package.decode import known_keys
 
-TOP = ("schema", "all", "link", "joint", "body_mass", "correlation")
+TOP = ("schema", "all", "link", "joint", "body_mass", "correlation", "covariance")
 PART, LENGTH = {"%": 0.01}, {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 MASS = {"%": 0.01, "kg": 1.0}
 OF_LINKS = {"mass": MASS, "centre": LENGTH, "radii": PART}
@@ -57,6 +61,8 @@ CERTAIN = "motion, loads, axes of joints, springs, damping, friction, armature"
 """All that counts as certain."""
 LARGEST = 1.0
 """Largest deviation as a part: with more, one normal mass in six is negative."""
+MOST = 32 * MIB
+"""Largest size of a file, in bytes: covariances of robots with many links take some."""
 QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([%a-z]+)\s*")
 
 
@@ -70,6 +76,8 @@ class UncertainRobot:
     links: tuple[str, ...]
     joints: tuple[str, ...]
     """Joints of the tree."""
+    note: str = ""
+    """What the file says of its covariance of parameters, in a line; "" without."""
 
     def record(self) -> dict[str, Any]:
         """Return what was assumed as plain data: parts of masses and of radii, centres in m."""
@@ -93,6 +101,8 @@ class UncertainRobot:
                 for name, length in zip(self.joints, np.asarray(given.lengths).tolist(), strict=True)
             ],
             "correlation": None if given.correlation is None else np.asarray(given.correlation).tolist(),
+            "covariance_of_parameters": given.parameters is not None,
+            "note": self.note,
             "certain": CERTAIN,
         }
 
@@ -107,17 +117,18 @@ def read_uncertain(path: Path, robot: OpenedRobot) -> UncertainRobot:
     refuse_unmodelled(robot)
     with within(str(path)):
         require_file(path)
-        data = toml_data(path)
+        data = toml_data(path, MOST)
         for key in (*data, *(key for table in _tables(data) for key in table)):
             if key in NOT_MODELLED:
                 raise LinkwiseError(f"{key!r} is not modelled: {NOT_MODELLED[key]}; leave it out")
         known_keys("the file", data, TOP)
-        bodies = _bodies(data, robot)
+        parameters, note = covariance_of(data, partial(_links, robot=robot), robot.tree)
+        bodies = _bodies(data, robot)._replace(parameters=parameters)
         try:
             share_deviations(robot.model.backend, bodies)
         except ValueError as error:
             raise LinkwiseError(str(error)) from None
-    return UncertainRobot(path.name, bodies, robot.links, robot.tree_joints)
+    return UncertainRobot(path.name, bodies, robot.links, robot.tree_joints, note)
 
 
 def refuse_unmodelled(robot: OpenedRobot) -> None:

@@ -198,13 +198,19 @@ def share_deviations(backend: ArrayBackend, bodies: object) -> ShareDeviations:
     """
     if any(not hasattr(bodies, name) for name in UncertainBodies._fields):
         raise TypeError(f"bodies is {known_kind(bodies, UncertainBodies)}; give an UncertainBodies")
-    tree, given = cast(JointTree, backend.tree), cast(UncertainBodies, bodies)
-    carried = tree_bodies(tree, backend.parameters, cast(Any, backend.bodies))
+    given = cast(UncertainBodies, bodies)
     try:
-        spread = body_spread(backend.structure.link_names, carried, body_axes(tree), given)
-        return ShareDeviations(backend, spread, length_shifts(tree, given.lengths))
+        shifts = length_shifts(cast(JointTree, backend.tree), given.lengths)
+        return ShareDeviations(backend, spread_of(backend, given), shifts)
     except ValueError as error:
         raise ValueError(f"bodies: {error}") from None
+
+
+def spread_of(backend: ArrayBackend, bodies: UncertainBodies) -> BodySpread:
+    """Return the spread of the bodies of a robot on a back end; raises as `body_spread` does."""
+    tree = cast(JointTree, backend.tree)
+    carried = tree_bodies(tree, backend.parameters, cast(Any, backend.bodies))
+    return body_spread(backend.structure.link_names, carried, body_axes(tree), bodies)
 
 
 def root(xp: Any, variance: Numbers) -> Numbers:

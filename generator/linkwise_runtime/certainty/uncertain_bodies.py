@@ -68,8 +68,8 @@ class BodySpread(NamedTuple):
         if not self.shared.shape[-1]:
             return self.own
         # By QR, as squares would lose what torques tell well beside what they do not.
-        found: Floats = np.linalg.qr(np.concatenate([self.own, self.shared], -1).mT, mode="r").mT
-        return found
+        triangles: Floats = np.asarray(np.linalg.qr(np.concatenate([self.own, self.shared], -1).mT, mode="r"))
+        return triangles.mT
 
     @property
     def factor(self) -> Floats:
