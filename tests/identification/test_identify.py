@@ -297,6 +297,7 @@ def test_the_command_writes_a_page_a_record_and_a_robot(
         "identified.json",
         "identified.md",
         "planar3.urdf",
+        "uncertain.toml",
     ]
     record = json.loads((tmp_path / "out/identified.json").read_text())
     first = record["base_parameters"][0]

@@ -85,8 +85,9 @@ def _matrix(table: Mapping[str, Any], key: str, rows: int, columns: int | None) 
 def _refuse_others(said: Array, numbers: Sequence[int], own: Array, tree: JointTree) -> None:
     """Raise LinkwiseError for parameters that are not the robot's."""
     off = np.abs(said - own[numbers]) / link_sizes(own)[numbers]
-    at, which = divmod(int(np.nan_to_num(off, nan=np.inf).argmax()), PARAMETERS)
-    if not off[at, which] <= APART:
+    apart = np.argwhere(~(off <= APART)).tolist()
+    if apart:
+        at, which = apart[0]
         raise LinkwiseError(
             f"{PLACE} is of other bodies than the robot's: {tree.link_name(numbers[at])!r} has "
             f"{own[numbers[at], which]:.6g}, not {said[at, which]:.6g}, for parameter {which + 1} of ten; "
