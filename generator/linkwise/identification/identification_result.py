@@ -105,12 +105,12 @@ class Identification:
 
     @property
     def unbound_distance(self) -> float:
-        """Distance of the physical bodies from the fit, root mean square of standard errors.
+        """Distance of the physical bodies from the fit, in standard errors (Mahalanobis').
 
-        The fit's covariance is theirs where this is small: conditions on bodies then hold by themselves.
+        Where it is 1 or more, conditions on bodies have moved them, and the fit's covariance is not quite theirs.
         """
         off = self.base.combinations @ self.physical.pi.reshape(-1) - self.fit.beta
-        return float(np.sqrt(np.mean((base_triangle(self.fit, self.base) @ off) ** 2)))
+        return float(np.linalg.norm(base_triangle(self.fit, self.base) @ off))
 
     def errors(self, equations: JointEquations) -> dict[str, Array]:
         """Return the root mean square error of each joint's torque, (n,), by fit, bodies and package."""

@@ -73,8 +73,8 @@ def doubt(found: Identification) -> str:
     if (distance := found.unbound_distance) < BOUND:
         return ""
     return (
-        f"bodies that can exist are {distance:.2g} standard errors from the fit (root mean square), of which "
-        f"{FILE} tells the deviations"
+        f"bodies that can exist are {distance:.2g} standard errors from the fit, of which {FILE} tells the "
+        "deviations"
     )
 
 
