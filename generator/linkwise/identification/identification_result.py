@@ -107,7 +107,8 @@ class Identification:
     def unbound_distance(self) -> float:
         """Distance of the physical bodies from the fit, in standard errors (Mahalanobis').
 
-        Where it is 1 or more, conditions on bodies have moved them, and the fit's covariance is not quite theirs.
+        Where it is 1 or more, conditions on bodies have moved them, and the fit's covariance is not quite
+        theirs.
         """
         off = self.base.combinations @ self.physical.pi.reshape(-1) - self.fit.beta
         return float(np.linalg.norm(base_triangle(self.fit, self.base) @ off))
