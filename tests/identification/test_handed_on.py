@@ -96,7 +96,7 @@ def test_analyze_takes_what_identify_writes(arm: Path, own: bool) -> None:
         "masses are spread over links, is as uncertain as before.toml said of the bodies before"
     )
     assert f"uncertain.toml: {told}" in done.stdout
-    assert "lean on what these torques do not tell: ab/b, ab/c, ab/d, bc/c, bc/d" in done.stdout
+    assert "torques by link that lean on what these do not tell: ab/b, ab/c, ab/d, bc/c, bc/d" in done.stdout
     record = json.loads((arm / out / "identified.json").read_text())
     assert record["uncertain"] == told
     assert record["leaning_torques"] == ["ab/b", "ab/c", "ab/d", "bc/c", "bc/d"]

@@ -17,11 +17,14 @@ from linkwise_runtime.rule.joint_tree import Bodies, JointTree
 from linkwise_runtime.rule.regressors import inertial_parameters
 
 from linkwise.arrays import Array
+from linkwise.bounded_file import MIB
 from linkwise.errors import LinkwiseError
 from linkwise.package.decode import known_keys
 
 PLACE = "[covariance]"
 KEYS = ("note", "links", "parameters", "factor", "matrix")
+MOST = 32 * MIB
+"""Largest size in bytes of a file that may have a covariance: those of robots with many links take some."""
 APART = 1e-3
 """Part of a link's size up to which parameters count as equal: files have them in other terms, rounded."""
 

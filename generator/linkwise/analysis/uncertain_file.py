@@ -17,8 +17,7 @@ links = ["upper_arm", "forearm"]
 [correlation]                # of these links' own errors of mass
 links = ["upper_arm", "forearm"]
 matrix = [[1.0, 0.5], [0.5, 1.0]]
-
-`covariance_table` says what stands in [covariance].
+[covariance]                 # of all inertial parameters of links: see `covariance_table`
 """
 
 import math
@@ -34,10 +33,10 @@ from linkwise_runtime.certainty.share_deviations import share_deviations
 from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies, checked_correlation
 from linkwise_runtime.chosen_names import nearest_first
 
-from linkwise.analysis.covariance_table import covariance_of
+from linkwise.analysis.covariance_table import MOST, covariance_of
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.arrays import Array
-from linkwise.bounded_file import MIB, toml_data
+from linkwise.bounded_file import toml_data
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
@@ -61,8 +60,6 @@ CERTAIN = "motion, loads, axes of joints, springs, damping, friction, armature"
 """All that counts as certain."""
 LARGEST = 1.0
 """Largest deviation as a part: with more, one normal mass in six is negative."""
-MOST = 32 * MIB
-"""Largest size of a file, in bytes: covariances of robots with many links take some."""
 QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([%a-z]+)\s*")
 
 
@@ -77,7 +74,7 @@ class UncertainRobot:
     joints: tuple[str, ...]
     """Joints of the tree."""
     note: str = ""
-    """What the file says of its covariance of parameters, in a line; "" without."""
+    """Note of the file on its covariance of parameters, in a line; "" without."""
 
     def record(self) -> dict[str, Any]:
         """Return what was assumed as plain data: parts of masses and of radii, centres in m."""

@@ -71,13 +71,12 @@ def identify(
         found = identified(log, package, reading, processing, fitting, progress, uncertain)
     manifest = package.package.manifest
     of_robot, lost = identified_robot(found, manifest, own)
-    if kept := not without(found):
+    if not without(found):
         written = own is not None and own.path.name in of_robot
         links = found.robot.links if written else tuple(map(printable, found.robot.links))
         of_robot |= {FILE: uncertain_text(found, links).encode()}
-    doubted = tuple(filter(None, [doubt(found)])) if kept else ()
-    told = (*(f"{log}: {warning}" for warning in (*found.warnings, *doubted)), *lost)
-    found = replace(found, warnings=(*found.warnings, *doubted, *lost))
+    told = (*(f"{log}: {warning}" for warning in found.warnings), *lost)
+    found = replace(found, warnings=(*found.warnings, *lost))
     chosen = choices(reading, processing) | {
         "fitting": asdict(fitting),
         "uncertain": None if uncertain is None else str(uncertain),
@@ -115,6 +114,7 @@ def _summary(found: Identification, files: Sequence[Path]) -> Iterator[str]:
             f"{errors['bodies'][i]:.3g}, by the package {errors['package'][i]:.3g} (root mean squares)"
         )
     yield without(found) or f"{FILE}: {note(found)}"
-    if leaning := found.leaning:
-        yield f"lean on what these torques do not tell: {listed(leaning)}"
+    yield from filter(None, [doubt(found)])
+    which = "not clear which" if found.leaning is None else listed(found.leaning)
+    yield f"torques by link that lean on what these do not tell: {which or 'none'}"
     yield from map(str, files)

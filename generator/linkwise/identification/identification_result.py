@@ -96,9 +96,15 @@ class Identification:
         return UncertainBodies(parameters=written_factor(self.fit, self.base, self.own, prior))
 
     @cached_property
-    def leaning(self) -> tuple[str, ...]:
-        """Partial torques that lean on masses which these torques do not tell, as JOINT/LINK."""
-        known = self.robot.model.identifiability(self.log.measured)
+    def leaning(self) -> tuple[str, ...] | None:
+        """Partial torques that lean on masses which these torques do not tell, as JOINT/LINK.
+
+        None where it is not clear which: a rank that rounding does not let be told.
+        """
+        try:
+            known = self.robot.model.identifiability(self.joints)
+        except ValueError:
+            return None
         there, follows = known.shares["torque"]
         places = np.argwhere(there & ~follows).tolist()
         return tuple(f"{known.joints[i]}/{known.links[j]}" for i, j in places)

@@ -9,7 +9,7 @@ from linkwise_runtime.certainty.pseudo_inertia import central
 from linkwise.escape import json_text, markdown
 from linkwise.identification.base_parameters import NAMES, UNITS
 from linkwise.identification.identification_result import Identification
-from linkwise.identification.uncertain_robot import FILE, note, without
+from linkwise.identification.uncertain_robot import FILE, doubt, note, without
 from linkwise.package.manifest import Manifest
 
 COEFFICIENTS = {"rad": ("N m s/rad", "N m"), "m": ("N s/m", "N")}
@@ -78,7 +78,7 @@ def record(found: Identification) -> dict[str, Any]:
         "hidden": list(found.base.hidden),
         "links": links,
         "uncertain": without(found) or note(found),
-        "leaning_torques": list(found.leaning),
+        "leaning_torques": None if found.leaning is None else list(found.leaning),
         "bodies_from_fit_in_standard_errors": found.unbound_distance,
         "warnings": list(found.warnings),
     }
@@ -186,9 +186,12 @@ def _certain(found: Identification) -> Iterator[str]:
     yield from ("", "## How certain torques by link are", "")
     told = without(found) or f"{FILE}: {note(found)}"
     yield f"{markdown(told[0].upper() + told[1:])}."
-    if found.leaning:
+    if told := doubt(found):
         yield ""
-        yield f"Torques by link that lean on what is not told: {', '.join(map(markdown, found.leaning))}."
+        yield f"{markdown(told[0].upper() + told[1:])}."
+    which = "not clear which" if found.leaning is None else ", ".join(map(markdown, found.leaning))
+    yield ""
+    yield f"Torques by link that lean on what is not told: {which or 'none'}."
 
 
 def _lost(lost: Sequence[str]) -> Iterator[str]:

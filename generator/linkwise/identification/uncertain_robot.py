@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from linkwise.analysis.covariance_table import MOST
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.uncertain_file import UncertainRobot, read_uncertain
 from linkwise.arrays import Array
@@ -28,7 +29,7 @@ def read_prior(path: Path, robot: OpenedRobot) -> UncertainRobot:
     """
     found = read_uncertain(path, robot)
     with within(str(path)):
-        others = [key for key in toml_data(path) if key not in OF_BODIES]
+        others = [key for key in toml_data(path, MOST) if key not in OF_BODIES]
         if np.any(found.bodies.lengths):
             others.append("length")
         if others:
@@ -69,8 +70,8 @@ def note(found: Identification) -> str:
 
 
 def doubt(found: Identification) -> str:
-    """Return a warning where bodies that can exist are not those of the fit; "" where they are."""
-    if (distance := found.unbound_distance) < BOUND:
+    """Return how far conditions on bodies and friction have moved the fit; "" where next to nothing."""
+    if without(found) or (distance := found.unbound_distance) < BOUND:
         return ""
     return (
         f"bodies that can exist are {distance:.2g} standard errors from the fit, of which {FILE} tells the "
