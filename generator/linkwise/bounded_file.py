@@ -73,10 +73,13 @@ LARGEST = MIB
 """Largest size of a file, in bytes."""
 
 
-def toml_data(path: Path) -> dict[str, Any]:
-    """Return the data of a file; raises LinkwiseError for what is not TOML or not of schema 1."""
+def toml_data(path: Path, most: int = LARGEST) -> dict[str, Any]:
+    """Return the data of a file; raises LinkwiseError for what is not TOML or not of schema 1.
+
+    most: size in bytes above which it is refused
+    """
     try:
-        text = content(path, LARGEST).decode("utf-8-sig").replace("\r\n", "\n")
+        text = content(path, most).decode("utf-8-sig").replace("\r\n", "\n")
         check_toml_bounds(text)
         data = tomllib.loads(text)
     except LinkwiseError:

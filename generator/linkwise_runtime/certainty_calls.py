@@ -24,12 +24,12 @@ class CertaintyCalls(MotionCalls):
         bodies: standard deviations of what links carry, an `UncertainBodies`
 
         Shares are linear in the links' inertial parameters, and the covariance of these is worked out
-        exactly; lengths, the places of joints, count to first order, by exact derivatives. Deviations are
-        about the shares' means; where centres are uncertain these differ from the shares of the robot's own
-        bodies, by what the mean of the inertia is more. Motion, axes of joints, springs, damping, friction,
-        armature and gravity count as certain; of reactions and induced accelerations there are no
-        deviations. Raises ValueError, which names the link, for deviations that cannot be, and as `regressor`
-        does.
+        exactly, or given, as an identification has it; lengths, the places of joints, count to first order,
+        by exact derivatives. Deviations are about the shares' means; where centres are uncertain these differ
+        from the shares of the robot's own bodies, by what the mean of the inertia is more. Motion, axes of
+        joints, springs, damping, friction, armature and gravity count as certain; of reactions and induced
+        accelerations there are no deviations. Raises ValueError, which names the link, for deviations that
+        cannot be, and as `regressor` does.
         """
         found: Uncertainty[Array] = uncertainty(self, q, qd, qdd, bodies)
         return found

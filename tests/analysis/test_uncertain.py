@@ -24,6 +24,7 @@ from linkwise import (
 from linkwise.analysis import analyze
 from linkwise.analysis.certain_signs import plus_minus
 from linkwise.analysis.load_robot import load_robot
+from linkwise.analysis.settings import Reading
 from linkwise.package.load import import_package
 from linkwise.study import run_study
 from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
@@ -92,7 +93,8 @@ def test_columns_are_the_deviations_of_drawn_bodies(arm: Path, backend: str) -> 
 def test_a_deviation_stands_for_each_torque_with_its_name_and_unit(arm: Path) -> None:
     result = analyze(arm / "log.csv", arm / "arm", uncertain=arm / "bodies.toml")
     units = {column.name: column.unit for column in result.columns}
-    names = [name for name in units if name.startswith(("tau/", "tau_qdd/", "tau_qd/", "tau_gravity/"))]
+    prefixes = ("tau/", "tau_qdd/", "tau_qd/", "tau_gravity/", "power/")
+    names = [name for name in units if name.startswith(prefixes)]
     assert {f"sd/{name}" for name in names} == {name for name in units if name.startswith("sd/")}
     assert all(units[f"sd/{name}"] == units[name] for name in names)
     assert result.closure.terms_relative < 1e-13
@@ -198,7 +200,18 @@ def test_a_value_has_as_many_digits_as_its_deviation_tells(value: float, deviati
             '[correlation]\nlinks = ["link1", "link2"]\nmatrix = [[1, 0.5]]',
             "[correlation] needs matrix, 2 rows of 2 numbers",
         ),
-        ('motion = "1 mm"', "'motion' is not modelled: motion counts as certain"),
+        ("", "nothing is uncertain; give [all], [link.NAME], [motion] or [loads]"),
+        ('motion = "1 mm"', "[motion] must be a table"),
+        ("[motion]", "[motion] states no noise; give angle, length or a joint's sd, or estimate = true"),
+        ('[motion]\nangle = "-1 deg"', "[motion]: angle is -1 deg; a standard deviation is 0 or more"),
+        ('[motion.joint.wrist]\nsd = "1 deg"', "[motion.joint.wrist]: planar3 has no joint 'wrist'"),
+        ("[motion]\nestimate = true\nangle = '1 deg'", "[motion]: estimate = true goes alone"),
+        ("[motion]\nestimate = true", "takes what a filter took away for noise, and nothing was"),
+        ('[loads]\nforce = "5 N"', "[loads] states how uncertain loads are, and planar3 bears none here"),
+        (
+            '[load.plate]\nforce = "5 kg"',
+            "[load.plate]: force is '5 kg'; write a number and its unit, N, as in",
+        ),
         ('[all]\naxis = "1 %"', "'axis' is not modelled: axes of joints count as certain"),
         ("[all\n", "malformed TOML"),
     ],
@@ -216,21 +229,20 @@ def test_a_bad_file_ends_in_one_line(text: str, told: str, tmp_path: Path) -> No
 
 
 def test_what_is_not_modelled_is_refused_by_name(arm: Path, tmp_path: Path) -> None:
-    def refused(told: str, robot: Any = arm / "arm", **more: Any) -> None:
-        with pytest.raises(LinkwiseError, match=f"--uncertain: {told}") as info:
-            analyze(arm / "log.csv", robot, uncertain=arm / "bodies.toml", **more)
+    def refused(told: str, robot: Any = arm / "arm", file: str = "bodies", **more: Any) -> None:
+        with pytest.raises(LinkwiseError, match=told) as info:
+            analyze(arm / "log.csv", robot, uncertain=arm / f"{file}.toml", **more)
         assert "\n" not in str(info.value)
 
-    refused("payloads have no deviations", payloads=[Payload("d", 1.0)])
-    refused("autograd has no regressors", load_robot(arm / "arm", "autograd"))
+    refused("--uncertain: autograd has no regressors", load_robot(arm / "arm", "autograd"))
+    write_package(generate(read_system(DATA / "cart_pendulum.py"), ["numpy"], "other"), tmp_path / "cart")
+    refused("--uncertain: the links of .* are energies", tmp_path / "cart")
+    (arm / "long.toml").write_text('schema = 1\n[all]\nlength = "1 mm"\n')
     held = Contacts((Contact("d", "point"),), unactuated=("ab", "bc", "cd"))
-    refused("what contacts leave", contacts=held)
-    for file, told in (
-        (DATA / "fourbar.toml", "joints of .* are tied"),
-        (DATA / "cart_pendulum.py", "energies"),
-    ):
-        write_package(generate(read_system(file), ["numpy"], "other"), tmp_path / file.stem)
-        refused(f".*{told}", tmp_path / file.stem)
+    for more in ({"payloads": [Payload("d", 1.0)]}, {"contacts": held}, {"reactions": ["cd"]}):
+        refused("lengths count", file="long", **more)
+    (arm / "noise.toml").write_text('schema = 1\n[motion]\nangle = "1 mrad"\n')
+    refused("leave --resample out", file="noise", reading=Reading(resample=50.0))
 
 
 def test_a_study_takes_the_file_as_a_key_and_works_anew_when_it_changes(tmp_path: Path) -> None:

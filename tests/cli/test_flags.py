@@ -209,9 +209,10 @@ def test_every_flag_of_identify_is_what_its_name_says(called: Any, monkeypatch: 
         "torque_factor": 0.001,
         "friction": False,
         "unseen": 0.3,
+        "uncertain": "before.toml",
     }
-    log, robot, *how, _ = called("identify", "identified", READING | own)
-    assert (log, robot) == (Path("walk.csv"), "the robot")
+    log, robot, *how, _, uncertain = called("identify", "identified", READING | own)
+    assert (log, robot, uncertain) == (Path("walk.csv"), "the robot", Path("before.toml"))
     fitting = Fitting((("c", "elbow"),), 0.001, False, 0.3, ("wrist",))
     assert how == [READ, Processing("savitzky-golay", 9, 3, SMOOTHED, "trim"), fitting]
     assert called("identify", "identified", {"qpos": "mujoco"})[2] == Reading(qpos="mujoco")

@@ -10,6 +10,7 @@ from helpers.motion_logs import write_csv
 from helpers.shown_model import ShownModel
 from linkwise import generate, read_robot, read_system, write_package
 from linkwise.analysis.load_robot import load_robot
+from linkwise.analysis.uncertain_file import read_uncertain
 from linkwise.cli.app import app
 from typer.testing import CliRunner
 
@@ -251,11 +252,13 @@ def test_a_robots_own_file_has_the_identified_bodies_and_is_else_as_it_was(name:
     torque, warnings = identified(tmp_path / "a", name, TEXTS[name].replace("\n", "\r\n"), *choice)
     after = (tmp_path / "a/out" / name).read_bytes().decode()
     assert sorted(path.name for path in (tmp_path / "a/out").iterdir()) == sorted(
-        [name, "identified.json", "identified.md"]
+        [name, "identified.json", "identified.md", "uncertain.toml"]
     )
     assert without_numbers(after) == without_numbers(TEXTS[name])
     assert after.count("\n") == after.count("\r\n") > 10
     arm = loaded(tmp_path / "a/out" / name, tmp_path / "after")
+    # The covariance is in the terms of this robot: it has the parameters that the file beside it names.
+    assert read_uncertain(tmp_path / "a/out/uncertain.toml", arm).links == arm.links
     _, q, qd, qdd = swings(len(arm.joints), 20, 100)
     bound = 2e-3 * abs(torque).max()
     np.testing.assert_allclose(arm.model.inverse_dynamics(q, qd, qdd), torque, atol=bound)

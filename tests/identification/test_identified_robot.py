@@ -66,7 +66,7 @@ def test_the_users_own_file_is_written_back_with_other_numbers_alone(log: Path, 
     own.write_bytes(b"\xef\xbb\xbf" + text)
     record = identified(log, own, tmp_path / "out")
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert names == ["arm.urdf", "identified.json", "identified.md"]
+    assert names == ["arm.urdf", "identified.json", "identified.md", "uncertain.toml"]
     before, after = own.read_bytes(), (tmp_path / "out/arm.urdf").read_bytes()
     assert masked(after) == masked(before)
     for kept in (

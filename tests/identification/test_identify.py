@@ -32,6 +32,7 @@ from linkwise.cli.app import app
 from linkwise.identification.base_parameters import base_parameters
 from linkwise.identification.identified_files import page
 from linkwise.identification.identified_robot import identified_robot
+from linkwise.identification.uncertain_robot import doubt
 from linkwise.identification.urdf_file import urdf_text
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import import_package
@@ -224,6 +225,13 @@ def test_bodies_can_exist_where_least_squares_has_none(planar3: OpenedRobot, tmp
     assert found.fit.beta[-1] < 0
     assert (np.linalg.eigvalsh(pseudo_inertia(found.physical.pi)) > 0).all()
     assert found.errors(found.seen)["bodies"] == pytest.approx(found.errors(found.seen)["fit"], rel=0.05)
+    # What is handed on is of the fit, and a line says how far the bodies are from it.
+    inverse = np.linalg.inv(found.fit.triangle[:-1, :-1])
+    off = found.base.combinations @ found.physical.pi.reshape(-1) - found.fit.beta
+    distance = np.sqrt(off @ np.linalg.solve(inverse @ inverse.T, off))
+    assert found.unbound_distance == pytest.approx(distance, rel=1e-6)
+    assert distance > 1
+    assert f"bodies that can exist are {distance:.2g} standard errors from the fit" in doubt(found)
 
 
 def planar_log(
@@ -297,6 +305,7 @@ def test_the_command_writes_a_page_a_record_and_a_robot(
         "identified.json",
         "identified.md",
         "planar3.urdf",
+        "uncertain.toml",
     ]
     record = json.loads((tmp_path / "out/identified.json").read_text())
     first = record["base_parameters"][0]

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from linkwise import Fitting, LinkwiseError, Options, generate, identify, read_system, write_package
 from linkwise.analysis.load_robot import load_robot
+from linkwise.identification.identified_files import record
 from linkwise.identification.identified_robot import identified_robot
+from linkwise.identification.uncertain_robot import without
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
 
@@ -122,6 +124,11 @@ def test_links_of_a_closed_mechanism_are_found_and_predict_another_motion(
     files, lost = identified_robot(found, Manifest.read(driven.package), None)
     assert set(files) == {f"{name}.urdf", f"{name}.toml"}
     assert all(words.startswith("a URDF file has no gravity") for words in lost)
+    assert (
+        without(found) == f"no uncertain.toml: joints of {name} are tied, whose shares have no deviations yet"
+    )
+    assert np.isfinite(np.asarray(found.uncertain_bodies.parameters)).all()
+    assert record(found)["uncertain"] == without(found)
     for file, text in files.items():
         (tmp_path / file).write_bytes(text)
     given = Options(constraints=tmp_path / f"{name}.toml")

@@ -98,6 +98,52 @@ def test_deviations_are_those_of_drawn_bodies(robot: str, package_at: Callable[[
         agree(found.c1[s] * np.abs(qd), spread(c1, True))
 
 
+@pytest.mark.parametrize("robot", ["puma560", str(CRANE)])
+def test_any_covariance_of_all_links_counts_as_its_draws_do(
+    robot: str, package_at: Callable[[str], ModuleType]
+) -> None:
+    """Links are as good as opposite to each other, so that sums are far better known than shares."""
+    package = package_at(robot)
+    dynamics = package.load("numpy")
+    own, draw = package.inertial_parameters(package.bodies()), np.random.default_rng(7)
+    mixed = draw.normal(size=(10 * dynamics.N, 6))
+    factor = 0.1 * (np.abs(own) + 0.01).reshape(-1, 1) * mixed
+    motion = random_states(dynamics.n, STATES)
+    rows = dynamics.regressor(*motion)
+    flat = rows[0].reshape(dynamics.n, -1)
+    factor -= np.linalg.pinv(flat, rcond=1e-9) @ (0.99 * flat @ factor)
+    covariance = factor @ factor.T
+    drawn = draw.multivariate_normal(np.zeros(len(factor)), covariance, 20_000, method="eigh")
+    drawn = drawn.reshape(-1, dynamics.N, 10)
+    whole = dynamics.uncertainty(*motion, UncertainBodies(parameters=covariance))
+    c2, c1, g = dynamics.coefficient_regressors(*motion[:2])
+    _, qd, qdd = motion
+    for found, y, by in (
+        (whole.torque, rows, 1.0),
+        (whole.gravity, g, 1.0),
+        (whole.acceleration, c2, qdd[:, None, None]),
+        (whole.velocity, c1, qd[:, None, None]),
+    ):
+        shares = np.einsum("sij...p,djp->dsij...", y, drawn, optimize=True)
+        agree(found, shares.std(0) * np.abs(by))
+    summed = np.einsum("sijp,djp->dsi", rows, drawn, optimize=True).std(0)
+    agree(whole.joint_torque, summed)
+    assert summed[0].max() < 0.1 * whole.torque[0].max()
+    for found, y, by in (
+        (whole.joint_acceleration, c2, qdd[:, None]),
+        (whole.joint_velocity, c1, qd[:, None]),
+    ):
+        agree(found, np.einsum("sijkp,djp->dsik", y, drawn, optimize=True).std(0) * np.abs(by))
+    agree(whole.joint_gravity, np.einsum("sijp,djp->dsi", g, drawn, optimize=True).std(0))
+    # With masses on top, which are independent of them, variances add; a factor says the same.
+    masses = uncertain(dynamics.N)
+    both = dynamics.uncertainty(
+        *motion, masses._replace(parameters=factor.reshape(dynamics.N, 10, -1))
+    ).joint_torque
+    alone = dynamics.uncertainty(*motion, masses).joint_torque
+    np.testing.assert_allclose(both**2, alone**2 + whole.joint_torque**2, rtol=1e-9)
+
+
 def test_lengths_count_by_slopes_of_robots_whose_joints_are_elsewhere(
     package_at: Callable[[str], ModuleType],
 ) -> None:
@@ -152,6 +198,14 @@ def test_lengths_count_by_slopes_of_robots_whose_joints_are_elsewhere(
         ),
         ({"centres": np.array([np.diag([1.0, 1.0, -1.0])] * 3)}, "centres of 'link1' is not a covariance"),
         ({"lengths": -0.001}, "lengths has -0.001"),
+        ({"parameters": np.eye(10)}, r"parameters has shape \(10, 10\); it must be a covariance, \(30, 30\)"),
+        (
+            {"parameters": np.diag([*[1.0] * 25, -1.0, *[1.0] * 4])},
+            "parameters of 'link3' have the variance -1",
+        ),
+        ({"parameters": np.ones((30, 30)) + 0.5 * np.eye(30, k=3)}, "parameters is not symmetric"),
+        ({"parameters": 3.0 - 2.0 * np.eye(30)}, "parameters is not a covariance: scaled to variances of 1"),
+        ({"parameters": np.full((3, 10, 2), np.inf)}, "parameters has NaN or infinity"),
     ],
 )
 def test_deviations_that_cannot_be_are_refused_by_name(

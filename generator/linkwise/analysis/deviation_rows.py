@@ -19,8 +19,8 @@ from linkwise.analysis.perturbed_rows import AT_ONCE, Direction, variances
 from linkwise.analysis.result_quantities import DEVIATION_OF, NOISE_OF, OF_BODIES, OF_LOADS, TORQUE_OF
 from linkwise.analysis.result_rows import Place
 from linkwise.analysis.settings import Convention
+from linkwise.analysis.stated_bodies import is_closed_form
 from linkwise.analysis.term_rows import TermArrays
-from linkwise.analysis.uncertain_file import is_closed_form
 from linkwise.analysis.uncertain_inputs import UncertainInputs
 from linkwise.arrays import Array, Index
 

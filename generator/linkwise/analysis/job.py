@@ -29,6 +29,7 @@ from linkwise.analysis.result_rows import Column
 from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import draw
+from linkwise.analysis.stated_bodies import check_lengths
 from linkwise.analysis.stream import Sink, span_of, stream
 from linkwise.analysis.torques import Decomposer, ToldBeside
 from linkwise.analysis.traced_rows import TracedRows
@@ -252,6 +253,9 @@ def prepared(
         measured = measured_torques(opened, torques, robot, *how)
         traced = TracedRows.of(made, robot, borne, samples, measured and measured.some(start, stop))
     planned = InducedPlan(points, outputs.induced_whole)
+    beside_torques = outputs.induced or outputs.reactions or outputs.induced_power
+    if uncertain is not None and uncertain.bodies is not None and beside_torques:
+        check_lengths(uncertain.bodies, "leave --induced, --reaction and --induced-power out")
     inputs = _uncertain(asked.uncertain, uncertain, raw, samples, processing, robot, borne)
     told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, inputs)
     decomposer = Decomposer.of(robot, processing.convention, borne, times, told)

@@ -3,9 +3,8 @@
 from dataclasses import replace
 from typing import Any, cast
 
-import numpy as np
 from linkwise_runtime.certainty.share_bounds import bodies_of
-from linkwise_runtime.certainty.uncertain_bodies import BodySpread, body_axes, body_spread, tree_bodies
+from linkwise_runtime.certainty.uncertain_bodies import body_axes, body_spread, tree_bodies
 from linkwise_runtime.rule.joint_tree import Bodies
 from linkwise_runtime.rule.regressors import inertial_parameters
 
@@ -35,22 +34,9 @@ def perturbed_robots(robot: OpenedRobot, given: Any) -> list[tuple[OpenedRobot, 
     spread = body_spread(robot.links[: len(tree.links)], carried, body_axes(tree), given)
     return [
         (_with(robot, backend, claimed + change), _with(robot, backend, claimed - change))
-        for change in directions(spread)
+        for change in spread.factor.T.reshape(-1, *claimed.shape)
+        if change.any()
     ]
-
-
-def directions(spread: BodySpread) -> list[Array]:
-    """Return independent changes of all inertial parameters (N, 10), of one standard deviation each."""
-    found = []
-    for j, k in np.argwhere(np.abs(spread.shapes).any(axis=1)):
-        change = np.zeros_like(spread.means)
-        change[j] = spread.shapes[j, :, k]
-        found.append(change)
-    values, vectors = np.linalg.eigh(spread.masses)
-    for value, vector in zip(values, vectors.T, strict=True):
-        if value > np.finfo(float).eps * values.max() * len(values):
-            found.append(np.sqrt(value) * vector[:, None] * spread.means)
-    return found
 
 
 def _with(robot: OpenedRobot, backend: str, parameters: Array) -> OpenedRobot:

@@ -259,7 +259,7 @@ class AnalysisResult(WholeMovement):
         parts += [f"loads filtered at {cutoff:g} Hz" for cutoff in cutoffs]
         if self.uncertain is not None:
             parts.append(printable(f"uncertain as {self.uncertain['file']} says"))
-            parts += map(printable, self.signs.lines)
+            parts += map(printable, filter(None, [self.uncertain.get("note", ""), *self.signs.lines]))
         return " · ".join(parts)
 
     @property

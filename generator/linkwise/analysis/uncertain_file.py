@@ -1,54 +1,29 @@
 """File that says how uncertain a robot's bodies, a log's motion and loads are.
 
-schema = 1
-[all]                        # every link, unless its own table says otherwise
-mass = "10 %"
-centre = "10 mm"             # along each axis; or three, along the body's own x, y and z
-radii = "10 %"               # each of the three radii of gyration about the centre
-length = "3 mm"              # place of each joint that is off its body's origin, along each axis
-[link.forearm]
-mass = "0.1 kg"
-centre = ["5 mm", "5 mm", "20 mm"]
-[joint.elbow]
-length = ["0 mm", "4 mm", "0 mm"]
-[body_mass]                  # a mass of which links have fixed parts: their masses go together by it
-sd = "2 %"
-links = ["upper_arm", "forearm"]
-[correlation]                # of these links' own errors of mass
-links = ["upper_arm", "forearm"]
-matrix = [[1.0, 0.5], [0.5, 1.0]]
-
-[motion], [loads] and [load.NAME] are those of `uncertain_motion` and `uncertain_loads`.
+schema = 1                   # tables of bodies: see `stated_bodies`
+[motion]                     # see `uncertain_motion`
+[loads]                      # see `uncertain_loads`
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from linkwise_runtime.certainty.share_deviations import share_deviations
-from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies, checked_correlation
+from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
 
+from linkwise.analysis.covariance_table import MOST
 from linkwise.analysis.opened_robot import OpenedRobot
-from linkwise.analysis.stated_sd import place_of, stated
+from linkwise.analysis.stated_bodies import TABLES, link_count, read_bodies, refuse_unmodelled
 from linkwise.analysis.uncertain_loads import StatedLoads, read_loads
 from linkwise.analysis.uncertain_motion import StatedNoise, read_motion
-from linkwise.arrays import Array
 from linkwise.bounded_file import toml_data
 from linkwise.errors import LinkwiseError, within
 from linkwise.input_file import require_file
 from linkwise.package.decode import known_keys
 
-OF_BODIES = ("all", "link", "joint", "body_mass", "correlation")
-"""Tables about the robot's bodies."""
-TOP = ("schema", *OF_BODIES, "motion", "loads", "load")
-PART, LENGTH = {"%": 0.01}, {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
-MASS = {"%": 0.01, "kg": 1.0}
-OF_LINKS = {"mass": MASS, "centre": LENGTH, "radii": PART}
-"""Units of each key of a link, by what brings them to parts, kg or m."""
-UNITS = OF_LINKS | {"length": LENGTH}
-"""Units of each key, with that of joints."""
+TOP = ("schema", *TABLES, "motion", "loads", "load")
 NOT_MODELLED = {
     "axis": "axes of joints count as certain",
     "preset": "there are no presets; write the numbers of your source",
@@ -56,8 +31,6 @@ NOT_MODELLED = {
 """Keys that others might expect, and what is so."""
 CERTAIN = "axes of joints, springs, damping, friction, armature"
 """What counts as certain on every path."""
-LARGEST = 1.0
-"""Largest deviation as a part: with more, one normal mass in six is negative."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +45,8 @@ class UncertainRobot:
     links: tuple[str, ...]
     joints: tuple[str, ...]
     """Joints of the tree."""
+    note: str = ""
+    """Note of the file on its covariance of parameters, in a line; "" without."""
 
     def record(self) -> dict[str, Any]:
         """Return what was assumed of bodies as plain data: parts of masses and of radii, centres in m."""
@@ -96,6 +71,8 @@ class UncertainRobot:
                 for name, length in zip(self.joints, np.asarray(given.lengths).tolist(), strict=True)
             ],
             "correlation": None if given.correlation is None else np.asarray(given.correlation).tolist(),
+            "covariance_of_parameters": given.parameters is not None,
+            "note": self.note,
         }
 
 
@@ -108,55 +85,23 @@ def read_uncertain(path: Path, robot: OpenedRobot) -> UncertainRobot:
     """
     with within(str(path)):
         require_file(path)
-        data = toml_data(path)
+        data = toml_data(path, MOST)
         for key in (*data, *(key for table in _tables(data) for key in table)):
             if key in NOT_MODELLED:
                 raise LinkwiseError(f"{key!r} is not modelled: {NOT_MODELLED[key]}; leave it out")
         known_keys("the file", data, TOP)
-        stated = [key for key in TOP[1:] if key in data]
-        if not stated:
+        given = set(data) - {"schema"}
+        if not given:
             raise LinkwiseError("nothing is uncertain; give [all], [link.NAME], [motion] or [loads]")
-        motion = read_motion(data["motion"], robot) if "motion" in data else None
-        loads = None
-        if "loads" in data or "load" in data:
-            loads = read_loads(data.get("loads"), data.get("load", {}))
-    bodies = _checked_bodies(path, data, robot) if set(stated) & set(OF_BODIES) else None
-    links = robot.links[: _count(robot)]
-    return UncertainRobot(path.name, bodies, motion, loads, links, robot.tree_joints)
-
-
-def _checked_bodies(path: Path, data: Mapping[str, Any], robot: OpenedRobot) -> UncertainBodies:
-    """Return what a file says of bodies."""
-    refuse_unmodelled(robot)
-    with within(str(path)):
-        bodies = _bodies(data, robot)
-        if is_closed_form(robot):
-            try:
-                share_deviations(robot.model.backend, bodies)
-            except ValueError as error:
-                raise LinkwiseError(str(error)) from None
-        elif np.any(bodies.lengths):
-            raise LinkwiseError(
-                "lengths count where joints are not tied, nothing is held and nothing is carried; leave"
-                " length out, or --contact and --payload"
-            )
-    return bodies
-
-
-def is_closed_form(robot: OpenedRobot) -> bool:
-    """Return whether what bodies do to a robot's torques is known from regressors: of an open tree alone."""
-    return robot.constrained is None and robot.contacts is None and not robot.payloads
-
-
-def refuse_unmodelled(robot: OpenedRobot) -> None:
-    """Raise LinkwiseError for a robot whose bodies cannot be uncertain here."""
-    reasons = {
-        f"the links of {robot.name} are energies, which do not say what bodies they have": robot.tree is None,
-        "autograd has no regressors; take --backend numpy, torch or native": robot.backend == "autograd",
-    }
-    for reason, holds in reasons.items():
-        if holds:
-            raise LinkwiseError(f"--uncertain: {reason}")
+        motion = read_motion(data["motion"], robot) if "motion" in given else None
+        loads = read_loads(data.get("loads"), data.get("load", {})) if given & {"loads", "load"} else None
+    bodies, note = None, ""
+    if given & set(TABLES):
+        refuse_unmodelled(robot)
+        with within(str(path)):
+            bodies, note = read_bodies(data, robot)
+    links = robot.links[: link_count(robot)]
+    return UncertainRobot(path.name, bodies, motion, loads, links, robot.tree_joints, note)
 
 
 def _tables(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -167,133 +112,3 @@ def _tables(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
         *(own for group in several if isinstance(group, dict) for own in group.values()),
     ]
     return [table for table in every if isinstance(table, dict)]
-
-
-def _bodies(data: Mapping[str, Any], robot: OpenedRobot) -> UncertainBodies:
-    usual = known_keys("[all]", data.get("all", {}), UNITS)
-    own = _named(data, "link", robot.links, OF_LINKS, robot)
-    found: dict[str, list[Any]] = {key: [] for key in OF_LINKS}
-    assert robot.package.manifest.tree is not None  # as `refuse_unmodelled` has seen
-    bodies = robot.package.manifest.tree.links
-    for name, body in zip(robot.links[: _count(robot)], bodies, strict=True):
-        table = own.get(name, {})
-        for key in OF_LINKS:
-            place = f"[link.{name}]" if key in table else "[all]"
-            given = table.get(key, usual.get(key))
-            found[key].append(_deviation(place, key, given, body.mass, name))
-    part, segments = _body_mass(data, robot)
-    return UncertainBodies(
-        np.array(found["mass"]),
-        np.array(found["centre"]),
-        np.array(found["radii"]),
-        part,
-        segments,
-        _correlation(data, robot),
-        _lengths(data, usual, robot),
-    )
-
-
-def _named(
-    data: Mapping[str, Any], what: str, names: Sequence[str], keys: Iterable[str], robot: OpenedRobot
-) -> dict[str, dict[str, Any]]:
-    """Return the tables of links or joints by name."""
-    tables = data.get(what, {})
-    if not isinstance(tables, dict):
-        raise LinkwiseError(f"{what} must hold tables by name; head each [{what}.NAME]")
-    for name, table in tables.items():
-        place_of(f"[{what}.{name}]", what, name, names, robot)
-        known_keys(f"[{what}.{name}]", table, keys)
-    return tables
-
-
-def _lengths(data: Mapping[str, Any], usual: Mapping[str, Any], robot: OpenedRobot) -> Array:
-    """Return deviations of the places of the tree's joints in m, (F, 3).
-
-    That of all is for joints that are off the origin of what carries them: several axes in one place would
-    else each have an error of its own.
-    """
-    tree = robot.package.manifest.tree
-    assert tree is not None  # as `refuse_unmodelled` has seen
-    own, found = _named(data, "joint", robot.tree_joints, ("length",), robot), []
-    for name, joint in zip(robot.tree_joints, tree.joints, strict=True):
-        table = own.get(name, {})
-        given = table.get("length", usual.get("length") if any(joint.translation) else None)
-        place = f"[joint.{name}]" if "length" in table else "[all]"
-        found.append(_deviation(place, "length", given, 0.0, name))
-    return np.array(found)
-
-
-def _deviation(place: str, key: str, given: Any, mass: float, link: str) -> Any:
-    """Return the deviation of one key: a part, or for a place three lengths in m."""
-    if UNITS[key] is LENGTH:
-        several = given if isinstance(given, list) else [given] * 3
-        if len(several) != 3:
-            raise LinkwiseError(
-                f'{place}: {key} has {len(several)} numbers; give "10 mm", or three for x, y, z'
-            )
-        return [0.0 if one is None else stated(place, key, one, UNITS[key])[0] for one in several]
-    if given is None:
-        return 0.0
-    value, unit = stated(place, key, given, UNITS[key])
-    if unit == "kg":
-        if not mass > 0:
-            raise LinkwiseError(f"{place}: {link!r} has no mass in the robot's file; give a part of it, in %")
-        value /= mass
-    if value > LARGEST:
-        raise LinkwiseError(
-            f"{place}: {key} of {link!r} is {given}, {100 * value:.3g} % of what it is of; give 100 % at most"
-        )
-    return value
-
-
-def _body_mass(data: Mapping[str, Any], robot: OpenedRobot) -> tuple[float, Array]:
-    """Return the deviation of the body mass, and ones for its links."""
-    if "body_mass" not in data:
-        return 0.0, np.zeros(_count(robot))
-    place = "[body_mass]"
-    table = known_keys(place, data["body_mass"], ("sd", "links"))
-    if "sd" not in table:
-        raise LinkwiseError(f'{place} needs sd, such as "2 %"')
-    value, _ = stated(place, "sd", table["sd"], PART)
-    if value > LARGEST:
-        raise LinkwiseError(f"{place}: sd is {table['sd']}; give 100 % at most")
-    segments = np.zeros(_count(robot))
-    segments[_links(place, table["links"], robot) if "links" in table else slice(None)] = 1.0
-    return value, segments
-
-
-def _correlation(data: Mapping[str, Any], robot: OpenedRobot) -> Array | None:
-    """Return the correlations of all links' masses; None where the file has none."""
-    if "correlation" not in data:
-        return None
-    place = "[correlation]"
-    table = known_keys(place, data["correlation"], ("links", "matrix"))
-    numbers = _links(place, table.get("links"), robot)
-    rows = table.get("matrix")
-    shaped = isinstance(rows, list) and len(rows) == len(numbers)
-    if not shaped or any(not isinstance(row, list) or len(row) != len(numbers) for row in rows or ()):
-        raise LinkwiseError(f"{place} needs matrix, {len(numbers)} rows of {len(numbers)} numbers")
-    if any(isinstance(x, bool) or not isinstance(x, (int, float)) for row in rows or () for x in row):
-        raise LinkwiseError(f"{place}: matrix holds what is no number")
-    try:
-        own = checked_correlation([robot.links[j] for j in numbers], rows)
-    except ValueError as error:
-        raise LinkwiseError(f"{place}: {error}") from None
-    whole = np.eye(_count(robot))
-    whole[np.ix_(numbers, numbers)] = own
-    return whole
-
-
-def _links(place: str, given: Any, robot: OpenedRobot) -> list[int]:
-    """Return the numbers of links that are listed by name."""
-    if not isinstance(given, list) or not given or not all(isinstance(name, str) for name in given):
-        raise LinkwiseError(f"{place} needs links, a list of their names")
-    found = [place_of(place, "link", name, robot.links, robot) for name in given]
-    if len(set(found)) < len(found):
-        raise LinkwiseError(f"{place}: links names one twice; name each once")
-    return found
-
-
-def _count(robot: OpenedRobot) -> int:
-    """Return the number of links of the robot's file: payloads, which come last, are certain."""
-    return len(robot.links) - len(robot.payloads)

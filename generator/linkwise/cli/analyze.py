@@ -91,9 +91,16 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
         f" these to joint torques within {closure.links_relative:.1e} (relative){shares}",
         *_of_contacts(analysis),
         *_of_residual(analysis),
+        *_of_bodies(analysis),
         *analysis.signs.lines,
         *map(str, files),
     ]
+
+
+def _of_bodies(analysis: Analysis) -> list[str]:
+    """Return a line on what a covariance of bodies is of, as its file says."""
+    uncertain = analysis.uncertain
+    return [f"{uncertain['file']}: {uncertain['note']}"] if uncertain and uncertain["note"] else []
 
 
 def _of_residual(analysis: Analysis) -> list[str]:

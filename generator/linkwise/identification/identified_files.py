@@ -9,6 +9,7 @@ from linkwise_runtime.certainty.pseudo_inertia import central
 from linkwise.escape import json_text, markdown
 from linkwise.identification.base_parameters import NAMES, UNITS
 from linkwise.identification.identification_result import Identification
+from linkwise.identification.uncertain_robot import FILE, doubt, note, without
 from linkwise.package.manifest import Manifest
 
 COEFFICIENTS = {"rad": ("N m s/rad", "N m"), "m": ("N s/m", "N")}
@@ -76,13 +77,18 @@ def record(found: Identification) -> dict[str, Any]:
         "joints_without_bearings": list(found.floating),
         "hidden": list(found.base.hidden),
         "links": links,
+        "uncertain": without(found) or note(found),
+        "leaning_torques": None if found.leaning is None else list(found.leaning),
+        "bodies_from_fit_in_standard_errors": found.unbound_distance,
         "warnings": list(found.warnings),
     }
 
 
-def page(found: Identification, without: Sequence[str]) -> str:
-    """Return the page, in Markdown; `without` is what the robot's file does not say."""
-    return "\n".join([*_head(found), *_joints(found), *_base(found), *_links(found), *_lost(without), ""])
+def page(found: Identification, lost: Sequence[str]) -> str:
+    """Return the page, in Markdown; `lost` is what the robot's file does not say."""
+    return "\n".join(
+        [*_head(found), *_joints(found), *_base(found), *_links(found), *_certain(found), *_lost(lost), ""]
+    )
 
 
 def _head(found: Identification) -> Iterator[str]:
@@ -176,7 +182,19 @@ def _links(found: Identification) -> Iterator[str]:
     )
 
 
-def _lost(without: Sequence[str]) -> Iterator[str]:
-    if without:
+def _certain(found: Identification) -> Iterator[str]:
+    yield from ("", "## How certain torques by link are", "")
+    told = without(found) or f"{FILE}: {note(found)}"
+    yield f"{markdown(told[0].upper() + told[1:])}."
+    if told := doubt(found):
+        yield ""
+        yield f"{markdown(told[0].upper() + told[1:])}."
+    which = "not clear which" if found.leaning is None else ", ".join(map(markdown, found.leaning))
+    yield ""
+    yield f"Torques by link that lean on what is not told: {which or 'none'}."
+
+
+def _lost(lost: Sequence[str]) -> Iterator[str]:
+    if lost:
         yield from ("", "## Not in the robot's file", "")
-        yield from (f"- {markdown(text[0].upper() + text[1:])}." for text in without)
+        yield from (f"- {markdown(text[0].upper() + text[1:])}." for text in lost)

@@ -5,11 +5,9 @@ from functools import partial
 from os import PathLike
 from pathlib import Path
 
-import numpy as np
 from linkwise_runtime.certainty.random_motions import Motion, random_closed_motion, random_motion
-from linkwise_runtime.rule.joint_tree import Bodies
-from linkwise_runtime.rule.regressors import inertial_parameters
 
+from linkwise.analysis.covariance_table import link_parameters
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.settings import Processing, Reading, pairs
@@ -23,6 +21,7 @@ from linkwise.identification.log_warnings import doubts, noisy_positions
 from linkwise.identification.normal_factors import JointEquations, joint_equations
 from linkwise.identification.physical_fit import physical_fit
 from linkwise.identification.torque_log import TorqueLog, read_torque_log
+from linkwise.identification.uncertain_robot import read_prior
 from linkwise.option import option
 from linkwise.progress import Progress, silent
 
@@ -67,16 +66,20 @@ def identify(
     processing: Processing | None = None,
     fitting: Fitting | None = None,
     progress: Progress = silent,
+    uncertain: str | PathLike[str] | None = None,
 ) -> Identification:
     """Identify a robot's links from a log of motion and torques.
 
     robot: the directory of its package; `linkwise.kept_package` makes one from a robot's file
+    uncertain: file of how uncertain the bodies of the package are, which tells how certain those are that are
+    identified, where torques do not tell; the fit itself does not use it
 
     Velocities and accelerations come from positions, as in `analyze`; torques are used as they are.
     Raises LinkwiseError, in one line that names the fix, for what cannot be identified.
     """
     loaded = robot if isinstance(robot, OpenedRobot) else load_robot(Path(robot))
     own = _own_parameters(loaded)
+    prior = None if uncertain is None else read_prior(Path(uncertain), loaded)
     reading, processing, fitting = reading or Reading(), processing or Processing(), fitting or Fitting()
     torques = fitting.torques, fitting.unmeasured, fitting.factor
     read = read_torque_log(Path(log), loaded, reading, processing, *torques, progress)
@@ -94,7 +97,9 @@ def identify(
         _refuse_unexcited(excitation(seen, base, bearings), base, noisy)
         fit = weighted_fit(seen, base, bearings)
         physical = physical_fit(fit, base, own, bearings.rubs)
-    found = Identification(loaded, read, base, bearings, fit, physical, own, seen, unseen, read.warnings)
+    found = Identification(
+        loaded, read, base, bearings, fit, physical, own, seen, unseen, read.warnings, prior
+    )
     return replace(found, warnings=(*read.warnings, *doubts(found, noisy)))
 
 
@@ -118,9 +123,7 @@ def _own_parameters(robot: OpenedRobot) -> Array:
         raise LinkwiseError(
             f"{robot.name} has no back end with regressors; generate the robot again, with --backend numpy"
         )
-    values = ([b.mass for b in tree.links], [b.com for b in tree.links], [b.inertia for b in tree.links])
-    pi: Array = inertial_parameters(Bodies(*(np.array(value, dtype=float) for value in values)))
-    return pi
+    return link_parameters(tree)
 
 
 def _refuse_few(seen: JointEquations, base: BaseParameters, bearings: Bearings) -> None:

@@ -2,14 +2,16 @@
 
 Shares are linear in inertial parameters, s = sum_j Y_j . pi_j, so that with the covariance of `BodySpread`
 
-    var(s) = sum_j |F_j^T Y_j|^2 + w^T C w        w_j = Y_j . p_j
+    var(s) = sum_j |F_j^T Y_j|^2 + |sum_j H_j^T Y_j|^2
 
-of which a share through one link has its own j alone. Places of joints add (ds/dp)^2 for each direction p of
-one standard deviation: they are independent of bodies, and count to first order.
+of which a share through one link has its own j alone: there the covariance of ten parameters will do. Places
+of joints add (ds/dp)^2 for each direction p of one standard deviation: they are independent of bodies, and
+count to first order.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -61,9 +63,7 @@ class ShareDeviations:
         self._backend, self._tables = backend, PackedTables(backend)
         layout, links = backend.structure.layout, range(backend.structure.N)
         self._layout, self._causes = layout, layout.velocity[:, 2].copy()  # writable, as torch wants it
-        self._maps = np.concatenate([spread.shapes, spread.means[..., None]], -1)
-        self._own = np.diag(spread.masses)
-        self._together = None if spread.is_diagonal else _root(spread.masses)
+        self._spread, self._by_link = spread, spread.by_link
         self._slices = {
             field: [slice(*np.searchsorted(getattr(layout, field)[:, 1], [j, j + 1])) for j in links]
             for field in ("acceleration", "velocity", "gravity", "torque")
@@ -78,7 +78,8 @@ class ShareDeviations:
 
         with_sums: whether sums over the links by cause are wanted; else they are left out, (S, 0)
         """
-        most = max(16, AT_ONCE // (PARAMETERS * sum(map(len, self._layout[:4]))))
+        wide = max(PARAMETERS, self._spread.shared.shape[-1])
+        most = max(16, AT_ONCE // (wide * sum(map(len, self._layout[:4]))))
         samples = len(motion[0])
         size = self._backend.chunk(motion, most) or samples
         if samples <= size:
@@ -90,10 +91,7 @@ class ShareDeviations:
     def _piece(self, motion: Sequence[Numbers], with_sums: bool) -> PackedDeviations:
         xp, (q, qd, qdd) = self._backend.xp, motion
         flat = self._backend.coefficient_regressors(q, qd, 0.0 * q)
-        c2, c1, g = (
-            self._mapped(rows, field)
-            for rows, field in zip(flat, ("acceleration", "velocity", "gravity"), strict=True)
-        )
+        c2, c1, g = (rows.reshape(rows.shape[0], -1, PARAMETERS) for rows in flat)
         causes = self._backend.index(self._causes, q)
         every = self._backend.index(self._mirrored, q)
         moved = c2[..., every, :] * qdd[..., causes, None] + c1 * qd[..., causes, None]
@@ -103,11 +101,16 @@ class ShareDeviations:
             own = moved[..., part, :]
             tau[j] = tau[j] + own.reshape(*own.shape[:-2], size, size, own.shape[-1]).sum(-2)
         torque = xp.concat(tau, -2)
-        variances = [self._own_variance(rows, field) for rows, field in self._fields(c2, c1, g, torque)]
-        variances.append(self._sum_over_links(torque))
+        variances = [self._share_variance(rows, field) for rows, field in self._fields(c2, c1, g, torque)]
+        sums, matrices = self._tables.sum_over_links, self._tables.matrices
+        summed = [(torque, "torque", sums, variances[3])]
         if with_sums:
-            variances += [self._matrices(c2, "acceleration"), self._matrices(c1, "velocity")]
-            variances.append(self._sum_over_links(g))
+            summed += [
+                (c2, "acceleration", partial(matrices, field="acceleration"), variances[0]),
+                (c1, "velocity", partial(matrices, field="velocity"), variances[1]),
+                (g, "gravity", sums, variances[2]),
+            ]
+        variances += [self._sum_variance(*one) for one in summed]
         for changes in self._changes(q, qd, qdd, with_sums):
             variances = [a + b**2 for a, b in zip(variances, changes, strict=True)]
         nothing = self._backend.zeros(q, 0)
@@ -133,36 +136,28 @@ class ShareDeviations:
     def _fields(*rows: Numbers) -> Sequence[tuple[Numbers, str]]:
         return list(zip(rows, ("acceleration", "velocity", "gravity", "torque"), strict=True))
 
-    def _mapped(self, flat: Numbers, field: str) -> Numbers:
-        """Return (F_j^T Y_j, w_j) of rows, (S, count, R + 1), from rows of 10 (S, count * 10)."""
-        rows = flat.reshape(flat.shape[0], len(getattr(self._layout, field)), PARAMETERS)
-        maps = self._backend.constant(self._maps, flat)
+    def _mapped(self, rows: Numbers, field: str, factors: Floats) -> Numbers:
+        """Return F_j^T Y_j of rows (S, count, 10), (S, count, R), for factors F_j (N, 10, R)."""
+        maps = self._backend.constant(factors, rows)
         parts = [rows[:, part] @ maps[j] for j, part in enumerate(self._slices[field])]
         return self._backend.xp.concat(parts, -2)
 
-    def _own_variance(self, rows: Numbers, field: str) -> Numbers:
+    def _share_variance(self, rows: Numbers, field: str) -> Numbers:
         """Return the variance of shares through one link, (S, count)."""
-        own = self._own[getattr(self._layout, field)[:, 1]]
-        return self._of_shapes(rows) + rows[..., -1] ** 2 * self._backend.constant(own, rows)
+        return (self._mapped(rows, field, self._by_link) ** 2).sum(-1)
 
-    @staticmethod
-    def _of_shapes(rows: Numbers) -> Numbers:
-        return (rows[..., :-1] ** 2).sum(-1)
+    def _sum_variance(
+        self, rows: Numbers, field: str, sums: Callable[[Numbers], Numbers], shares: Numbers
+    ) -> Numbers:
+        """Return the variance of `sums` over the links, (S, ...), which takes values (..., count).
 
-    def _sum_over_links(self, rows: Numbers) -> Numbers:
-        """Return the variance of torques (S, count, R + 1) summed over the links, (S, n)."""
-        if self._together is None:
-            return self._tables.sum_over_links(self._own_variance(rows, "torque"))
-        mass = self._tables.spread(rows[..., -1], "torque") @ self._backend.constant(self._together, rows)
-        return self._tables.sum_over_links(self._of_shapes(rows)) + (mass**2).sum(-1)
-
-    def _matrices(self, rows: Numbers, field: str) -> Numbers:
-        """Return the variance of coefficients summed over the links, (S, n, n)."""
-        if self._together is None:
-            return self._tables.matrices(self._own_variance(rows, field), field)
-        by_link = self._backend.xp.swapaxes(self._tables.spread(rows[..., -1], field), -1, -2)
-        mass = by_link @ self._backend.constant(self._together, rows)
-        return self._tables.matrices(self._of_shapes(rows), field) + (mass**2).sum(-1)
+        shares: the variance of shares through one link
+        """
+        if not self._spread.shared.shape[-1]:
+            return sums(shares)
+        own = sums((self._mapped(rows, field, self._spread.own) ** 2).sum(-1))
+        common = self._backend.xp.swapaxes(self._mapped(rows, field, self._spread.shared), -1, -2)
+        return own + (sums(common) ** 2).sum(1)
 
     def spread(self, values: Numbers, field: str) -> Numbers:
         """Return packed values (S, count) of a field of `Layout` as (S, n, N) or (S, n, N, n)."""
@@ -203,13 +198,19 @@ def share_deviations(backend: ArrayBackend, bodies: object) -> ShareDeviations:
     """
     if any(not hasattr(bodies, name) for name in UncertainBodies._fields):
         raise TypeError(f"bodies is {known_kind(bodies, UncertainBodies)}; give an UncertainBodies")
-    tree, given = cast(JointTree, backend.tree), cast(UncertainBodies, bodies)
-    carried = tree_bodies(tree, backend.parameters, cast(Any, backend.bodies))
+    given = cast(UncertainBodies, bodies)
     try:
-        spread = body_spread(backend.structure.link_names, carried, body_axes(tree), given)
-        return ShareDeviations(backend, spread, length_shifts(tree, given.lengths))
+        shifts = length_shifts(cast(JointTree, backend.tree), given.lengths)
+        return ShareDeviations(backend, spread_of(backend, given), shifts)
     except ValueError as error:
         raise ValueError(f"bodies: {error}") from None
+
+
+def spread_of(backend: ArrayBackend, bodies: UncertainBodies) -> BodySpread:
+    """Return the spread of the bodies of a robot on a back end; raises as `body_spread` does."""
+    tree = cast(JointTree, backend.tree)
+    carried = tree_bodies(tree, backend.parameters, cast(Any, backend.bodies))
+    return body_spread(backend.structure.link_names, carried, body_axes(tree), bodies)
 
 
 def root(xp: Any, variance: Numbers) -> Numbers:
@@ -217,12 +218,4 @@ def root(xp: Any, variance: Numbers) -> Numbers:
     there = variance > 0
     roots = xp.where(there, variance, xp.ones_like(variance)) ** 0.5
     found: Numbers = xp.where(there, roots, xp.zeros_like(variance))
-    return found
-
-
-def _root(matrix: Floats) -> Floats:
-    """Return D with D D^T = matrix, positive semidefinite."""
-    values, vectors = np.linalg.eigh(matrix)
-    kept = values > np.finfo(float).eps * values.max(initial=0.0) * len(values)
-    found: Floats = vectors[:, kept] * np.sqrt(values[kept])
     return found

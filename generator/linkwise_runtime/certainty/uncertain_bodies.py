@@ -13,6 +13,8 @@ of which segments have fixed parts, and e_j those of the parts. So for all pairs
 
 which is exact: moments of normals are polynomials. The mean of pi_j is not quite pi_j at the means, but more
 by m (tr P 1 - P + sum_x var(r_x) e_x e_x^T) in its inertia, P being the covariance of the centre.
+
+Any other covariance of all pi together, such as that of identified ones, may come on top.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..chosen_names import short
+from ..quantities import PARAMETERS
 from ..rule.joint_tree import JointTree
 from ..rule.tree_arrays import SHAPES, formula_sources, given_numbers, own_numbers
 from .parameter_moments import ROUNDING, Floats, factor, parameter_moments, principal_moments
@@ -46,31 +49,36 @@ class UncertainBodies(NamedTuple):
     lengths: ArrayLike = 0.0
     """Deviation of the places of the tree's joints in m: (F, 3) along x, y, z of the body in its file that
     carries the joint, or one number for all; or covariances, (F, 3, 3). They count to first order."""
+    parameters: ArrayLike | None = None
+    """Covariance of all links' inertial parameters, those of `regressor`, (10 N, 10 N), or a factor H of it,
+    (N, 10, Q), with H H^T that covariance; on top of what the others say, and independent of it."""
 
 
 class BodySpread(NamedTuple):
-    """Covariance of inertial parameters: cov(pi_j, pi_l) = C_jl p_j p_l^T + (j = l) F_j F_j^T."""
+    """Covariance of inertial parameters: cov(pi_j, pi_l) = H_j H_l^T + (j = l) F_j F_j^T."""
 
-    means: Floats
-    """Means of p_j, (N, 10)."""
-    shapes: Floats
-    """F_j, factors of what centres and radii do, (N, 10, R); none where neither is uncertain."""
-    masses: Floats
-    """C, covariance of the factors f_j of masses, (N, N)."""
+    own: Floats
+    """F_j, what differs by each link for itself, (N, 10, R)."""
+    shared: Floats
+    """H_j, what links have in common, (N, 10, Q); no columns where each differs by itself."""
 
     @property
-    def is_diagonal(self) -> bool:
-        """True if no two masses go together."""
-        return bool((self.masses == np.diag(np.diag(self.masses))).all())
+    def by_link(self) -> Floats:
+        """Factors of each link's own covariance, (N, 10, up to 10): of H_j H_j^T + F_j F_j^T."""
+        if not self.shared.shape[-1]:
+            return self.own
+        # By QR, as squares would lose what torques tell well beside what they do not.
+        triangles: Floats = np.asarray(np.linalg.qr(np.concatenate([self.own, self.shared], -1).mT, mode="r"))
+        return triangles.mT
 
-    def covariance(self) -> Floats:
-        """Return the covariance of all parameters, (10 N, 10 N)."""
-        count = len(self.means)
-        whole = np.einsum("jl,jp,lq->jplq", self.masses, self.means, self.means)
+    @property
+    def factor(self) -> Floats:
+        """Factor of the covariance of all parameters, (10 N, N R + Q)."""
+        count, _, columns = self.own.shape
+        apart = np.zeros((count, PARAMETERS, count, columns))
         each = np.arange(count)
-        whole[each, :, each, :] += self.shapes @ self.shapes.mT
-        found: Floats = whole.reshape(10 * count, 10 * count)
-        return found
+        apart[each, :, each] = self.own
+        return np.concatenate([a.reshape(PARAMETERS * count, -1) for a in (apart, self.shared)], 1)
 
 
 def body_spread(links: Sequence[str], carried: Sequence[Floats], axes: Floats, given: Any) -> BodySpread:
@@ -84,20 +92,32 @@ def body_spread(links: Sequence[str], carried: Sequence[Floats], axes: Floats, g
     count, (masses, centres, inertias) = len(links), carried
     own, radii = (_parts(links, name, getattr(given, name)) for name in ("masses", "radii"))
     places = axes @ _covariances(links, "centres", given.centres) @ axes.mT
-    part = _parts(["body_mass"], "body_mass", given.body_mass)[0] ** 2
-    segments = _parts(links, "segments", given.segments)
+    part = _parts(["body_mass"], "body_mass", given.body_mass)[0]
+    segments = part * _parts(links, "segments", given.segments)
+    # cov(f_j, f_l) = segments_j segments_l + errors_jl
     together = checked_correlation(links, given.correlation)
-    factors = (1.0 + part * np.outer(segments, segments)) * (1.0 + together * np.outer(own, own)) - 1.0
+    errors = (1.0 + np.outer(segments, segments)) * together * np.outer(own, own)
+    sizes = np.sqrt(1.0 + segments**2 + np.diag(errors))
     found = [
         parameter_moments(
             masses[j], centres[j], places[j], *principal_moments(inertias[j], axes[j]), radii[j]
         )
         for j in range(count)
     ]
-    shapes = [np.sqrt(1.0 + factors[j, j]) * factor(cov) for j, (_, cov) in enumerate(found)]
-    widest = max(f.shape[1] for f in shapes)
-    padded = [np.pad(f, ((0, 0), (0, widest - f.shape[1]))) for f in shapes]
-    return BodySpread(np.array([mean for mean, _ in found]), np.array(padded), factors)
+    means = np.array([mean for mean, _ in found])
+    alone = np.count_nonzero(errors - np.diag(np.diag(errors)), axis=1) == 0
+    apart = [
+        np.hstack(
+            [sizes[j] * factor(cov), means[j, :, None] * factor(errors[j : j + 1, j : j + 1] * alone[j])]
+        )
+        for j, (_, cov) in enumerate(found)
+    ]
+    widest = max(f.shape[1] for f in apart)
+    padded = [np.pad(f, ((0, 0), (0, widest - f.shape[1]))) for f in apart]
+    common = np.hstack([segments[:, None], factor(np.where(alone, 0.0, errors))])
+    common = common[:, common.any(0)]
+    shared = [means[:, :, None] * common[:, None, :], _parameter_factor(links, given.parameters)]
+    return BodySpread(np.array(padded), np.concatenate(shared, -1))
 
 
 def tree_bodies(
@@ -180,6 +200,35 @@ def checked_correlation(names: Sequence[str], given: Any) -> Floats:
             "correlations of three have to agree with each other"
         )
     return matrix
+
+
+def _parameter_factor(links: Sequence[str], given: Any) -> Floats:
+    """Return H (N, 10, Q) of `UncertainBodies.parameters`."""
+    count = len(links)
+    if given is None:
+        return np.zeros((count, PARAMETERS, 0))
+    values, size = _numbers("parameters", given), PARAMETERS * count
+    if values.ndim == 3 and values.shape[:2] == (count, PARAMETERS):
+        return values
+    if values.shape != (size, size):
+        raise ValueError(
+            f"parameters has shape {values.shape}; it must be a covariance, {(size, size)}, or a factor of "
+            f"it, {(count, PARAMETERS, 'Q')}"
+        )
+    variances = np.diag(values)
+    if (variances < 0).any():
+        link = short(links[int(variances.argmin()) // PARAMETERS])
+        raise ValueError(f"parameters of {link} have the variance {variances.min():g}; it is 0 or more")
+    scales = np.sqrt(np.where(variances > 0, variances, 1.0))
+    scaled = values / np.outer(scales, scales)
+    if np.abs(scaled - scaled.T).max() > ROUNDING:
+        raise ValueError("parameters is not symmetric; give a covariance")
+    least = float(np.linalg.eigvalsh(scaled).min())
+    if least < -ROUNDING * size:
+        raise ValueError(
+            f"parameters is not a covariance: scaled to variances of 1 it has the eigenvalue {least:.3g}"
+        )
+    return factor(values).reshape(count, PARAMETERS, -1)
 
 
 def _covariances(names: Sequence[str], what: str, given: Any) -> Floats:
