@@ -5,9 +5,9 @@ else by perturbing what is uncertain, see `perturbed_rows`. All three are indepe
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol, Self
 
 import numpy as np
 from linkwise_runtime.certainty.share_deviations import ShareDeviations, share_deviations
@@ -17,18 +17,32 @@ from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.perturbed_robots import perturbed_robots
 from linkwise.analysis.perturbed_rows import AT_ONCE, Direction, variances
 from linkwise.analysis.result_quantities import DEVIATION_OF, NOISE_OF, OF_BODIES, OF_LOADS, TORQUE_OF
-from linkwise.analysis.result_rows import Place
+from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.stated_bodies import is_closed_form
 from linkwise.analysis.term_rows import TermArrays
 from linkwise.analysis.uncertain_inputs import UncertainInputs
 from linkwise.arrays import Array, Index
 
-if TYPE_CHECKING:
-    from linkwise.analysis.torques import Decomposer
-
 Motion = tuple[Array, Array, Array]
 """q, qd and qdd, (S, n) each."""
+
+
+class Perturbable(Protocol):
+    """Decomposition whose rows are perturbed."""
+
+    @property
+    def rows(self) -> ResultRows:
+        """Rows of the result."""
+
+    def values(self, time: Array, q: Array, qd: Array, qdd: Array) -> Array:
+        """Return all rows but those of deviations, (rows, S)."""
+
+    def with_robot(self, robot: OpenedRobot) -> Self:
+        """Return the decomposition of another robot of the same joints and links."""
+
+    def with_load_off(self, e: int, shift: LoadShift) -> Self:
+        """Return the decomposition in which load e is off by a shift."""
 
 
 Some = slice | Index
@@ -77,16 +91,15 @@ class DeviationRows:
         given = self.uncertain.bodies
         return () if given is None else perturbed_robots(self.robot, given)
 
-    def fill(self, out: Array, decomposer: "Decomposer", time: Array, motion: Motion) -> None:
+    def fill(self, out: Array, plain: Perturbable, time: Array, motion: Motion) -> None:
         """Fill the rows of deviations in `out` (rows, S), whose other rows are filled.
 
         motion: q, qd and qdd (S, n) in which ties close
         """
-        rows = decomposer.rows
+        rows = plain.rows
         names = [name for name in DEVIATION_OF if name in rows]
         if not names:
             return
-        plain = replace(decomposer, deviations=replace(self, uncertain=UncertainInputs()))
         into, every = rows.numbers(*names), rows.numbers(*(DEVIATION_OF[name] for name in names))
         of = together(every)
         apart = rows.numbers(*(name for name in NOISE_OF if name in rows))
@@ -109,7 +122,7 @@ class DeviationRows:
             out[rows.numbers(f"sd/{name}")] += deviations**2
         out[into] = np.sqrt(out[into])
 
-    def _moved(self, plain: "Decomposer", time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
+    def _moved(self, plain: Perturbable, time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
         """Yield the directions of motion, along which rows `of` are known."""
         noise = self.uncertain.motion
         moves = () if noise is None else noise.directions(time)
@@ -120,7 +133,7 @@ class DeviationRows:
 
             yield Direction(rows, is_linear=3 * number >= 2 * len(moves))
 
-    def _loaded(self, plain: "Decomposer", time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
+    def _loaded(self, plain: Perturbable, time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
         """Yield the directions of loads."""
         for e, spread in enumerate(self.uncertain.loads):
             for shift in () if spread is None else spread.directions():
@@ -131,7 +144,7 @@ class DeviationRows:
 
                 yield Direction(rows)
 
-    def _carried(self, plain: "Decomposer", time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
+    def _carried(self, plain: Perturbable, time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
         """Yield the directions of bodies."""
         for two in self._bodies:
 
@@ -140,7 +153,7 @@ class DeviationRows:
 
             yield Direction(rows, 1.0)
 
-    def _of_bodies(self, exact: ShareDeviations, plain: "Decomposer", motion: Motion) -> dict[str, Array]:
+    def _of_bodies(self, exact: ShareDeviations, plain: Perturbable, motion: Motion) -> dict[str, Array]:
         """Return deviations by bodies of an open tree, (rows, S), by the quantity that they are of."""
         rows, (_, qd, qdd) = plain.rows, motion
         _, at = self.robot.model.door.read(dict(zip(("q", "qd", "qdd"), motion, strict=True)))

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from linkwise_runtime.motion.tracer import TraceState
@@ -138,7 +138,7 @@ class Decomposer:
             return self
         return self.with_robot(robot)
 
-    def with_robot(self, robot: OpenedRobot) -> "Decomposer":
+    def with_robot(self, robot: OpenedRobot) -> Self:
         """Return the decomposer of another robot of the same joints and links."""
         sources = replace(self.induced.sources, robot=robot)
         return replace(
@@ -150,7 +150,7 @@ class Decomposer:
             reactions=replace(self.reactions, robot=robot),
         )
 
-    def with_load_off(self, e: int, shift: LoadShift) -> "Decomposer":
+    def with_load_off(self, e: int, shift: LoadShift) -> Self:
         """Return the decomposer in which load e is off by a shift."""
         loads = tuple(replace(load, shift=shift) if e == at else load for at, load in enumerate(self.loads))
         return replace(
@@ -164,7 +164,7 @@ class Decomposer:
     def values(self, time: Array, q: Array, qd: Array, qdd: Array) -> Array:
         """Return all rows but those of a trace and of deviations, (rows, S); arguments are as of `fill`."""
         out = np.empty((len(self.rows), len(time)))
-        self._fill(out, time, self._consistent(time, q, qd, qdd))
+        self._fill(out, time, self._consistent(time, q, qd, qdd), closes=False)
         return out
 
     def fill(self, out: Array, time: Array, q: Array, qd: Array, qdd: Array) -> Closure:
@@ -174,13 +174,14 @@ class Decomposer:
         where ties cannot be closed or joints do not follow.
         """
         motion = self._consistent(time, q, qd, qdd)
-        closure, partial = self._fill(out, time, motion)
-        closure |= self._closure(out, partial)
+        closure = self._fill(out, time, motion)
         self.deviations.fill(out, self, time, motion)
         return closure
 
-    def _fill(self, out: Array, time: Array, motion: tuple[Array, Array, Array]) -> tuple[Closure, Array]:
-        """Fill `out` but for deviations; return the errors of induced parts, and tau_ij before contacts."""
+    def _fill(
+        self, out: Array, time: Array, motion: tuple[Array, Array, Array], closes: bool = True
+    ) -> Closure:
+        """Fill `out` but for deviations; return how well it closes, where that is asked for."""
         q, qd, qdd = motion
         packed: Any = self.robot.model.packed(q, qd, qdd)
         standing = self._standing(time, q)
@@ -203,14 +204,15 @@ class Decomposer:
         else:
             _spread(out, rows["tau_gravity"], packed.gravity, sources.gravity)
         self.forces.fill(out, rows, standing, time, motion, partial)
-        closure = self.induced.fill(out, unborne, standing, q, qd, qdd)
+        closure = self._closure(out, partial) if closes else Closure()
+        closure |= self.induced.fill(out, unborne, standing, q, qd, qdd)
         self.reactions.fill(out, rows, standing, time, motion)
         closure |= self.power.fill(out, unborne, standing, time, motion)
         if self.convention == "gradient":
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
             rows.put(out, "tau_qd", _left(standing, velocity))
         self._fill_power(out, qd)
-        return closure, partial
+        return closure
 
     def trace(
         self, out: Array, block: ExtendedBlock, state: TraceState | None

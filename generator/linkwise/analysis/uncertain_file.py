@@ -30,7 +30,7 @@ NOT_MODELLED = {
 }
 """Keys that others might expect, and what is so."""
 CERTAIN = "axes of joints, springs, damping, friction, armature"
-"""What counts as certain on every path."""
+"""All that counts as certain on every path."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,11 +33,11 @@ class LoadSpread(NamedTuple):
     """Standard deviations of a load along three axes, (3,) each."""
 
     force: Array
-    """In N."""
+    """Deviation of the force in N."""
     moment: Array
-    """Of the free moment in N m."""
+    """Deviation of the free moment in N m."""
     point: Array
-    """In m."""
+    """Deviation of the point in m."""
 
     def directions(self) -> list[LoadShift]:
         """Return independent changes of the load, of one standard deviation each."""
@@ -52,7 +52,7 @@ class StatedLoads(NamedTuple):
     """Uncertainty of loads as a file states it."""
 
     usual: LoadSpread | None
-    """That of every load without a table of its own."""
+    """Uncertainty of every load without a table of its own."""
     own: Mapping[str, LoadSpread]
 
     def placed(self, loads: Sequence[PlacedLoad], robot: OpenedRobot) -> tuple[LoadSpread | None, ...]:

@@ -72,7 +72,7 @@ class PlacedLoad:
     warnings: tuple[str, ...] = ()
     """Warnings about the file; each names it."""
     shift: LoadShift = NO_SHIFT
-    """What is added to every row, as errors are."""
+    """Addition to every row, as errors are."""
 
     def wrench(self, time: Array, q: Array, pose: Pose) -> Wrench:
         """Return the wrench that acts at instants (S,) with the robot at q (S, n)."""
