@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import threading
 import time
 from types import FrameType
 
@@ -10,6 +11,8 @@ from linkwise.own_runtime import require_own_runtime
 
 OVERDUE = 10.0
 """Seconds after which an interrupted command should have ended, also where others use the machine."""
+SOON = 0.02
+"""Seconds after which an interrupt comes again that met a finaliser, where Python would lose it."""
 
 
 def main() -> None:
@@ -41,11 +44,31 @@ def _heed_one_interrupt() -> None:
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         nonlocal overdue
-        if time.monotonic() >= overdue:
-            overdue = time.monotonic() + OVERDUE
-            signal.default_int_handler(number, frame)
+        if time.monotonic() < overdue:
+            return
+        if _finalises(frame):
+            threading.Timer(SOON, _to_main_thread, (number,)).start()
+            return
+        overdue = time.monotonic() + OVERDUE
+        signal.default_int_handler(number, frame)
 
     signal.signal(signal.SIGINT, interrupt)
+
+
+def _to_main_thread(number: int) -> None:
+    """Send a signal to the main thread, which may be waiting for something."""
+    main_thread = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main_thread is not None:
+        signal.pthread_kill(main_thread, number)
+    else:
+        signal.raise_signal(number)
+
+
+def _finalises(frame: FrameType | None) -> bool:
+    """Return whether an object is being deleted: what is raised there is printed, and lost."""
+    while frame is not None and frame.f_code.co_name != "__del__":
+        frame = frame.f_back
+    return frame is not None
 
 
 def _open_closed() -> None:

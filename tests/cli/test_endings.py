@@ -321,6 +321,28 @@ def test_the_first_ctrl_c_decides_and_another_only_where_the_end_is_overdue() ->
     assert done.stdout.split() == ["10.0", "20.1", "SIG_IGN"]
 
 
+DELETED = """
+import signal, time
+from linkwise import __main__ as start
+signal.signal(signal.SIGINT, signal.default_int_handler)
+start._heed_one_interrupt()
+class Writer:
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+        print("deleted")
+try:
+    Writer()
+    time.sleep(10)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+def test_ctrl_c_while_an_object_is_deleted_is_not_lost() -> None:
+    done = subprocess.run([sys.executable, "-c", DELETED], capture_output=True, text=True, check=True)
+    assert (done.stdout.split(), done.stderr) == (["deleted", "interrupted"], "")
+
+
 def test_quick_work_on_no_terminal_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     with progress.progress() as report:
         report("analysing", 1000, 1000)
