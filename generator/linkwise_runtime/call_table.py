@@ -189,7 +189,7 @@ DYNAMICS = (
         QDD,
         DEVIATIONS,
         Uncertainty,
-        options={"bodies": REQUIRED},
+        options={"bodies": None, "motion": None},
         rigid=True,
         lacking=("autograd",),
         out=False,

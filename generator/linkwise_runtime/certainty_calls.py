@@ -3,11 +3,13 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
+from numpy.typing import ArrayLike
+
 from .arrays.numpy_backend import NumpyBackend
 from .certainty.identifiability import Identifiability, identifiability
 from .certainty.share_bounds import ShareBounds, share_bounds
-from .certainty.share_deviations import uncertainty
 from .certainty.uncertain_bodies import UncertainBodies
+from .certainty.uncertain_shares import uncertainty
 from .interface import Array, array_of
 from .motion_calls import MotionCalls
 from .rule.calls import RigidRule
@@ -18,20 +20,29 @@ from .share_uncertainty import Uncertainty
 class CertaintyCalls(MotionCalls):
     """Calls on certainty; arguments and answers are as `Dynamics` says."""
 
-    def uncertainty(self, q: Array, qd: Array, qdd: Array, bodies: UncertainBodies) -> Uncertainty[Array]:
-        """Return standard deviations of shares, of their sums and powers, where bodies are uncertain.
+    def uncertainty(
+        self,
+        q: Array,
+        qd: Array,
+        qdd: Array,
+        bodies: UncertainBodies | None = None,
+        motion: ArrayLike | None = None,
+    ) -> Uncertainty[Array]:
+        """Return standard deviations of shares, of their sums and powers, by uncertain bodies and motion.
 
-        bodies: standard deviations of what links carry, an `UncertainBodies`
+        bodies: standard deviations of what links carry, or any covariance of it, an `UncertainBodies`
+        motion: covariance of q, qd and qdd, one after the other, (3 n, 3 n), or of each sample
+        (..., 3 n, 3 n); it is independent of the bodies
 
         Shares are linear in the links' inertial parameters, and the covariance of these is worked out
-        exactly, or given, as an identification has it; lengths, the places of joints, count to first order,
-        by exact derivatives. Deviations are about the shares' means; where centres are uncertain these differ
-        from the shares of the robot's own bodies, by what the mean of the inertia is more. Motion, axes of
-        joints, springs, damping, friction, armature and gravity count as certain; of reactions and induced
-        accelerations there are no deviations. Raises ValueError, which names the link, for deviations that
-        cannot be, and as `regressor` does.
+        exactly; lengths, the places of joints, count to first order, by exact derivatives. Deviations are
+        about the shares' means; where centres are uncertain these differ from the shares of the robot's own
+        bodies, by what the mean of the inertia is more. Motion counts by `divided_differences`, to second
+        order along each direction of its covariance. Axes of joints, springs, damping, friction, armature and
+        gravity count as certain. Raises ValueError, which names the link, for deviations and covariances that
+        cannot be, where nothing is uncertain, and as `regressor` does.
         """
-        found: Uncertainty[Array] = uncertainty(self, q, qd, qdd, bodies)
+        found: Uncertainty[Array] = uncertainty(self, q, qd, qdd, bodies, motion)
         return found
 
     def identifiability(self, measured: Sequence[int | str] | None = None) -> Identifiability:

@@ -144,6 +144,54 @@ def test_any_covariance_of_all_links_counts_as_its_draws_do(
     np.testing.assert_allclose(both**2, alone**2 + whole.joint_torque**2, rtol=1e-9)
 
 
+@pytest.mark.parametrize("backend", ["numpy", "torch", "native"])
+def test_a_covariance_of_motion_counts_as_its_draws_do(
+    backend: str, package_at: Callable[[str], ModuleType]
+) -> None:
+    package = package_at("puma560")
+    dynamics, draw = package.load(backend), np.random.default_rng(5)
+    n, motion = dynamics.n, random_states(dynamics.n, 2)
+    sizes = np.repeat([3e-3, 5e-2, 1.0], n)
+    mixed = draw.normal(size=(2, 3 * n, 3 * n)) * sizes[:, None] / np.sqrt(3 * n)
+    covariance = mixed @ mixed.mT
+    tensors = pytest.importorskip("torch").tensor if backend == "torch" else np.array
+    given = [tensors(a) for a in motion]
+    found = dynamics.uncertainty(*given, motion=covariance)
+    robot = package.load("numpy")
+    for s in range(2):
+        noise = draw.normal(size=(20_000, 3 * n)) @ mixed[s].T
+        q, qd, qdd = (a[s] + noise[:, k * n : (k + 1) * n] for k, a in enumerate(motion))
+        tau, (c2, c1, g) = robot.partial_torque(q, qd, qdd), robot.coefficients(q, qd)
+        agree(found.torque[s], tau.std(0))
+        agree(found.acceleration[s], (c2 * qdd[:, None, None]).std(0))
+        agree(found.velocity[s], (c1 * qd[:, None, None]).std(0))
+        agree(found.gravity[s], g.std(0))
+        agree(found.joint_torque[s], tau.sum(-1).std(0))
+        agree(found.joint_velocity[s], (c1 * qd[:, None, None]).sum(2).std(0))
+        agree(found.power[s], (tau * qd[:, :, None]).std(0))
+    bodies = UncertainBodies(0.1)
+    both, alone = (dynamics.uncertainty(*given, bodies, one).torque for one in (covariance, None))
+    np.testing.assert_allclose(both**2, alone**2 + found.torque**2, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (np.eye(6), r"motion has shape \(6, 6\); a covariance of q, qd and qdd has \(9, 9\), or \(2, 9, 9\)"),
+        (np.full((9, 9), np.nan), "motion has NaN or infinity"),
+        (-np.eye(9), "motion is no covariance"),
+        (np.eye(9) + np.eye(9, k=1), "motion is no covariance"),
+        ("much", "motion is 'much'; give a covariance of q, qd and qdd"),
+        (None, "nothing is uncertain; give bodies, motion or both"),
+    ],
+)
+def test_covariances_of_motion_that_cannot_be_are_refused(
+    given: Any, told: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    with pytest.raises(ValueError, match=told):
+        package_of("planar3").load("numpy").uncertainty(*random_states(3, 2), motion=given)
+
+
 def test_lengths_count_by_slopes_of_robots_whose_joints_are_elsewhere(
     package_at: Callable[[str], ModuleType],
 ) -> None:

@@ -1,7 +1,7 @@
 """Rows of a result that hold standard deviations, where bodies, motion or loads are uncertain.
 
 What bodies do to torques of an open tree, and to their powers, is known exactly from regressors; everything
-else by perturbing what is uncertain, see `perturbed_rows`. All three are independent of each other.
+else by perturbing what is uncertain, see `divided_differences`. All three are independent of each other.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,12 +10,12 @@ from functools import cached_property
 from typing import Any, Protocol, Self
 
 import numpy as np
+from linkwise_runtime.certainty.divided_differences import Direction, variances
 from linkwise_runtime.certainty.share_deviations import ShareDeviations, share_deviations
 
 from linkwise.analysis.loads.placed import LoadShift
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.perturbed_robots import perturbed_robots
-from linkwise.analysis.perturbed_rows import AT_ONCE, Direction, variances
 from linkwise.analysis.result_quantities import DEVIATION_OF, NOISE_OF, OF_BODIES, OF_LOADS, TORQUE_OF
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.settings import Convention
@@ -24,6 +24,8 @@ from linkwise.analysis.term_rows import TermArrays
 from linkwise.analysis.uncertain_inputs import UncertainInputs
 from linkwise.arrays import Array, Index
 
+AT_ONCE = 256
+"""Samples perturbed at once, whose rows stay in the cache."""
 Motion = tuple[Array, Array, Array]
 """q, qd and qdd, (S, n) each."""
 
@@ -111,12 +113,12 @@ class DeviationRows:
             q, qd, qdd = motion
             here: tuple[Array, Motion] = time[some], (q[some], qd[some], qdd[some])
             values = out[of, some]
-            found = variances(values, self._moved(plain, *here, of))
+            [found] = variances([values], self._moved(plain, *here, of))
             if len(apart):
                 out[apart, some] = np.sqrt(found)
-            found += variances(values, self._loaded(plain, *here, of))
+            found += variances([values], self._loaded(plain, *here, of))[0]
             if left.any():
-                found[left] += variances(values[left], self._carried(plain, *here, every[left]))
+                found[left] += variances([values[left]], self._carried(plain, *here, every[left]))[0]
             out[into, some] = found
         for name, deviations in exact.items():
             out[rows.numbers(f"sd/{name}")] += deviations**2
@@ -128,8 +130,8 @@ class DeviationRows:
         moves = () if noise is None else noise.directions(time)
         for number, move in enumerate(moves):
 
-            def rows(size: float, move: Motion = move) -> Array:
-                return plain.values(time, *(a + size * d for a, d in zip(motion, move, strict=True)))[of]
+            def rows(size: float, move: Motion = move) -> list[Array]:
+                return [plain.values(time, *(a + size * d for a, d in zip(motion, move, strict=True)))[of]]
 
             yield Direction(rows, is_linear=3 * number >= 2 * len(moves))
 
@@ -138,9 +140,9 @@ class DeviationRows:
         for e, spread in enumerate(self.uncertain.loads):
             for shift in () if spread is None else spread.directions():
 
-                def rows(size: float, e: int = e, shift: LoadShift = shift) -> Array:
+                def rows(size: float, e: int = e, shift: LoadShift = shift) -> list[Array]:
                     off = LoadShift(*(size * a for a in shift))
-                    return plain.with_load_off(e, off).values(time, *motion)[of]
+                    return [plain.with_load_off(e, off).values(time, *motion)[of]]
 
                 yield Direction(rows)
 
@@ -148,8 +150,8 @@ class DeviationRows:
         """Yield the directions of bodies."""
         for two in self._bodies:
 
-            def rows(size: float, two: tuple[OpenedRobot, OpenedRobot] = two) -> Array:
-                return plain.with_robot(two[0 if size > 0 else 1]).values(time, *motion)[of]
+            def rows(size: float, two: tuple[OpenedRobot, OpenedRobot] = two) -> list[Array]:
+                return [plain.with_robot(two[0 if size > 0 else 1]).values(time, *motion)[of]]
 
             yield Direction(rows, 1.0)
 

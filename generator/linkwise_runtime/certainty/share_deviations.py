@@ -9,7 +9,6 @@ of joints add (ds/dp)^2 for each direction p of one standard deviation: they are
 count to first order.
 """
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, NamedTuple, cast
@@ -19,11 +18,10 @@ import numpy as np
 from ..answers.packed import PackedTables
 from ..arrays.backend import ArrayBackend
 from ..chosen_names import known_kind
-from ..interface import Numbers, side_by_side
+from ..interface import Numbers
 from ..quantities import PARAMETERS
 from ..rule.calls import RigidRule
 from ..rule.joint_tree import JointTree
-from ..share_uncertainty import Uncertainty
 from .parameter_moments import Floats
 from .uncertain_bodies import (
     BodySpread,
@@ -162,33 +160,6 @@ class ShareDeviations:
     def spread(self, values: Numbers, field: str) -> Numbers:
         """Return packed values (S, count) of a field of `Layout` as (S, n, N) or (S, n, N, n)."""
         return self._tables.spread(values, field)
-
-
-def uncertainty(robot: Any, q: object, qd: object, qdd: object, bodies: object) -> Uncertainty[Any]:
-    """Return the answer of `Dynamics.uncertainty`."""
-    backend, motion = robot.door.read({"q": q, "qd": qd, "qdd": qdd})
-    backend.answers.check_regresses()
-    at = share_deviations(backend, bodies)
-    batch = tuple(motion[0].shape[:-1])
-    flat = [a.reshape(math.prod(batch), a.shape[-1]) for a in motion]
-    found, (_, rate, gain) = at.packed(flat), (abs(a) for a in flat)
-    c2, c1 = at.spread(found.c2, "acceleration"), at.spread(found.c1, "velocity")
-    torque = at.spread(found.torque, "torque")
-    answers = (
-        torque,
-        c2,
-        c1,
-        c2 * gain[:, None, None, :],
-        c1 * rate[:, None, None, :],
-        at.spread(found.gravity, "gravity"),
-        found.joint_torque,
-        found.joint_c2 * gain[:, None, :],
-        found.joint_c1 * rate[:, None, :],
-        found.joint_gravity,
-        torque * rate[:, :, None],
-        found.joint_torque * rate,
-    )
-    return Uncertainty(*(side_by_side(a.reshape(*batch, *a.shape[1:])) for a in answers))
 
 
 def share_deviations(backend: ArrayBackend, bodies: object) -> ShareDeviations:
