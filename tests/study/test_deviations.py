@@ -194,6 +194,20 @@ def test_bodies_and_spread_together_cover_the_truth_of_new_subjects() -> None:
     np.testing.assert_allclose(by_case(np.abs(of_new) < 1.645 * told.new), 0.9, atol=0.01)
 
 
+@pytest.mark.parametrize("with_bodies", [False, True])
+def test_noise_of_motion_is_new_in_each_cycle_and_bodies_are_not(tmp_path: Path, with_bodies: bool) -> None:
+    file = write_study(tmp_path, HEAD, KEPT, WITH, CYCLES, FIGURE, TRIALS, subjects=2)
+    noise = '[motion]\nangle = "1 mrad"\n'
+    (tmp_path / "bodies.toml").write_text((BODIES if with_bodies else "schema = 1\n") + noise)
+    assert run_study(file, tmp_path / "out", Here()).broken == ()
+    table = curve_table(tmp_path / "out").loc[("slow", "tau/joint1")]
+    assert (table["sd_random"] > 0).all()
+    assert ((table["sd_systematic"] > 1e-3 * table["sd_random"]).all()) == with_bodies
+    np.testing.assert_allclose(
+        table["sd_within"], np.hypot(table["sd_systematic"], table["sd_random"]), rtol=1e-12
+    )
+
+
 def test_a_group_with_a_trial_without_deviations_has_none(tmp_path: Path) -> None:
     one = TRIALS.replace("{condition}_{trial}", "slow_{trial}").replace("{condition}-{trial}", "slow-{trial}")
     slow, fast = (one.replace("slow", name) + f'condition = "{name}"\n' for name in ("slow", "fast"))

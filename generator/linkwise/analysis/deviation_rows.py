@@ -64,7 +64,7 @@ class DeviationRows:
     def places(self, others: Sequence[Place]) -> Iterator[Place]:
         """Yield the place of a deviation for each of these rows that has one, then of its part by motion."""
         wanted, given = self._wanted, self.uncertain
-        apart = given.motion is not None and (given.bodies is not None or any(given.loads))
+        apart = given.motion is not None and not given.is_of_motion_alone
         for of in (DEVIATION_OF, NOISE_OF) if apart else (DEVIATION_OF,):
             for deviation, quantity in of.items():
                 if quantity in wanted:

@@ -25,6 +25,11 @@ class UncertainInputs:
         """Uncertainty of the robot's bodies."""
         return None if self.stated is None else self.stated.bodies
 
+    @property
+    def is_of_motion_alone(self) -> bool:
+        """True if deviations are by noise of motion and nothing else."""
+        return self.motion is not None and self.bodies is None and not any(self.loads)
+
     def record(self) -> dict[str, Any] | None:
         """Return what was assumed as plain data; None where nothing is uncertain."""
         if self.stated is None:

@@ -18,7 +18,7 @@ from linkwise.analysis.logs.checks import named_once
 from linkwise.arrays import Array, Index, Mask
 from linkwise.errors import LinkwiseError, within
 from linkwise.extras import extra
-from linkwise.study.deviation_columns import is_deviation
+from linkwise.study.deviation_columns import RANDOM, WHOLE, is_deviation
 from linkwise.study.ledger import CURVES
 from linkwise.study.paths import opened_here
 from linkwise.study.plan import Cycles, StudyPlan
@@ -173,6 +173,7 @@ class TrialCycles:
     ) -> None:
         self._write, self._integrals = write, integrals
         self._names = [column.name for column in job.columns]
+        self._of_motion_alone = job.uncertain.is_of_motion_alone
         self._points = 0 if plan.cycles is None else plan.cycles.points
         self._moments = RunningMoments(len(self._names) * self._points)
         with within(job.source):
@@ -197,5 +198,10 @@ class TrialCycles:
         if not self._points:
             return
         self.sink.finish()
-        curves = self._moments.table.reshape(-1, len(self._names), self._points)
-        np.savez(draft / CURVES, curves=curves[:2], names=self._names, cycles=self.count)
+        curves = self._moments.table.reshape(-1, len(self._names), self._points)[:2]
+        names = list(self._names)
+        if self._of_motion_alone:
+            whole = [at for at, name in enumerate(names) if name.startswith(WHOLE)]
+            curves = np.concatenate([curves, curves[:, whole]], axis=1)
+            names += [f"{RANDOM}{names[at].removeprefix(WHOLE)}" for at in whole]
+        np.savez(draft / CURVES, curves=curves, names=names, cycles=self.count)
