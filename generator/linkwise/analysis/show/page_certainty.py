@@ -16,7 +16,12 @@ BODIES = {
     "length": ("Places of joints", 1000.0, "mm"),
 }
 """Words for what is uncertain of each link or joint, and how a number is told."""
-TOLD = ("file", "links", "joints", "body_mass", "segments", "correlation", "certain")
+LOADS = {
+    "force": ("Forces of loads", 1.0, "N"),
+    "moment": ("Free moments of loads", 1.0, "N·m"),
+    "point": ("Points of loads", 1000.0, "mm"),
+}
+TOLD = ("file", "links", "joints", "body_mass", "segments", "correlation", "motion", "loads", "certain")
 """Parts of the record that have words of their own."""
 
 
@@ -53,8 +58,8 @@ def _share(result: AnalysisResult, peak: LargestTorque) -> dict[str, Any]:
 
 def assumptions(record: Mapping[str, Any]) -> Iterator[str]:
     """Yield what an analysis assumed to be how uncertain, from its record, a line each."""
-    for key, (what, factor, unit) in BODIES.items():
-        every = [*record.get("links", ()), *record.get("joints", ())]
+    for key, (what, factor, unit) in (*BODIES.items(), *LOADS.items()):
+        every = [*record.get("links", ()), *record.get("joints", ()), *record.get("loads", ())]
         told = {one["name"]: _size(one[key], factor, unit) for one in every if key in one}
         if told:
             yield f"{what}: {_most(told)}."
@@ -63,11 +68,23 @@ def assumptions(record: Mapping[str, Any]) -> Iterator[str]:
         yield f"Mass of the body: ± {100 * record['body_mass']:.4g} %, with fixed parts: {links}."
     if record.get("correlation") is not None:
         yield "Errors of masses go together as the file says."
+    if record.get("motion"):
+        yield _of_motion(record["motion"])
     for key, value in record.items():
         if key not in TOLD and value:
             yield f"{key.replace('_', ' ').capitalize()}: {_plain(value)}."
     if record.get("certain"):
         yield f"Counted as certain: {record['certain']}."
+
+
+def _of_motion(record: Mapping[str, Any]) -> str:
+    """Return the noise of positions, in a line."""
+    told = {one["joint"]: f"± {1000.0 * one['sd']:.3g} m{one['unit']}" for one in record["noise"]}
+    matrix = record["correlation"]
+    most = max((abs(x) for i, row in enumerate(matrix) for x in row[:i]), default=0.0)
+    whence = ", from what the filter took away" if record["estimated_from_what_the_filter_took_away"] else ""
+    together = f"; noise of joints goes together, by correlations up to {most:.2f}" if most else ""
+    return f"Noise of positions{whence}: {_most(told)}{together}."
 
 
 def _size(value: float | Sequence[float], factor: float, unit: str) -> str:
