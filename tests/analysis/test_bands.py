@@ -201,13 +201,26 @@ def test_assumptions_are_told_and_those_that_nobody_knew_of_too() -> None:
         "segments": ["a", "b"],
         "correlation": [[1]],
     }
-    told = list(assumptions(record | {"certain": "axes", "motion": {"positions": 0.001, "unit": "rad"}}))
+    noise = [{"joint": name, "sd": sd, "unit": "rad"} for name, sd in (("d", 1e-3), ("e", 1e-3), ("f", 2e-3))]
+    motion = {
+        "noise": noise,
+        "correlation": [[1.0, 0.2, 0.0], [0.2, 1.0, -0.4], [0.0, -0.4, 1.0]],
+        "estimated_from_what_the_filter_took_away": True,
+    }
+    loads = [{"name": "tip", "force": [5.0] * 3, "moment": [0.0] * 3, "point": [0.005] * 3}]
+    more = {"motion": motion, "loads": loads, "axes": {"elbow": 0.01}, "certain": "springs"}
+    told = list(assumptions(record | more))
     assert told == [
         "Masses: ± 10 %; b ± 2.5 %.",
         "Centres of mass: ± 10 mm; c ± 10/0/2 mm.",
         "Radii of gyration: certain.",
+        "Forces of loads: ± 5 N.",
+        "Free moments of loads: certain.",
+        "Points of loads: ± 5 mm.",
         "Mass of the body: ± 5 %, with fixed parts: a, b.",
         "Errors of masses go together as the file says.",
-        "Motion: positions 0.001, unit rad.",
-        "Counted as certain: axes.",
+        "Noise of positions, from what the filter took away: ± 1 mrad; f ± 2 mrad; noise of joints goes"
+        " together, by correlations up to 0.40.",
+        "Axes: elbow 0.01.",
+        "Counted as certain: springs.",
     ]
