@@ -15,7 +15,7 @@ from linkwise.analysis.show.page_certainty import assumptions
 NAMES = ("ground", "tibia_r", "LeftForeArm", "box")
 JOINTS = ("knee", "elbow", "grip")
 LEG = robot(*map(link, NAMES), *(joint(*each) for each in zip(JOINTS, NAMES, NAMES[1:], strict=False)))
-"""Its root stands still; the others have 1.5 kg each."""
+"""Robot whose root stands still; its other links have 1.5 kg each."""
 
 
 @pytest.fixture(scope="module")
