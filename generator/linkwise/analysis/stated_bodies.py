@@ -17,11 +17,13 @@ links = ["upper_arm", "forearm"]
 links = ["upper_arm", "forearm"]
 matrix = [[1.0, 0.5], [0.5, 1.0]]
 [covariance]                 # of all inertial parameters of links: see `covariance_table`
+
+In [all] or [link.NAME], preset = "NAME" gives what the same table does not state: see `segment_presets`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from linkwise_runtime.certainty.share_deviations import share_deviations
@@ -29,6 +31,7 @@ from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies, checked
 
 from linkwise.analysis.covariance_table import covariance_of
 from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.segment_presets import FittedSegment, fitted_segment
 from linkwise.analysis.stated_sd import place_of, stated
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
@@ -42,17 +45,30 @@ OF_LINKS = {"mass": MASS, "centre": LENGTH, "radii": PART}
 """Units of each key of a link, by what brings them to parts, kg or m."""
 UNITS = OF_LINKS | {"length": LENGTH}
 """Units of each key, with that of joints."""
+KEYS_OF_ALL = (*UNITS, "preset")
+KEYS_OF_LINK = (*OF_LINKS, "preset", "segment")
 LARGEST = 1.0
 """Largest deviation as a part: with more, one normal mass in six is negative."""
 
 
-def read_bodies(data: Mapping[str, Any], robot: OpenedRobot) -> tuple[UncertainBodies, str]:
-    """Return what a file's data says of bodies, and its note on their covariance.
+class StatedBodies(NamedTuple):
+    """Bodies as a file says them."""
+
+    bodies: UncertainBodies
+    note: str
+    """Note on their covariance, in a line; "" without."""
+    fitted: Mapping[str, FittedSegment]
+    """Segments of presets that links are, by their names."""
+
+
+def read_bodies(data: Mapping[str, Any], robot: OpenedRobot) -> StatedBodies:
+    """Return what a file's data says of bodies.
 
     Raises LinkwiseError, which names table and key, for what cannot be.
     """
     parameters, note = covariance_of(data, partial(_links, robot=robot), robot.package.manifest.tree)
-    bodies = _bodies(data, robot)._replace(parameters=parameters)
+    bodies, fitted = _bodies(data, robot)
+    bodies = bodies._replace(parameters=parameters)
     if is_closed_form(robot):
         try:
             share_deviations(robot.model.backend, bodies)
@@ -60,7 +76,7 @@ def read_bodies(data: Mapping[str, Any], robot: OpenedRobot) -> tuple[UncertainB
             raise LinkwiseError(str(error)) from None
     else:
         check_lengths(bodies, "leave length out, or --contact and --payload")
-    return bodies, note
+    return StatedBodies(bodies, note, fitted)
 
 
 def check_lengths(bodies: UncertainBodies, mend: str) -> None:
@@ -85,20 +101,27 @@ def refuse_unmodelled(robot: OpenedRobot) -> None:
             raise LinkwiseError(f"--uncertain: {reason}")
 
 
-def _bodies(data: Mapping[str, Any], robot: OpenedRobot) -> UncertainBodies:
-    usual = known_keys("[all]", data.get("all", {}), UNITS)
-    own = _named(data, "link", robot.links, OF_LINKS, robot)
+def _bodies(data: Mapping[str, Any], robot: OpenedRobot) -> tuple[UncertainBodies, dict[str, FittedSegment]]:
+    usual = known_keys("[all]", data.get("all", {}), KEYS_OF_ALL)
+    own = _named(data, "link", robot.links, KEYS_OF_LINK, robot)
     found: dict[str, list[Any]] = {key: [] for key in OF_LINKS}
+    every: dict[str, FittedSegment] = {}
     assert robot.package.manifest.tree is not None  # as `refuse_unmodelled` has seen
     bodies = robot.package.manifest.tree.links
     for name, body in zip(robot.links[: link_count(robot)], bodies, strict=True):
         table = own.get(name, {})
+        fitted = fitted_segment(name, table, usual, body.mass)
+        if fitted is not None:
+            every[name] = fitted
         for key in OF_LINKS:
+            if fitted is not None and key not in (table if "preset" in table else {**usual, **table}):
+                found[key].append(fitted.deviations[key])
+                continue
             place = f"[link.{name}]" if key in table else "[all]"
             given = table.get(key, usual.get(key))
             found[key].append(_deviation(place, key, given, body.mass, name))
     part, segments = _body_mass(data, robot)
-    return UncertainBodies(
+    stated = UncertainBodies(
         np.array(found["mass"]),
         np.array(found["centre"]),
         np.array(found["radii"]),
@@ -107,6 +130,7 @@ def _bodies(data: Mapping[str, Any], robot: OpenedRobot) -> UncertainBodies:
         _correlation(data, robot),
         _lengths(data, usual, robot),
     )
+    return stated, every
 
 
 def _named(

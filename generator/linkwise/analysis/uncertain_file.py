@@ -6,7 +6,7 @@ schema = 1                   # tables of bodies: see `stated_bodies`
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
 
 from linkwise.analysis.covariance_table import MOST
 from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.segment_presets import FittedSegment, presets_record
 from linkwise.analysis.stated_bodies import TABLES, link_count, read_bodies, refuse_unmodelled
 from linkwise.analysis.uncertain_loads import StatedLoads, read_loads
 from linkwise.analysis.uncertain_motion import StatedNoise, read_motion
@@ -24,10 +25,7 @@ from linkwise.input_file import require_file
 from linkwise.package.decode import known_keys
 
 TOP = ("schema", *TABLES, "motion", "loads", "load")
-NOT_MODELLED = {
-    "axis": "axes of joints count as certain",
-    "preset": "there are no presets; write the numbers of your source",
-}
+NOT_MODELLED = {"axis": "axes of joints count as certain"}
 """Keys that others might expect, and what is so."""
 CERTAIN = "axes of joints, springs, damping, friction, armature"
 """All that counts as certain on every path."""
@@ -47,6 +45,8 @@ class UncertainRobot:
     """Joints of the tree."""
     note: str = ""
     """Note of the file on its covariance of parameters, in a line; "" without."""
+    fitted: Mapping[str, FittedSegment] = field(default_factory=dict)
+    """Segments of presets that links are, by their names."""
 
     def record(self) -> dict[str, Any]:
         """Return what was assumed of bodies as plain data: parts of masses and of radii, centres in m."""
@@ -72,6 +72,7 @@ class UncertainRobot:
             ],
             "correlation": None if given.correlation is None else np.asarray(given.correlation).tolist(),
             "covariance_of_parameters": given.parameters is not None,
+            "presets": presets_record(self.fitted),
             "note": self.note,
         }
 
@@ -95,13 +96,15 @@ def read_uncertain(path: Path, robot: OpenedRobot) -> UncertainRobot:
             raise LinkwiseError("nothing is uncertain; give [all], [link.NAME], [motion] or [loads]")
         motion = read_motion(data["motion"], robot) if "motion" in given else None
         loads = read_loads(data.get("loads"), data.get("load", {})) if given & {"loads", "load"} else None
-    bodies, note = None, ""
+    told = None
     if given & set(TABLES):
         refuse_unmodelled(robot)
         with within(str(path)):
-            bodies, note = read_bodies(data, robot)
-    links = robot.links[: link_count(robot)]
-    return UncertainRobot(path.name, bodies, motion, loads, links, robot.tree_joints, note)
+            told = read_bodies(data, robot)
+    named = (robot.links[: link_count(robot)], robot.tree_joints)
+    if told is None:
+        return UncertainRobot(path.name, None, motion, loads, *named)
+    return UncertainRobot(path.name, told.bodies, motion, loads, *named, told.note, told.fitted)
 
 
 def _tables(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:

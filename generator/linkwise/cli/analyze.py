@@ -98,9 +98,13 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
 
 
 def _of_bodies(analysis: Analysis) -> list[str]:
-    """Return a line on what a covariance of bodies is of, as its file says."""
-    uncertain = analysis.uncertain
-    return [f"{uncertain['file']}: {uncertain['note']}"] if uncertain and uncertain["note"] else []
+    """Return lines on which segments links are, and on what a covariance of bodies is of."""
+    uncertain = analysis.uncertain or {}
+    presets = [
+        f"{preset}: {', '.join(f'{link} is {segment}' for link, segment in told['segments'].items())}"
+        for preset, told in uncertain.get("presets", {}).items()
+    ]
+    return [f"{uncertain['file']}: {line}" for line in [*presets, uncertain.get("note")] if line]
 
 
 def _of_residual(analysis: Analysis) -> list[str]:
