@@ -104,8 +104,8 @@ class DeviationRows:
         of = together(every)
         apart = rows.numbers(*(name for name in NOISE_OF if name in rows))
         exact = {} if self._exact is None else self._of_bodies(self._exact, plain, motion)
-        left = np.array([DEVIATION_OF[name] not in exact for name in names for _ in rows[name].numbers])
-        left &= self.uncertain.bodies is not None
+        borne = OF_BODIES.difference(exact) if self.uncertain.bodies is not None else frozenset()
+        left = np.array([DEVIATION_OF[name] in borne for name in names for _ in rows[name].numbers])
         for at in range(0, len(time), AT_ONCE):
             some = slice(at, at + AT_ONCE)
             q, qd, qdd = motion
