@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from linkwise.analysis.product_rows import Pairs
 from linkwise.arrays import Array
 
 WIDTH = sqrt(3.0)
@@ -35,14 +36,16 @@ class Direction(NamedTuple):
     """True if no row is more than linear along it."""
 
 
-def variances(rows: Array, directions: Iterator[Direction]) -> Array:
-    """Return the variances of rows (rows, S) by all directions, (rows, S)."""
+def variances(rows: Array, directions: Iterator[Direction], pairs: Pairs | None = None) -> Array:
+    """Return the variances of rows (rows, S) by all directions, (rows, S), which are added to `pairs` too."""
     found = np.zeros_like(rows)
     for along, width, is_linear in directions:
         ahead = along(width)
         if is_linear:
             ahead -= rows
             ahead *= 1.0 / width
+            if pairs is not None:
+                pairs.add(ahead)
             ahead *= ahead
             found += ahead
             continue
@@ -55,6 +58,8 @@ def variances(rows: Array, directions: Iterator[Direction]) -> Array:
             found += bent
         ahead -= behind
         ahead *= 0.5 / width
+        if pairs is not None:
+            pairs.add(ahead)
         ahead *= ahead
         found += ahead
     return found
