@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import DATA, LOCKED_FINGERS, PANDA
-from helpers.motion_logs import smooth, write_csv
+from helpers.motion_logs import PLANAR3, smooth, write_csv
 from linkwise import (
     Lowpass,
     Options,
@@ -133,6 +133,24 @@ def test_noise_is_estimated_from_what_the_filter_took_away(panda: Path) -> None:
         assert abs(told["correlation"][2][3]) < 0.1
         said = "noise of positions, from what the filter took away: panda_joint1 "
         assert any(said in warning for warning in result.warnings)
+
+
+@pytest.mark.parametrize(
+    ("slowness", "told"), [(0.0, ""), (0.7, "what the filter took away of joint2 is not noise")]
+)
+def test_noise_that_goes_on_from_sample_to_sample_is_told(slowness: float, told: str, tmp_path: Path) -> None:
+    signal = pytest.importorskip("scipy.signal")
+    noise = 1e-3 * np.random.default_rng(3).normal(size=(3000, 3))
+    noise[:, 1] = signal.lfilter([1.0], [1.0, -slowness], noise[:, 1])
+    table = smooth(3000, 3)
+    table[:, 1:] = 0.3 * np.sin(0.4 * table[:, 1:]) + noise
+    write_csv(tmp_path / "log.csv", table)
+    (tmp_path / "estimate.toml").write_text("schema = 1\n[motion]\nestimate = true\n")
+    for how in (Processing(lowpass=LOWPASS), Processing(derivative="savitzky-golay")):
+        result = analyze(tmp_path / "log.csv", PLANAR3, processing=how, uncertain=tmp_path / "estimate.toml")
+        found = [warning for warning in result.warnings if "is not noise" in warning]
+        assert len(found) == bool(told)
+        assert all(told in one for one in found)
 
 
 BOTH = 'schema = 1\n[motion]\nangle = "2 mrad"\nlength = "1 mm"\n[all]\nmass = "5 %"\ncentre = "4 mm"\n'
