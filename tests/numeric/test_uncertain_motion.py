@@ -168,22 +168,22 @@ def test_reactions_and_induced_accelerations_deviate_as_those_of_draws(tmp_path:
     result = analyze(
         tmp_path / "log.csv",
         tmp_path / "crane",
-        processing=Processing(lowpass=LOWPASS),
+        processing=Processing(lowpass=LOWPASS, start=MIDDLE[0] / RATE, stop=MIDDLE[-1] / RATE),
         uncertain=tmp_path / "both.toml",
         reactions=[tip],
         induced=["boom"],
     )
     sd = np.array([2e-3 if unit == "rad" else 1e-3 for unit in model.joint_units])
     drawn = package.load("numpy", bodies=drawn_bodies(package, DRAWS, mass=0.05, centre=0.004))
-    for at in MIDDLE[::2]:
-        motion = drawn_at(table[:, 1:], np.diag(sd), at)
+    for at in (0, -1):
+        motion = drawn_at(table[:, 1:], np.diag(sd), MIDDLE[at])
         found = drawn.reactions(*motion, joints=[tip])
         whole = (found.acceleration + found.velocity).sum((-2, -3))[:, 0] + found.gravity.sum(-2)[:, 0]
         agree(result.dense("sd/reaction")[at, 0], whole.std(0))
         agree(result.dense("sd/tau")[at], drawn.inverse_dynamics(*motion).std(0))
         agree(result.dense("sd/tau_link")[at], drawn.partial_torque(*motion).std(0))
-        induced = drawn.induced_accelerations(*motion[:2], qdd=motion[2], frame="boom")
-        agree(result.dense("sd/acc_tau")[at, 0], induced.actuators.std(0))
+    induced = drawn.induced_accelerations(*motion[:2], qdd=motion[2], frame="boom")
+    agree(result.dense("sd/acc_tau")[-1, 0], induced.actuators.std(0))
 
 
 def test_tied_joints_and_forces_of_ties_deviate_as_those_of_draws(tmp_path: Path) -> None:
