@@ -1,6 +1,6 @@
 """Deviations by noise of positions, by loads and by bodies, against draws through the whole chain.
 
-Noise goes through SciPy's own filter and five-point formulas of this file, torques of arms are Pinocchio's.
+Torques of arms are Pinocchio's.
 """
 
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import DATA, LOCKED_FINGERS, PANDA
-from helpers.motion_logs import smooth, write_csv
+from helpers.motion_logs import PLANAR3, smooth, write_csv
 from linkwise import (
     Lowpass,
     Options,
@@ -24,7 +24,8 @@ from linkwise.analysis.passed_noise import PassedNoise
 from linkwise.package.load import import_package
 from numpy.typing import NDArray
 
-from numeric.drawn_bodies import agree
+from numeric.drawn_bodies import DRAWS, agree
+from numeric.draws import drawn_bodies, drawn_motions, passed
 
 RATE, COUNT = 100.0, 160
 LOWPASS = Lowpass(8.0)
@@ -32,26 +33,9 @@ MIDDLE = (60, 80, 101)
 Floats = NDArray[np.float64]
 
 
-def filtered(x: Floats) -> Floats:
-    """Return positions behind the zero-phase filter, by SciPy, padded by all but one sample."""
-    signal = pytest.importorskip("scipy.signal")
-    sos = signal.butter(LOWPASS.order, LOWPASS.cutoff, fs=RATE, output="sos")
-    found: Floats = signal.sosfiltfilt(sos, x, axis=0, padtype="odd", padlen=min(len(x) - 1, 60))
-    return found
-
-
-def derived(x: Floats, at: int) -> tuple[Floats, Floats, Floats]:
-    """Return q, qd and qdd at a sample inside, by central formulas of five points."""
-    first, second = (1, -8, 0, 8, -1), (-1, 16, -30, 16, -1)
-    near = x[at - 2 : at + 3]
-    qd, qdd = (np.tensordot(w, near, 1) / 12.0 for w in (first, second))
-    return near[2], qd * RATE, qdd * RATE**2
-
-
-def drawn_motions(q: Floats, root: Floats, at: int, draws: int, seed: int = 0) -> tuple[Floats, ...]:
-    """Return q, qd, qdd (draws, n) at a sample, of positions (S, n) with noise of covariance root root^T."""
-    noise = np.random.default_rng(seed).normal(size=(len(q), draws, q.shape[1])) @ root.T
-    return derived(filtered(q[:, None] + noise), at)
+def drawn_at(q: Floats, root: Floats, at: int) -> tuple[Floats, ...]:
+    """Return q, qd and qdd (draws, n) at a sample, of positions (S, n) with noise of that covariance."""
+    return drawn_motions(passed(len(q), at, RATE, LOWPASS.cutoff, LOWPASS.order), q, root, DRAWS)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +73,7 @@ def test_torques_and_shares_of_panda_deviate_as_those_of_noisy_logs(panda: Path)
     data, shares = model.createData(), import_package(panda / "panda").load("numpy")
     raw = np.loadtxt(panda / "log.csv", delimiter=",", skiprows=1)[:, 1:]
     for at in MIDDLE:
-        q, qd, qdd = drawn_motions(raw, root, at, 20_000)
+        q, qd, qdd = drawn_at(raw, root, at)
         torque = np.array([pin.rnea(model, data, *motion) for motion in zip(q, qd, qdd, strict=True)])
         agree(result.dense("sd/tau")[at], torque.std(0))
         for name, drawn in zip(("q", "qd", "qdd"), (q, qd, qdd), strict=True):
@@ -151,18 +135,25 @@ def test_noise_is_estimated_from_what_the_filter_took_away(panda: Path) -> None:
         assert any(said in warning for warning in result.warnings)
 
 
-def drawn_bodies(package: Any, draws: int, links: int) -> Any:
-    """Return bodies whose masses have 5 % and whose centres 4 mm of deviation, of one radius of gyration."""
-    own, draw = package.bodies(), np.random.default_rng(9)
-    factors = 1.0 + 0.05 * draw.normal(size=(draws, links))
-    centres = own.centres + 0.004 * draw.normal(size=(draws, links, 3))
-    return own._replace(
-        masses=own.masses * factors, centres=centres, inertias=own.inertias * factors[..., None, None]
-    )
+@pytest.mark.parametrize(
+    ("slowness", "told"), [(0.0, ""), (0.7, "what the filter took away of joint2 is not noise")]
+)
+def test_noise_that_goes_on_from_sample_to_sample_is_told(slowness: float, told: str, tmp_path: Path) -> None:
+    signal = pytest.importorskip("scipy.signal")
+    noise = 1e-3 * np.random.default_rng(3).normal(size=(3000, 3))
+    noise[:, 1] = signal.lfilter([1.0], [1.0, -slowness], noise[:, 1])
+    table = smooth(3000, 3)
+    table[:, 1:] = 0.3 * np.sin(0.4 * table[:, 1:]) + noise
+    write_csv(tmp_path / "log.csv", table)
+    (tmp_path / "estimate.toml").write_text("schema = 1\n[motion]\nestimate = true\n")
+    for how in (Processing(lowpass=LOWPASS), Processing(derivative="savitzky-golay")):
+        result = analyze(tmp_path / "log.csv", PLANAR3, processing=how, uncertain=tmp_path / "estimate.toml")
+        found = [warning for warning in result.warnings if "is not noise" in warning]
+        assert len(found) == bool(told)
+        assert all(told in one for one in found)
 
 
 BOTH = 'schema = 1\n[motion]\nangle = "2 mrad"\nlength = "1 mm"\n[all]\nmass = "5 %"\ncentre = "4 mm"\n'
-DRAWS = 20_000
 
 
 def test_reactions_and_induced_accelerations_deviate_as_those_of_draws(tmp_path: Path) -> None:
@@ -177,22 +168,22 @@ def test_reactions_and_induced_accelerations_deviate_as_those_of_draws(tmp_path:
     result = analyze(
         tmp_path / "log.csv",
         tmp_path / "crane",
-        processing=Processing(lowpass=LOWPASS),
+        processing=Processing(lowpass=LOWPASS, start=MIDDLE[0] / RATE, stop=MIDDLE[-1] / RATE),
         uncertain=tmp_path / "both.toml",
         reactions=[tip],
         induced=["boom"],
     )
     sd = np.array([2e-3 if unit == "rad" else 1e-3 for unit in model.joint_units])
-    drawn = package.load("numpy", bodies=drawn_bodies(package, DRAWS, len(model.link_names)))
-    for at in MIDDLE:
-        motion = drawn_motions(table[:, 1:], np.diag(sd), at, DRAWS)
+    drawn = package.load("numpy", bodies=drawn_bodies(package, DRAWS, mass=0.05, centre=0.004))
+    for at in (0, -1):
+        motion = drawn_at(table[:, 1:], np.diag(sd), MIDDLE[at])
         found = drawn.reactions(*motion, joints=[tip])
         whole = (found.acceleration + found.velocity).sum((-2, -3))[:, 0] + found.gravity.sum(-2)[:, 0]
         agree(result.dense("sd/reaction")[at, 0], whole.std(0))
         agree(result.dense("sd/tau")[at], drawn.inverse_dynamics(*motion).std(0))
         agree(result.dense("sd/tau_link")[at], drawn.partial_torque(*motion).std(0))
-        induced = drawn.induced_accelerations(*motion[:2], qdd=motion[2], frame="boom")
-        agree(result.dense("sd/acc_tau")[at, 0], induced.actuators.std(0))
+    induced = drawn.induced_accelerations(*motion[:2], qdd=motion[2], frame="boom")
+    agree(result.dense("sd/acc_tau")[-1, 0], induced.actuators.std(0))
 
 
 def test_tied_joints_and_forces_of_ties_deviate_as_those_of_draws(tmp_path: Path) -> None:
@@ -208,10 +199,10 @@ def test_tied_joints_and_forces_of_ties_deviate_as_those_of_draws(tmp_path: Path
     result = analyze(
         tmp_path / "log.csv", tmp_path / "fourbar", processing=how, uncertain=tmp_path / "both.toml"
     )
-    drawn = package.load("numpy", bodies=drawn_bodies(package, DRAWS, len(model.link_names))).constraints
+    drawn = package.load("numpy", bodies=drawn_bodies(package, DRAWS, mass=0.05, centre=0.004)).constraints
     own = [model.joint_names.index(name) for name in free]
     for at in MIDDLE:
-        moved = drawn_motions(table[:, 1:], 2e-3 * np.eye(len(free)), at, DRAWS)
+        moved = drawn_at(table[:, 1:], 2e-3 * np.eye(len(free)), at)
         start = np.broadcast_to(result.q[at], (DRAWS, len(model.joint_names))).copy()
         start[:, own] = moved[0]
         q = model.constraints.closed(start)

@@ -4,10 +4,10 @@ What bodies do to torques of an open tree, and to their powers, is known exactly
 else by perturbing what is uncertain, see `divided_differences`. All three are independent of each other.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from linkwise_runtime.certainty.divided_differences import Direction, variances
@@ -16,7 +16,8 @@ from linkwise_runtime.certainty.share_deviations import ShareDeviations, share_d
 from linkwise.analysis.loads.placed import LoadShift
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.perturbed_robots import perturbed_robots
-from linkwise.analysis.result_quantities import DEVIATION_OF, NOISE_OF, OF_BODIES, OF_LOADS, TORQUE_OF
+from linkwise.analysis.product_rows import Pairs, ProductRows
+from linkwise.analysis.result_quantities import DEVIATION_OF, MOTION, NOISE_OF, OF_BODIES, OF_LOADS, TORQUE_OF
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.stated_bodies import is_closed_form
@@ -38,7 +39,7 @@ class Perturbable(Protocol):
         """Rows of the result."""
 
     def values(self, time: Array, q: Array, qd: Array, qdd: Array) -> Array:
-        """Return all rows but those of deviations, (rows, S)."""
+        """Return all rows but those of deviations, then c2 and c1 of rows tau_qdd and tau_qd, (rows, S)."""
 
     def with_robot(self, robot: OpenedRobot) -> Self:
         """Return the decomposition of another robot of the same joints and links."""
@@ -49,6 +50,22 @@ class Perturbable(Protocol):
 
 Some = slice | Index
 """Rows, as a slice where they follow each other."""
+FACTORS = "factors"
+"""Name under which the factors c2 and c1 of torques by cause stand beside quantities."""
+
+
+class PerturbedRows(NamedTuple):
+    """Rows whose variances are found, among those of `Perturbable.values`."""
+
+    of: Some
+    borne: Index
+    """Those that are perturbed by bodies."""
+    left: Array
+    """Whether each is such, (rows,)."""
+    places: Mapping[str, slice]
+    """Where each quantity, and the factors, are among them."""
+    products: ProductRows | None
+    """Products of what is uncertain; None where motion is not."""
 
 
 @dataclass(frozen=True)
@@ -102,27 +119,54 @@ class DeviationRows:
         names = [name for name in DEVIATION_OF if name in rows]
         if not names:
             return
-        into, every = rows.numbers(*names), rows.numbers(*(DEVIATION_OF[name] for name in names))
-        of = together(every)
-        apart = rows.numbers(*(name for name in NOISE_OF if name in rows))
+        into, apart = rows.numbers(*names), rows.numbers(*(name for name in NOISE_OF if name in rows))
         exact = {} if self._exact is None else self._of_bodies(self._exact, plain, motion)
-        left = np.array([DEVIATION_OF[name] not in exact for name in names for _ in rows[name].numbers])
-        left &= self.uncertain.bodies is not None
+        every = self._perturbed(rows, [DEVIATION_OF[name] for name in names], frozenset(exact))
         for at in range(0, len(time), AT_ONCE):
             some = slice(at, at + AT_ONCE)
             q, qd, qdd = motion
-            here: tuple[Array, Motion] = time[some], (q[some], qd[some], qdd[some])
-            values = out[of, some]
-            [found] = variances([values], self._moved(plain, *here, of))
-            if len(apart):
-                out[apart, some] = np.sqrt(found)
-            found += variances([values], self._loaded(plain, *here, of))[0]
-            if left.any():
-                found[left] += variances([values[left]], self._carried(plain, *here, every[left]))[0]
-            out[into, some] = found
-        for name, deviations in exact.items():
-            out[rows.numbers(f"sd/{name}")] += deviations**2
-        out[into] = np.sqrt(out[into])
+            moved, found, pairs = self._variances(plain, every, time[some], (q[some], qd[some], qdd[some]))
+            for name, deviations in exact.items():
+                found[every.places[name]] += deviations[:, some] ** 2
+            for variance, numbers in ((moved, apart), (found, into)):
+                if pairs is not None and len(numbers):
+                    pairs.widen(variance)
+                out[numbers, some] = np.sqrt(variance[: len(numbers)])
+
+    def _perturbed(self, rows: ResultRows, names: Sequence[str], exact: frozenset[str]) -> "PerturbedRows":
+        """Return the rows of these quantities, then the factors of torques by cause.
+
+        exact: quantities whose variances by bodies are known otherwise
+        """
+        count = sum(len(rows[name].numbers) for name in MOTION)
+        numbers = [*(rows[name].numbers for name in names), rows.plain + np.arange(count)]
+        ends = np.cumsum([len(some) for some in numbers])
+        spans = [slice(end - len(some), end) for end, some in zip(ends.tolist(), numbers, strict=True)]
+        places, every = dict(zip((*names, FACTORS), spans, strict=True)), np.concatenate(numbers)
+        left = np.zeros(len(every), bool)
+        if self.uncertain.bodies is not None:
+            for name in (OF_BODIES | {FACTORS}).difference(exact).intersection(places):
+                left[places[name]] = True
+        products = None if self.uncertain.motion is None else ProductRows.of(rows, places, FACTORS)
+        return PerturbedRows(together(every), every[left], left, places, products)
+
+    def _variances(
+        self, plain: Perturbable, every: "PerturbedRows", time: Array, motion: Motion
+    ) -> tuple[Array, Array, Pairs | None]:
+        """Return variances of rows by noise of motion, by all that is perturbed, and pairs of directions."""
+        given, of = self.uncertain, every.of
+        pairs = None if every.products is None else Pairs(every.products, len(time))
+        if given.motion is None and not any(given.loads) and not len(every.borne):
+            found = np.zeros((len(every.left), len(time)))
+            return found, found, pairs
+        values = plain.values(time, *motion)[of]
+        note = None if pairs is None else pairs.add
+        [moved] = variances([values], self._moved(plain, time, motion, of), note)
+        found = moved + variances([values], self._loaded(plain, time, motion, of))[0]
+        if len(every.borne):
+            carried = self._carried(plain, time, motion, every.borne)
+            found[every.left] += variances([values[every.left]], carried)[0]
+        return moved, found, pairs
 
     def _moved(self, plain: Perturbable, time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
         """Yield the directions of motion, along which rows `of` are known."""
@@ -163,15 +207,13 @@ class DeviationRows:
         c2, c1, gravity, torque, whole = (np.asarray(a) for a in found[:5])
         twice = 2.0 if self.convention == "gradient" else 1.0
         answers = {"tau": whole[:, rows["tau"].at[:, 0]].T}
-        for name, values, places, moves in (
-            ("tau_link", torque, self.sources.torque, None),
-            ("tau_qdd", c2, self.sources.acceleration, qdd),
-            ("tau_qd", c1, self.sources.velocity, twice * qd),
-            ("tau_gravity", gravity, self.sources.gravity, None),
-        ):
-            answers[name] = values[:, places].T
-            if moves is not None:
-                answers[name] = answers[name] * np.abs(moves[:, rows[name].at[:, 2]]).T
+        sources = self.sources
+        factors = [c2[:, sources.acceleration].T, twice * c1[:, sources.velocity].T]
+        for name, values, moves in zip(MOTION, factors, (qdd, qd), strict=True):
+            answers[name] = values * np.abs(moves[:, rows[name].at[:, 2]]).T
+        answers["tau_link"] = torque[:, sources.torque].T
+        answers["tau_gravity"] = gravity[:, sources.gravity].T
+        answers[FACTORS] = np.concatenate(factors)
         for power, of in TORQUE_OF.items():
             if of in answers and power in rows:
                 answers[power] = answers[of] * np.abs(qd[:, rows[power].at[:, 0]]).T

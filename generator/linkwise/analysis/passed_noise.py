@@ -6,8 +6,9 @@ positions x. Noise of these, independent from sample to sample with deviation si
     sigma^2 G_t        G_t = [A_t; B_t; C_t] [A_t; B_t; C_t]^T
 
 What the filter takes away, x - A x, has the variance sigma^2 (1 - 2 A_tt + |A_t|^2), by which noise is
-estimated from it. The sums are what filter and derivatives make of single ones: of all samples of a short log
-and of a long one near its ends and in its middle, between which they are the same.
+estimated from it, and a covariance from sample to sample, by which noise that is not independent is told.
+The sums are what filter and derivatives make of single ones: of all samples of a short log and of a long one
+near its ends and in its middle, between which they are the same.
 """
 
 from collections.abc import Iterator
@@ -32,6 +33,8 @@ class PassedNoise:
     """G_t of the samples of a log that is as long or shorter, (L, 3, 3), of q, qd and qdd, per s and s^2."""
     removed: Array
     """1 - 2 A_tt + |A_t|^2 of the same samples, (L,)."""
+    followed: Array
+    """Covariance of what is taken away there and at the next sample, per that of noise, (L,); the last 0."""
 
     @classmethod
     def of(cls, samples: int, rate: float, processing: Processing) -> "PassedNoise":
@@ -40,12 +43,15 @@ class PassedNoise:
         if processing.lowpass is not None:
             reach += filter_memory(rate, processing.lowpass)
         length = min(samples, 4 * reach + 1)
-        gram, itself = np.zeros((length, 3, 3)), np.zeros(length)
+        gram, removed, followed = np.zeros((length, 3, 3)), np.zeros(length), np.zeros(length)
         for first, motion in _responses(length, rate, processing):
             gram += np.einsum("atm,btm->tab", motion, motion)
             ones = np.arange(motion.shape[2])
-            itself[first + ones] = motion[0, first + ones, ones]
-        return cls(samples, gram, 1.0 - 2.0 * itself + gram[:, 0, 0])
+            taken = -motion[0]
+            taken[first + ones, ones] += 1.0
+            removed += np.einsum("tm,tm->t", taken, taken)
+            followed[:-1] += np.einsum("tm,tm->t", taken[:-1], taken[1:])
+        return cls(samples, gram, removed, followed)
 
     def alike(self, sample: Index) -> Index:
         """Return the samples of the shorter log that are as these are, (S,)."""

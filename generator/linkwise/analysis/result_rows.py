@@ -30,7 +30,7 @@ from linkwise.escape import column_part
 
 Place = tuple[str, tuple[int, ...]]
 """A quantity, and the index along each of its axes."""
-DEVIATION = "sd/"
+DEVIATION, OF_MOTION = "sd/", "sd-motion/"
 """Beginning of the name of a quantity that is the standard deviation of the one named behind it."""
 OVER_TIME = {"velocity": "/s", "acceleration": "/s²"}
 FIELD_OF = {"load": "cause", "share": "cause", "contact": "cause", "constraint": "cause", "component": "row"}
@@ -153,6 +153,11 @@ class ResultRows:
                 numbers, at = numbers[asked], at[asked]
             found.append(numbers)
         return np.concatenate(found)
+
+    @cached_property
+    def plain(self) -> int:
+        """Number of the rows before those of deviations, which come last."""
+        return sum(not name.startswith((DEVIATION, OF_MOTION)) for name, _ in self.places)
 
     @cached_property
     def _beside(self) -> dict[int, int]:

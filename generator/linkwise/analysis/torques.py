@@ -162,9 +162,14 @@ class Decomposer:
         )
 
     def values(self, time: Array, q: Array, qd: Array, qdd: Array) -> Array:
-        """Return all rows but those of a trace and of deviations, (rows, S); arguments are as of `fill`."""
-        out = np.empty((len(self.rows), len(time)))
-        self._fill(out, time, self._consistent(time, q, qd, qdd), closes=False)
+        """Return all rows but those of a trace and of deviations, then factors; arguments are as of `fill`.
+
+        They are (rows, S); factors are c2 of all rows tau_qdd and c1 of all rows tau_qd, which times the
+        cause's motion are these.
+        """
+        plain, (acceleration, velocity) = self.rows.plain, self.sources[:2]
+        out = np.empty((plain + len(acceleration) + len(velocity), len(time)))
+        self._fill(out[:plain], time, self._consistent(time, q, qd, qdd), out[plain:])
         return out
 
     def fill(self, out: Array, time: Array, q: Array, qd: Array, qdd: Array) -> Closure:
@@ -179,9 +184,9 @@ class Decomposer:
         return closure
 
     def _fill(
-        self, out: Array, time: Array, motion: tuple[Array, Array, Array], closes: bool = True
+        self, out: Array, time: Array, motion: tuple[Array, Array, Array], factors: Array | None = None
     ) -> Closure:
-        """Fill `out` but for deviations; return how well it closes, where that is asked for."""
+        """Fill `out` but for deviations; return how well it closes, unless `factors` are to be filled too."""
         q, qd, qdd = motion
         packed: Any = self.robot.model.packed(q, qd, qdd)
         standing = self._standing(time, q)
@@ -204,7 +209,7 @@ class Decomposer:
         else:
             _spread(out, rows["tau_gravity"], packed.gravity, sources.gravity)
         self.forces.fill(out, rows, standing, time, motion, partial)
-        closure = self._closure(out, partial) if closes else Closure()
+        closure = self._closure(out, partial) if factors is None else Closure()
         closure |= self.induced.fill(out, unborne, standing, q, qd, qdd)
         self.reactions.fill(out, rows, standing, time, motion)
         closure |= self.power.fill(out, unborne, standing, time, motion)
@@ -212,6 +217,10 @@ class Decomposer:
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
             rows.put(out, "tau_qd", _left(standing, velocity))
         self._fill_power(out, qd)
+        if factors is not None:
+            count, twice = len(sources.acceleration), 2.0 if self.convention == "gradient" else 1.0
+            factors[:count] = packed.acceleration.T[sources.acceleration]
+            factors[count:] = twice * packed.velocity.T[sources.velocity]
         return closure
 
     def trace(

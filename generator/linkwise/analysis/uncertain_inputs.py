@@ -57,3 +57,5 @@ class UncertainInputs:
         """Yield what was found out about noise."""
         if self.motion is not None and self.motion.is_estimated:
             yield self.motion.told
+            if self.motion.suspicion:
+                yield self.motion.suspicion

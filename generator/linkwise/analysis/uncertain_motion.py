@@ -64,6 +64,8 @@ class MotionNoise:
     rate: float
     joints: tuple[str, ...]
     units: tuple[str, ...]
+    followed: tuple[float, ...] = ()
+    """Correlation of what was taken away of each joint with the next sample's, where noise is estimated."""
 
     @property
     def deviations(self) -> Array:
@@ -112,9 +114,32 @@ class MotionNoise:
         whence = "from what the filter took away" if self.is_estimated else "as stated"
         return f"noise of positions, {whence}: {', '.join(some[:SHOWN])}{more}"
 
+    @property
+    def suspicion(self) -> str:
+        """Phrase about joints of which more, or less, than independent noise was taken away; "" without."""
+        own = self.passage.followed.sum() / self.passage.removed.sum() if self.followed else 0.0
+        least = max(ALIKE, CHANCE / self.passage.samples**0.5)
+        apart = [
+            (abs(found - own), joint, found)
+            for joint, found, sd in zip(self.joints, self.followed, self.deviations, strict=False)
+            if sd and abs(found - own) > least
+        ]
+        if not apart:
+            return ""
+        _, worst, found = max(apart)
+        more = f" and of {len(apart) - 1} more" if len(apart) > 1 else ""
+        return (
+            f"what the filter took away of {worst}{more} is not noise that is independent from sample to"
+            f" sample: it correlates by {found:.2f} with the next sample's, and such noise by {own:.2f};"
+            " motion above the cutoff makes deviations larger than they are, slow noise smaller"
+        )
+
 
 SHOWN = 8
 """Joints whose noise a phrase tells."""
+ALIKE, CHANCE = 0.1, 4.0
+"""Difference of correlations from sample to sample, also as a multiple of one over the root of their number,
+from which on noise does not count as independent."""
 
 
 def read_motion(data: Any, robot: OpenedRobot) -> StatedNoise:
@@ -185,7 +210,7 @@ def motion_noise(
             " together; leave --resample out"
         )
     passage = PassedNoise.of(len(samples.time), samples.rate, processing)
-    covariance, driven = asked.covariance, np.zeros(len(robot.joints))
+    covariance, driven, followed = asked.covariance, np.zeros(len(robot.joints)), ()
     driven[list(robot.driven)] = 1.0
     if covariance is None:
         if processing.lowpass is None and processing.derivative == "five-point":
@@ -197,10 +222,13 @@ def motion_noise(
         taken = raw - made
         removed = passage.removed[passage.alike(np.arange(len(raw)))].sum()
         covariance = taken.T @ taken / removed
+        sizes = (taken**2).sum(0)
+        followed = tuple(((taken[:-1] * taken[1:]).sum(0) / np.where(sizes > 0.0, sizes, 1.0)).tolist())
     covariance = covariance * np.outer(driven, driven)
     first, units = float(samples.time[0]), tuple(robot.units)
     estimated = asked.covariance is None
-    return MotionNoise(covariance, passage, estimated, first, samples.rate, tuple(robot.joints), units)
+    names = tuple(robot.joints)
+    return MotionNoise(covariance, passage, estimated, first, samples.rate, names, units, followed)
 
 
 def lower_triangles(matrices: Array) -> Array:

@@ -29,10 +29,14 @@ class Direction(NamedTuple):
     """True if no value is more than linear along it."""
 
 
-def variances(here: Sequence[Any], directions: Iterable[Direction]) -> list[Any]:
+def variances(
+    here: Sequence[Any],
+    directions: Iterable[Direction],
+    note: Callable[[Sequence[Any]], None] | None = None,
+) -> list[Any]:
     """Return the variances of arrays of values by all directions.
 
-    here: the values at no deviation
+    here: the values at no deviation; note: is told the changes along each direction
     """
     found = [0.0 * one for one in here]
     for values, width, is_linear in directions:
@@ -42,6 +46,8 @@ def variances(here: Sequence[Any], directions: Iterable[Direction]) -> list[Any]
         else:
             behind = values(-width)
             steps = [(a - b) * (0.5 / width) for a, b in zip(ahead, behind, strict=True)]
+        if note is not None:
+            note(steps)
         found = [one + step * step for one, step in zip(found, steps, strict=True)]
         if not is_linear and width != 1.0:
             part = sqrt(width**2 - 1.0) / (2.0 * width**2)
