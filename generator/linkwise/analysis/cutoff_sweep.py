@@ -27,24 +27,25 @@ class RowSizes:
     """A sink that sums up root mean squares of swept rows, and finds their largest magnitudes."""
 
     def __init__(self, rows: ResultRows) -> None:
-        self._some = [rows[name].rows for name in SWEPT if name in rows]
-        self.columns = tuple(rows.columns[row] for row in rows.numbers(*SWEPT).tolist())
-        self._samples, self._squares = 0, np.zeros(len(self.columns))
-        self._peaks = np.zeros((2, len(self.columns)))
+        numbers = np.sort(rows.numbers(*SWEPT))
+        quantities = [rows[name] for name in SWEPT if name in rows]
+        self._some = [(one.rows, np.searchsorted(numbers, one.numbers)) for one in quantities]
+        self.columns = tuple(rows.columns[row] for row in numbers.tolist())
+        self._samples, self._squares = 0, np.zeros(len(numbers))
+        self._peaks = np.zeros((2, len(numbers)))
 
     def __call__(self, block: Array) -> None:
         """Look through a block (rows, samples) whose first row is the time."""
+        is_first = not self._samples
         self._samples += block.shape[1]
-        end = 0
-        for some in self._some:
+        for some, own in self._some:
             values = block[some]
-            own = slice(end, end := end + len(values))
             self._squares[own] += np.einsum("rs,rs->r", values, values)
             at = np.abs(values).argmax(axis=1)
             found = np.array([values[np.arange(len(values)), at], block[0, at]])
             peaks = self._peaks[:, own]
-            larger = np.abs(found[0]) > np.abs(peaks[0])
-            peaks[:, larger] = found[:, larger]
+            larger = (np.abs(found[0]) > np.abs(peaks[0])) | is_first
+            self._peaks[:, own] = np.where(larger, found, peaks)
 
     def sizes(self) -> tuple[Array, Array, Array]:
         """Return of each row the root mean square, the value of largest magnitude, and its time in s."""
