@@ -11,7 +11,7 @@ from linkwise.analysis.result_rows import Column
 from linkwise.analysis.show.drawn_curves import largest_few, new_figure, write_note, write_title
 from linkwise.arrays import Index
 from linkwise.escape import listed
-from linkwise.plotstyle import GRAVITY, INK, colour, drawn
+from linkwise.plotstyle import GRAVITY, INK, drawn, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,6 +20,8 @@ MOST = 6
 """Shares of a joint that have a line."""
 JOINTS = 12
 """Most joints that are drawn: those with the shares that change most."""
+MARKERS = "osv^DPX"
+"""Markers of a joint's shares, so that each differs: one more than `MOST`, as never only one is left out."""
 LOOKS = {"tau_qdd": "solid", "tau_qd": "dashed"}
 """Styles of lines by quantity; all others are dotted."""
 
@@ -61,14 +63,14 @@ def _joint(result: AnalysisResult, sweep: CutoffSweep, i: int, left: Any, right:
     columns = sweep.columns
     whole = next(row for row, c in enumerate(columns) if c.quantity == "tau" and c.joint == i)
     shares = np.array([r for r, c in enumerate(columns) if c.quantity in SHARES and c.joint == i], np.intp)
-    for row in [whole, *_largest(sweep, shares)]:
+    for place, row in enumerate([whole, *_largest(sweep, shares)]):
         column = columns[row]
         look: dict[str, Any] = {"color": INK, "linewidth": 2.2, "label": "joint torque"}
         if row != whole:
             look = {"label": _label(result, sweep, column), "linestyle": LOOKS.get(column.quantity, "dotted")}
             moves = column.quantity in LOOKS and column.cause is not None
-            look["color"] = colour(result.robot.driven.index(column.cause)) if moves else GRAVITY
-            look |= {"marker": "osv^D"[(column.link or 0) % 5], "markersize": 3}
+            look["color"] = tone(result.robot.driven.index(column.cause)) if moves else GRAVITY
+            look |= {"marker": MARKERS[place - 1], "markersize": 3}
         left.plot(sweep.cutoffs, sweep.rms[row], **look)
         right.plot(sweep.cutoffs, np.abs(sweep.peak[row]), **look)
     for panel in (left, right):
