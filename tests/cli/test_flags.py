@@ -147,6 +147,8 @@ def test_every_flag_of_analyze_is_the_choice_of_its_name(
     monkeypatch.setattr("linkwise.cli.analyze.opened_robot", lambda *given: "the robot")
     monkeypatch.setattr(AnalysisChoices, "payloads", lambda own, _: own)
     assert called("analyze", "with_payloads", ANALYSIS | {"qpos": None})[1] == WRITTEN
+    swept = called("analyze", "with_payloads", ANALYSIS | {"qpos": None, "cutoff_sweep": "4,12"})[1]
+    assert swept == replace(WRITTEN, cutoff_sweep="4,12")
     assert called("analyze", "with_payloads", {"qpos": "mujoco"})[1].reading == Reading(qpos="mujoco")
 
 

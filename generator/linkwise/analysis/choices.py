@@ -8,6 +8,7 @@ from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.contacts import Contacts, WhileColumn
 from linkwise.analysis.contacts.pressed import PRESSED
+from linkwise.analysis.cutoff_range import CutoffRange
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.opened_robot import OpenedRobot, named_body
 from linkwise.analysis.request import Outputs, Request
@@ -80,6 +81,17 @@ class AnalysisChoices:
         metavar="FILE",
         is_file=True,
     )
+    cutoff_sweep: str | None = option(
+        None,
+        "Tell sizes of all torques at so many cutoffs between two too, Hz, 7 if not given, and which torques"
+        " depend on them; goes with --cutoff, that of the analysis itself",
+        metavar="LOW,HIGH[,COUNT]",
+        is_key=False,
+    )
+
+    def __post_init__(self) -> None:
+        if self.cutoff_sweep is not None:  # refused before a robot is opened
+            Request(processing=self.processing, cutoff_sweep=CutoffRange.of(self.cutoff_sweep))
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -90,7 +102,8 @@ class AnalysisChoices:
         """Return what is asked of a robot's log."""
         uncertain = None if self.uncertain is None else Path(self.uncertain)
         borne, held = self.borne(robot), self.contacts(robot)
-        return Request(self.reading, self.processing, self.outputs, borne, held, uncertain)
+        swept = None if self.cutoff_sweep is None else CutoffRange.of(self.cutoff_sweep)
+        return Request(self.reading, self.processing, self.outputs, borne, held, uncertain, swept)
 
     def payloads(self, robot: OpenedRobot) -> tuple[Payload, ...]:
         """Return the point masses that a robot carries."""

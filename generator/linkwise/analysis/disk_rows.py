@@ -29,6 +29,17 @@ def collected(blocks: Iterator[Array], width: int, directory: Path | None) -> Ar
         return np.frombuffer(mmap.mmap(file.fileno(), 0)).reshape(-1, width)
 
 
+def copied(rows: Array, directory: Path | None) -> Array:
+    """Return a writable copy of rows (any, width) that may be in a file, in memory or in a file."""
+
+    def blocks() -> Iterator[Array]:
+        for at in range(0, len(rows), AT_ONCE):
+            yield rows[at : at + AT_ONCE]
+            let_go(rows)
+
+    return collected(blocks(), rows.shape[1], directory)
+
+
 class EverySample:
     """A sink that keeps all samples as one array (columns, samples), in memory or in a file in `directory`.
 

@@ -36,18 +36,7 @@ def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536, flag: s
 
     Raises LinkwiseError for a cutoff too low to compute, or not below half the rate, and a log too short.
     """
-    signal = extra("scipy.signal")
-    if settings.cutoff >= rate / 2:
-        raise LinkwiseError(
-            f"{flag} {settings.cutoff:g} Hz is not below half the sampling rate of {rate:g} Hz; lower it"
-        )
-    sos = _sections(rate, settings)
-    try:
-        rest = signal.sosfilt_zi(sos)[:, :, None]
-    except np.linalg.LinAlgError:  # its poles round to 1
-        raise LinkwiseError(
-            f"{flag} {settings.cutoff:g} Hz is too low for a sampling rate of {rate:g} Hz; raise it"
-        ) from None
+    sos, rest = sections_at_rest(rate, settings, flag)
     pad = padding_length(sos, len(q)) if settings.padding != "none" else 0
     front = _extension(q[: pad + 1], settings.padding)
     back = _extension(q[-1 : -pad - 2 : -1], settings.padding)[::-1]
@@ -66,6 +55,26 @@ def lowpass(q: Array, rate: float, settings: Lowpass, rows: int = 65536, flag: s
         backwards, state = _passed(sos, q[start:stop][::-1], state)
         q[start:stop] = backwards[::-1]
         let_go(q)
+
+
+def sections_at_rest(rate: float, settings: Lowpass, flag: str = "--cutoff") -> tuple[Array, Array]:
+    """Return the filter's sections of one pass, and their states (sections, 2, 1) where all input was 1.
+
+    rate: in Hz; flag: the flag that gives the cutoff, for messages
+
+    Raises LinkwiseError for a cutoff too low to compute, or not below half the rate.
+    """
+    if settings.cutoff >= rate / 2:
+        raise LinkwiseError(
+            f"{flag} {settings.cutoff:g} Hz is not below half the sampling rate of {rate:g} Hz; lower it"
+        )
+    sos = _sections(rate, settings)
+    try:
+        return sos, extra("scipy.signal").sosfilt_zi(sos)[:, :, None]
+    except np.linalg.LinAlgError:  # its poles round to 1
+        raise LinkwiseError(
+            f"{flag} {settings.cutoff:g} Hz is too low for a sampling rate of {rate:g} Hz; raise it"
+        ) from None
 
 
 def padding_length(sos: Array, samples: int) -> int:

@@ -13,6 +13,7 @@ from linkwise.analysis.borne_joints import borne_joints
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples, slip_warnings
 from linkwise.analysis.column_matching import with_columns
 from linkwise.analysis.contacts.times import contact_times, switch_columns
+from linkwise.analysis.cutoff_sweep import RowSizes
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.induced_points import InducedPlan, induced_points
 from linkwise.analysis.loads.placed import PlacedLoad
@@ -31,6 +32,7 @@ from linkwise.analysis.settings import Processing, Reading, choices
 from linkwise.analysis.show import draw
 from linkwise.analysis.stated_bodies import check_lengths
 from linkwise.analysis.stream import Sink, span_of, stream
+from linkwise.analysis.swept_log import SweptLog, before_filter
 from linkwise.analysis.torques import Decomposer, ToldBeside
 from linkwise.analysis.traced_rows import TracedRows
 from linkwise.analysis.uncertain_file import UncertainRobot, read_uncertain
@@ -56,7 +58,8 @@ class Analysis(AnalysisResult):
 
         name: "paper" or "causes", with ":JOINT" for another joint than the first; "shares"; "power";
         "energy", or "energy:PHASE" for work over a phase; "induced", or "induced:POINT" for another point
-        than the first; "reaction" or "reaction:JOINT", "trace" or "trace:JOINT" likewise; "contacts"
+        than the first; "reaction" or "reaction:JOINT", "trace" or "trace:JOINT" likewise; "contacts";
+        "cutoff" of a sweep
 
         "paper" has five panels, laid out like the paper's Fig. 5-9. Raises LinkwiseError for another name.
         """
@@ -98,12 +101,24 @@ class Job:
     """Largest violation of a constraint by positions of the log, where joints are tied."""
     phases: tuple[PlacedPhase, ...] = ()
     uncertain: UncertainInputs = field(default_factory=UncertainInputs)
+    swept: SweptLog | None = None
+    """The log as it was before the filter, where a sweep of cutoffs is asked for."""
 
     def run(self, sink: Sink, progress: Progress) -> WholeMovement:
-        """Analyse every sample, handing the blocks to `sink`."""
+        """Analyse every sample, handing the blocks to `sink`; then sweep cutoffs where that is asked for."""
+        own = None if self.swept is None else RowSizes(self.decomposer.rows)
+
+        def both(block: Array) -> None:
+            if own is not None:
+                own(block)
+            sink(block)
+
         with within(self.source):
             asked = self.asked.processing
-            return stream(self.samples, self.decomposer, asked, sink, progress, self.phases)
+            done = stream(self.samples, self.decomposer, asked, both, progress, self.phases)
+            if self.swept is None or own is None:
+                return done
+            return replace(done, cutoff_sweep=self.swept.run(own, progress))
 
     def note(self) -> dict[str, Any]:
         """Return the description that a table carries: log, robot and all choices."""
@@ -233,6 +248,7 @@ def prepared(
     with within(str(log)):
         start, stop = span_of(samples, processing)
         raw = samples.q[:LONGEST].copy() if uncertain is not None else samples.q[:0]
+        unfiltered = before_filter(asked.cutoff_sweep, samples, processing, buffer)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
         slips = tuple(slip_warnings(samples, robot.constrained, processing))
@@ -259,7 +275,12 @@ def prepared(
     inputs = _uncertain(asked.uncertain, uncertain, raw, samples, processing, robot, borne)
     told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, inputs)
     decomposer = Decomposer.of(robot, processing.convention, borne, times, told)
-    return Job(log.name, asked, samples, decomposer, closed, phases, inputs)
+    if unfiltered is None:
+        return Job(log.name, asked, samples, decomposer, closed, phases, inputs)
+    bare = told._replace(traced=None, uncertain=UncertainInputs())
+    plain = Decomposer.of(robot, processing.convention, borne, times, bare)
+    swept = SweptLog(unfiltered, plain, processing, buffer)
+    return Job(log.name, asked, samples, decomposer, closed, phases, inputs, swept)
 
 
 def _uncertain(

@@ -92,6 +92,7 @@ def record(result: AnalysisResult) -> dict[str, Any]:
         "phases": [phase.told for phase in result.phases],
         **({} if result.traced is None else {"trace": dict(result.traced)}),
         **({} if result.uncertain is None else {"uncertain": {**result.uncertain, **result.signs.record()}}),
+        **({} if result.cutoff_sweep is None else {"cutoff_sweep": result.cutoff_sweep.record()}),
         "closure": asdict(result.closure),
         **({} if result.closed is None else {"constraints": _constraints(result, result.closed)}),
         **({} if robot.contacts is None else {"contacts": _contacts(result)}),

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from linkwise.analysis.asked_trace import TraceChoices
 from linkwise.analysis.contacts import Contacts
+from linkwise.analysis.cutoff_range import CutoffRange
 from linkwise.analysis.loads import Loads
 from linkwise.analysis.outputs import Format
 from linkwise.analysis.phases import Phase
@@ -21,7 +22,7 @@ class Outputs:
     figures: tuple[str, ...] = option(
         (),
         "paper or causes, alone or with :JOINT, shares, power, energy, energy:PHASE, induced, induced:POINT,"
-        " reaction or trace, alone or with :JOINT, or contacts; may be repeated",
+        " reaction or trace, alone or with :JOINT, contacts, or cutoff; may be repeated",
         "--figure",
         is_key=False,
     )
@@ -87,3 +88,9 @@ class Request:
     contacts: Contacts = field(default_factory=Contacts)
     uncertain: Path | None = None
     """File of how uncertain bodies are."""
+    cutoff_sweep: CutoffRange | None = None
+    """Cutoffs at which sizes of torques are told too."""
+
+    def __post_init__(self) -> None:
+        if self.cutoff_sweep is not None and self.processing.lowpass is None:
+            raise LinkwiseError("--cutoff-sweep goes with --cutoff, that of the analysis itself; add it")

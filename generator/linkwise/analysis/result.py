@@ -11,6 +11,7 @@ from linkwise.analysis.borne_joints import BorneJoint
 from linkwise.analysis.certain_signs import CertainSigns, LargestTorque
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.contacts.times import ContactTimes
+from linkwise.analysis.cutoff_sweep import CutoffSweep
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
@@ -71,6 +72,8 @@ class WholeMovement:
     """Number of samples."""
     peaks: tuple[LargestTorque, ...]
     """Torques at their largest magnitude, with their deviations there; none where nothing is uncertain."""
+    cutoff_sweep: CutoffSweep | None
+    """Sizes of torques at other cutoffs; None where they were not asked for."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from linkwise_runtime.quantities import Contact
 from linkwise.analysis.asked_trace import EVERY, TraceChoices, Weight
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.standing import with_contacts
+from linkwise.analysis.cutoff_range import CutoffRange
 from linkwise.analysis.disk_rows import EverySample
 from linkwise.analysis.job import Analysis, prepared
 from linkwise.analysis.load_robot import load_robot
@@ -23,6 +24,8 @@ from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.settings import Payload, Processing, Reading
 from linkwise.analysis.show import check_figure, figure_names, figure_png
 from linkwise.analysis.show.page import report
+from linkwise.analysis.sweep_table import NAME as SWEEP_TABLE
+from linkwise.analysis.sweep_table import write_sweep
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names, json_text
@@ -57,6 +60,7 @@ def analyze(
     trace_torque: Mapping[str, str] | Sequence[tuple[str, str]] = (),
     trace_torque_factor: float = 1.0,
     uncertain: str | PathLike[str] | None = None,
+    cutoff_sweep: Sequence[float] | None = None,
 ) -> Analysis:
     """Analyse a motion log with a generated robot, all samples in memory.
 
@@ -77,6 +81,8 @@ def analyze(
     trace_torque: columns of torques that actuators gave, by joint; what these leave is a source "residual"
     trace_torque_factor: what brings these to N m and N
     uncertain: file of how uncertain bodies are, which gives torques a standard deviation beside them
+    cutoff_sweep: lowest and highest cutoff in Hz, and their number if not 7, at which sizes of all torques
+    are told by `Analysis.cutoff_sweep`; `processing` needs a low-pass
 
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
@@ -99,7 +105,8 @@ def analyze(
         ),
     )
     told = None if uncertain is None else Path(uncertain)
-    asked = Request(reading or Reading(), processing or Processing(), outputs, borne, held, told)
+    swept = None if cutoff_sweep is None else CutoffRange.of(cutoff_sweep)
+    asked = Request(reading or Reading(), processing or Processing(), outputs, borne, held, told, swept)
     job = prepared(Path(log), loaded, asked, progress)
     with EverySample(len(job.columns), job.count) as kept:
         return job.analysis(job.run(kept, progress), kept.values)
@@ -117,7 +124,8 @@ def analyze_to(
     robot, outputs = with_contacts(robot, asked.contacts), asked.outputs
     phases = [phase.name for phase in outputs.phases]
     traced = robot.joints if EVERY in outputs.trace.joints else outputs.trace.joints
-    told = figure_names(outputs.induced, outputs.reactions, outputs.induced_power, phases, traced)
+    swept = asked.cutoff_sweep is not None
+    told = figure_names(outputs.induced, outputs.reactions, outputs.induced_power, phases, traced, swept)
     for name in outputs.figures:
         check_figure(name, robot, told)
     refuse_inside_package(out)
@@ -143,6 +151,8 @@ def analyze_to(
                     kept(block)
 
             analysis = job.analysis(job.run(sink, progress), kept.values)
+        if analysis.cutoff_sweep is not None:
+            write_sweep(draft / f"{SWEEP_TABLE}.{outputs.table}", analysis.cutoff_sweep, note)
         _write_beside_table(draft, analysis, outputs)
         names = sorted(file.name for file in draft.iterdir())
     return analysis, [out / name for name in names]

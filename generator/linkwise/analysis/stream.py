@@ -134,6 +134,7 @@ class MovementSums:
             closure=self.closure,
             total=self._samples,
             peaks=self._search.peaks(),
+            cutoff_sweep=None,
             work_by_source={power: work for power, work in whole.items() if power in WORK_BY_SOURCE},
             work_in_phases=tuple(phases),
             **{name: whole[power] for name, power in POWER_OF.items()},

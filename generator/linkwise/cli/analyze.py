@@ -34,7 +34,7 @@ app = typer.Typer(add_completion=False)
 @takes(
     *("log", "robot", "opensim_setup", "out", "units", "time", "topic", "qpos"),
     ...,
-    *("induced", "induced_sto", "sto_units", "induced_power", "reaction", "uncertain"),
+    *("induced", "induced_sto", "sto_units", "induced_power", "reaction", "uncertain", "cutoff_sweep"),
     *("trace", "trace_windows", "trace_weight", "trace_restart", "trace_torque"),
     *("trace_torque_factor", "backend", "page", "as_json"),
     complete=with_setup,
@@ -93,6 +93,7 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
         *_of_residual(analysis),
         *_of_bodies(analysis),
         *analysis.signs.lines,
+        *(() if analysis.cutoff_sweep is None else analysis.cutoff_sweep.lines),
         *map(str, files),
     ]
 

@@ -22,6 +22,7 @@ UNITS = {
     "resampling": "samples",
     "closing": "samples",
     "analysing": "samples",
+    "sweeping": "samples",
     "fitting": "samples",
 }
 """Units in which progress is counted, by stage."""

@@ -9,6 +9,7 @@ from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.causes_figure import causes
 from linkwise.analysis.show.contacts_figure import contacts
+from linkwise.analysis.show.cutoff_figure import cutoff
 from linkwise.analysis.show.energy_figure import energy
 from linkwise.analysis.show.induced_figure import induced_panels
 from linkwise.analysis.show.paper_figure import paper
@@ -34,6 +35,7 @@ FIGURES: dict[str, Callable[[AnalysisResult, int], "Figure"]] = {
     "reaction": figure_of(reaction_panels),
     "trace": figure_of(trace_panels),
     "contacts": contacts,
+    "cutoff": cutoff,
 }
 
 
@@ -68,6 +70,7 @@ ASKED_BY = {
     "reaction": "--reaction {}, whose shares it draws",
     "energy": "--induced-power, whose flows it draws",
     "trace": "--trace {}, whose sources it draws",
+    "cutoff": "--cutoff-sweep, whose sizes it draws",
 }
 """Flags, after `add`, by which the names of a figure are asked for."""
 
@@ -78,26 +81,29 @@ def figure_names(
     flows: bool,
     phases: Sequence[str],
     traced: Sequence[str],
+    swept: bool,
 ) -> FigureNames:
     """Return the names of figures, from the points, joints and phases that were asked for.
 
-    flows: whether power by source is told; traced: joints of a trace
+    flows: whether power by source is told; traced: joints of a trace; swept: whether cutoffs are swept
     """
-    energies = ("", *phases) if flows else ()
-    return {"induced": induced, "reaction": reactions, "energy": energies, "trace": traced}
+    energies, sweeps = ("", *phases) if flows else (), ("",) if swept else ()
+    asked = {"induced": induced, "reaction": reactions, "energy": energies, "trace": traced}
+    return {**asked, "cutoff": sweeps}
 
 
 def names_of(result: AnalysisResult) -> FigureNames:
     """Return the names of the figures of a result."""
     phases = [phase.name for phase in result.phases]
     traced = () if result.traced is None else result.traced["joints"]
-    return figure_names(result.induced, result.reactions, "gain" in result.rows, phases, traced)
+    swept = result.cutoff_sweep is not None
+    return figure_names(result.induced, result.reactions, "gain" in result.rows, phases, traced, swept)
 
 
 def check_figure(name: str, robot: OpenedRobot, told: FigureNames) -> None:
     """Raise LinkwiseError unless `draw` knows the figure."""
     kind, _, joint = name.partition(":")
-    if kind in told:
+    if kind in told and (kind != "cutoff" or not joint):
         names = told[kind]
         if names and kind == "energy" and joint not in names:
             raise LinkwiseError(f"--figure {name}: add --phase {joint}=..., over which it sums up work")

@@ -35,6 +35,7 @@ from linkwise.analysis.show.page_curves import (
     point_data,
     stride_for,
 )
+from linkwise.analysis.show.page_cutoff import cutoff_data
 from linkwise.analysis.show.reaction_figure import reaction_panels
 from linkwise.analysis.show.sourced_panels import SourcedPanels
 from linkwise.analysis.show.trace_figure import trace_panels
@@ -137,6 +138,7 @@ def page_data(result: AnalysisResult) -> str:
         "gravityColour": GRAVITY,
         "bodies": _bodies(instants),
         "certain": certainty_data(result),
+        "cutoff": cutoff_data(result),
         "largestForce": force,
         "loads": _loads(instants),
         "reactions": _reactions(instants, pressed),
