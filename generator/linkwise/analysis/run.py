@@ -12,7 +12,7 @@ from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.standing import with_contacts
 from linkwise.analysis.cutoff_range import CutoffRange
 from linkwise.analysis.disk_rows import EverySample
-from linkwise.analysis.job import Analysis, prepared
+from linkwise.analysis.job import Analysis
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.opened_robot import OpenedRobot
@@ -20,6 +20,7 @@ from linkwise.analysis.opensim.storage import begin_storages
 from linkwise.analysis.outputs import open_table
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.phases import Phase
+from linkwise.analysis.preparation import prepared
 from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.settings import Payload, Processing, Reading
 from linkwise.analysis.show import check_figure, figure_names, figure_png

@@ -1,14 +1,21 @@
 """All that is uncertain of one analysis: the robot's bodies, the log's motion, the loads."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
 
+from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.samples import Samples
+from linkwise.analysis.settings import Processing
 from linkwise.analysis.uncertain_file import CERTAIN, UncertainRobot
 from linkwise.analysis.uncertain_loads import LoadSpread
-from linkwise.analysis.uncertain_motion import MotionNoise
+from linkwise.analysis.uncertain_motion import MotionNoise, motion_noise
+from linkwise.arrays import Array
+from linkwise.errors import within
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,3 +66,31 @@ class UncertainInputs:
             yield self.motion.told
             if self.motion.suspicion:
                 yield self.motion.suspicion
+
+
+def uncertain_inputs(
+    file: Path | None,
+    stated: UncertainRobot | None,
+    raw: Array,
+    samples: Samples,
+    processing: Processing,
+    robot: OpenedRobot,
+    loads: Sequence[PlacedLoad],
+) -> UncertainInputs:
+    """Return all that is uncertain of a log.
+
+    file, stated: the file that says so, and what it says; raw: the log's first positions, as they were before
+    the filter
+
+    Raises LinkwiseError, which names the file, as `motion_noise` and `StatedLoads.placed` do.
+    """
+    if stated is None:
+        return UncertainInputs()
+    noise: MotionNoise | None = None
+    spreads: tuple[LoadSpread | None, ...] = (None,) * len(loads)
+    with within(str(file)):
+        if stated.motion is not None:
+            noise = motion_noise(stated.motion, raw, samples, processing, robot)
+        if stated.loads is not None:
+            spreads = stated.loads.placed(loads, robot)
+    return UncertainInputs(stated, noise, spreads, tuple(load.name for load in loads))

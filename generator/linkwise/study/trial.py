@@ -9,9 +9,10 @@ import numpy as np
 
 from linkwise.analysis.contacts.standing import with_contacts
 from linkwise.analysis.disk_rows import EverySample
-from linkwise.analysis.job import Job, prepared
+from linkwise.analysis.job import Job
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.phases import Phase
+from linkwise.analysis.preparation import prepared
 from linkwise.analysis.show.page import report
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError

@@ -1,0 +1,115 @@
+"""Preparation of an analysis: a log is read, brought to where ties close, and filtered; rows are planned."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from linkwise.analysis.asked_trace import AskedTrace, restart_times
+from linkwise.analysis.borne_joints import borne_joints
+from linkwise.analysis.closed_motion import ClosedLog, closed_samples, slip_warnings
+from linkwise.analysis.column_matching import with_columns
+from linkwise.analysis.contacts.times import contact_times, switch_columns
+from linkwise.analysis.filtering import lowpass
+from linkwise.analysis.induced_points import InducedPlan, induced_points
+from linkwise.analysis.job import Job
+from linkwise.analysis.loads.read import placed_loads
+from linkwise.analysis.logs import Log, open_log
+from linkwise.analysis.measured_torques import measured_torques, torque_columns
+from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.phases import phase_columns, placed_phases
+from linkwise.analysis.request import Request
+from linkwise.analysis.samples import Samples, read_samples
+from linkwise.analysis.settings import Reading
+from linkwise.analysis.stated_bodies import check_lengths
+from linkwise.analysis.stream import span_of
+from linkwise.analysis.swept_log import SweptLog, before_filter
+from linkwise.analysis.torques import Decomposer, ToldBeside
+from linkwise.analysis.traced_rows import TracedRows
+from linkwise.analysis.uncertain_file import read_uncertain
+from linkwise.analysis.uncertain_inputs import UncertainInputs, uncertain_inputs
+from linkwise.analysis.uncertain_motion import LONGEST
+from linkwise.errors import LinkwiseError, within
+from linkwise.progress import Progress
+
+
+def prepared(
+    log: Path,
+    robot: OpenedRobot,
+    asked: Request,
+    progress: Progress,
+    buffer: Path | None = None,
+) -> Job:
+    """Read and filter the log of a robot that stands on its contacts; return the job that analyses it.
+
+    buffer: a directory that keeps the samples in a disk buffer, not in memory
+    """
+    reading, processing, outputs = asked.reading, asked.processing, asked.outputs
+    if outputs.trace.joints and processing.convention != "closing":
+        raise LinkwiseError("--trace goes with --convention closing, whose velocity terms sum to torques")
+    uncertain = None if asked.uncertain is None else read_uncertain(asked.uncertain, robot)
+    points, bearings = induced_points(outputs.induced, robot), borne_joints(outputs.reactions, robot)
+    opened = open_log(log, reading, robot.joints, robot.file_joints, robot.qpos)
+    with within(str(log)):
+        torques = torque_columns("--trace-torque", opened.columns, robot, outputs.trace.pairs)
+    beside = (*switch_columns(asked.contacts, opened), *phase_columns(outputs.phases, opened))
+    samples, closed = _samples(opened, robot, reading, (*beside, *torques.values()), progress, buffer)
+    with within(str(log)):
+        start, stop = span_of(samples, processing)
+        raw = samples.q[:LONGEST].copy() if uncertain is not None else samples.q[:0]
+        unfiltered = before_filter(asked.cutoff_sweep, samples, processing, buffer)
+        if processing.lowpass is not None:
+            lowpass(samples.q, samples.rate, processing.lowpass)
+        slips = tuple(slip_warnings(samples, robot.constrained, processing))
+    samples = replace(samples, warnings=(*samples.warnings, *slips))
+    motion = samples.time[start:stop]
+    borne = placed_loads(asked.loads, robot, motion, reading.ignore_extra, progress, buffer)
+    times = contact_times(asked.contacts, opened, robot, reading, motion, progress, buffer)
+    every = (*borne, *(() if times is None else times.loads))
+    phases = placed_phases(outputs.phases, opened, robot, every, reading, progress)
+    traced = None
+    if outputs.trace.joints:
+        q = samples.q[start:stop]
+        restarts = restart_times(outputs.trace.restart, phases, robot, times, motion, q)
+        made = AskedTrace.of(outputs.trace, restarts, robot, motion)
+        how = reading, outputs.trace.torque_factor, samples.rate, processing.lowpass, progress, buffer
+        measured = measured_torques(opened, torques, robot, *how)
+        traced = TracedRows.of(made, robot, borne, samples, measured and measured.some(start, stop))
+    planned = InducedPlan(points, outputs.induced_whole)
+    beside_torques = outputs.induced or outputs.reactions or outputs.induced_power
+    if uncertain is not None and uncertain.bodies is not None and beside_torques:
+        check_lengths(uncertain.bodies, "leave --induced, --reaction and --induced-power out")
+    inputs = uncertain_inputs(asked.uncertain, uncertain, raw, samples, processing, robot, borne)
+    told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, inputs)
+    decomposer = Decomposer.of(robot, processing.convention, borne, times, told)
+    if unfiltered is None:
+        return Job(log.name, asked, samples, decomposer, closed, phases, inputs)
+    bare = told._replace(traced=None, uncertain=UncertainInputs())
+    plain = Decomposer.of(robot, processing.convention, borne, times, bare)
+    swept = SweptLog(unfiltered, plain, processing, buffer)
+    return Job(log.name, asked, samples, decomposer, closed, phases, inputs, swept)
+
+
+def _samples(
+    log: Log,
+    robot: OpenedRobot,
+    reading: Reading,
+    beside: Sequence[str],
+    progress: Progress,
+    buffer: Path | None,
+) -> tuple[Samples, ClosedLog | None]:
+    """Return samples of all joints and, where joints are tied, how well the log closes.
+
+    Dependent joints are moved to where the ties close.
+
+    beside: columns of the log that are read elsewhere: those that say when contacts are on, torques
+    """
+    with within(str(log.path)):
+        every = with_columns(log.columns, (*robot.joints, *robot.inputs), robot.dependent_joints, reading)
+    there = [k for k in every if k < len(robot.joints)]
+    names = (*(robot.joints[k] for k in there), *robot.inputs)
+    units = (*(robot.units_in_logs[k] for k in there), *("" for _ in robot.inputs))
+    reach = [*(robot.reach[k] for k in there), *(math.inf for _ in robot.inputs)]
+    samples = read_samples(log, names, units, reading, progress, buffer, beside, reach, robot.followers)
+    with within(str(log.path)):
+        return closed_samples(samples, there, robot.constrained, reading.loop_tolerance, progress, buffer)
