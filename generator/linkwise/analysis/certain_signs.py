@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from linkwise.analysis.result_quantities import DEVIATION_OF, MOTION, TERMS
+from linkwise.analysis.result_quantities import DEVIATION_OF, TERMS
 from linkwise.analysis.result_rows import Column, ResultRows
 from linkwise.arrays import Array, Index
 
 DEVIATIONS = 2.0
 """Standard deviations at which a sign counts as certain: one normal value in 44 is further off that way."""
-TORQUES = ("tau", "tau_link", *TERMS)
+TORQUES = ("tau", "tau_link", *TERMS, "tau_load")
 """Torques whose largest magnitudes are looked for."""
 SMALL = 1e-3
 """Part of a joint's largest torque below which no share of it is listed."""
@@ -34,7 +34,7 @@ class LargestTorque(NamedTuple):
     @property
     def is_certain(self) -> bool:
         """True if its sign is certain."""
-        return abs(self.value) >= DEVIATIONS * self.deviation
+        return abs(self.value) >= DEVIATIONS * self.deviation and self.value != 0.0
 
     def record(self) -> dict[str, Any]:
         """Return this as plain data."""
@@ -62,12 +62,14 @@ class LargestTorques:
         self._torques = np.concatenate([none, *(some for some, _ in numbers)])
         self._deviations = np.concatenate([none, *(some for _, some in numbers)])
         self._found = np.zeros((3, len(self._torques)))
+        self._seen = np.full(len(self._torques), -1.0)
 
     def add(self, block: Array) -> None:
         """Look through a block (rows, samples)."""
         for place, (row, beside) in enumerate(zip(self._torques, self._deviations, strict=True)):
             at = int(np.abs(block[row]).argmax())
-            if abs(block[row, at]) > abs(self._found[0, place]):
+            if abs(block[row, at]) > self._seen[place]:
+                self._seen[place] = abs(block[row, at])
                 self._found[:, place] = block[row, at], block[beside, at], block[0, at]
 
     def peaks(self) -> tuple[LargestTorque, ...]:
@@ -86,18 +88,20 @@ class CertainSigns:
     peaks: tuple[LargestTorque, ...]
     joints: tuple[str, ...]
     links: tuple[str, ...]
+    is_gradient: bool = False
+    """True if torques by velocity are of the gradient convention, which counts them twice."""
 
     @property
     def shares(self) -> tuple[LargestTorque, ...]:
-        """Shares through one link by one cause, those that are next to nothing left out."""
+        """Shares through one link by one cause, and of loads, but for those that are surely next to nothing."""
         most: dict[int | None, float] = {}
         for peak in self.peaks:
             most[peak.column.joint] = max(most.get(peak.column.joint, 0.0), abs(peak.value))
         return tuple(
             peak
             for peak in self.peaks
-            if peak.column.quantity in (*MOTION, "tau_gravity")
-            and abs(peak.value) > SMALL * most[peak.column.joint]
+            if peak.column.quantity in (*TERMS, "tau_load")
+            and abs(peak.value) + DEVIATIONS * peak.deviation > SMALL * most[peak.column.joint]
         )
 
     @property
@@ -122,15 +126,16 @@ class CertainSigns:
                     f"the {what} of {self.joints[column.cause]} asked {self.joints[column.joint]} for"
                     f" {plus_minus(told.value, told.deviation)} {column.unit} through"
                     f" {self.links[column.link]} at {told.time:.2f} s"
+                    f"{' (gradient convention)' if self.is_gradient and quantity == 'tau_qd' else ''}"
                 )
         return ""
 
     @property
     def lines(self) -> Iterator[str]:
         """Yield the lines that a terminal shows."""
-        if not self.peaks:
-            return
         unsure, count = self.uncertain, len(self.shares)
+        if not count:
+            return
         told = f"{len(unsure)} of {count} shares have no certain sign even where they are largest"
         if not unsure:
             told = f"all {count} shares have a certain sign where they are largest"

@@ -76,8 +76,7 @@ class AnalysisChoices:
 
     uncertain: str | None = option(
         None,
-        "How uncertain masses, centres, radii of gyration and lengths are: a standard deviation stands"
-        " beside each torque",
+        "How uncertain bodies, motion and loads are: a standard deviation stands beside each number",
         metavar="FILE",
         is_file=True,
     )

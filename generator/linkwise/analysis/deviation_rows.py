@@ -15,7 +15,7 @@ from linkwise_runtime.certainty.share_deviations import ShareDeviations, share_d
 
 from linkwise.analysis.loads.placed import LoadShift
 from linkwise.analysis.opened_robot import OpenedRobot
-from linkwise.analysis.perturbed_robots import perturbed_robots
+from linkwise.analysis.perturbed_robots import PerturbedRobots, perturbed_robots
 from linkwise.analysis.product_rows import Pairs, ProductRows
 from linkwise.analysis.result_quantities import DEVIATION_OF, MOTION, NOISE_OF, OF_BODIES, OF_LOADS, TORQUE_OF
 from linkwise.analysis.result_rows import Place, ResultRows
@@ -24,6 +24,7 @@ from linkwise.analysis.stated_bodies import is_closed_form
 from linkwise.analysis.term_rows import TermArrays
 from linkwise.analysis.uncertain_inputs import UncertainInputs
 from linkwise.arrays import Array, Index
+from linkwise.errors import LinkwiseError
 
 AT_ONCE = 256
 """Samples perturbed at once, whose rows stay in the cache."""
@@ -105,8 +106,8 @@ class DeviationRows:
         return share_deviations(robot.model.backend, given)
 
     @cached_property
-    def _bodies(self) -> Sequence[tuple[OpenedRobot, OpenedRobot]]:
-        """Robots whose bodies are off by one standard deviation, one way and the other."""
+    def _bodies(self) -> Sequence[PerturbedRobots]:
+        """Robots whose bodies are off, one way and the other."""
         given = self.uncertain.bodies
         return () if given is None else perturbed_robots(self.robot, given)
 
@@ -192,12 +193,17 @@ class DeviationRows:
 
     def _carried(self, plain: Perturbable, time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
         """Yield the directions of bodies."""
-        for two in self._bodies:
+        for off in self._bodies:
 
-            def rows(size: float, two: tuple[OpenedRobot, OpenedRobot] = two) -> list[Array]:
-                return [plain.with_robot(two[0 if size > 0 else 1]).values(time, *motion)[of]]
+            def rows(size: float, off: PerturbedRobots = off) -> list[Array]:
+                try:
+                    return [plain.with_robot(off[0 if size > 0 else 1]).values(time, *motion)[of]]
+                except LinkwiseError as error:
+                    raise LinkwiseError(
+                        f"--uncertain: with a body off by {abs(size):.2g} standard deviations, {error}"
+                    ) from error
 
-            yield Direction(rows, 1.0)
+            yield Direction(rows, off.width)
 
     def _of_bodies(self, exact: ShareDeviations, plain: Perturbable, motion: Motion) -> dict[str, Array]:
         """Return deviations by bodies of an open tree, (rows, S), by the quantity that they are of."""

@@ -147,7 +147,8 @@ class AnalysisResult(WholeMovement):
     @property
     def signs(self) -> CertainSigns:
         """Shares with their deviations at their largest magnitude, and whose sign is certain."""
-        return CertainSigns(self.peaks, self.robot.joints, self.robot.links)
+        gradient = self.processing.convention == "gradient"
+        return CertainSigns(self.peaks, self.robot.joints, self.robot.links, gradient)
 
     @property
     def time(self) -> Array:

@@ -195,7 +195,7 @@ class ResultRows:
     def _column(self, quantity: ResultQuantity, at: tuple[int, ...]) -> Column:
         index = dict(zip(quantity.axes, at, strict=True))
         names = [self.axes[axis].names[index[axis]] for axis in quantity.written_axes]
-        if quantity.name == "slip":
+        if quantity.name.rpartition("/")[2] == "slip":
             names = list(map(slip_name, names))
         fields: dict[str, int] = {}
         for axis, number in index.items():

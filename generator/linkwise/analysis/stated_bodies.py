@@ -69,6 +69,8 @@ def read_bodies(data: Mapping[str, Any], robot: OpenedRobot) -> StatedBodies:
     parameters, note = covariance_of(data, partial(_links, robot=robot), robot.package.manifest.tree)
     bodies, fitted = _bodies(data, robot)
     bodies = bodies._replace(parameters=parameters)
+    if parameters is None and not any(np.any(one) for one in (*bodies[:4], bodies.lengths)):
+        raise LinkwiseError("all deviations of bodies are 0; give some, or leave these tables out")
     if is_closed_form(robot):
         try:
             share_deviations(robot.model.backend, bodies)
@@ -103,7 +105,7 @@ def refuse_unmodelled(robot: OpenedRobot) -> None:
 
 def _bodies(data: Mapping[str, Any], robot: OpenedRobot) -> tuple[UncertainBodies, dict[str, FittedSegment]]:
     usual = known_keys("[all]", data.get("all", {}), KEYS_OF_ALL)
-    own = _named(data, "link", robot.links, KEYS_OF_LINK, robot)
+    own = _named(data, "link", robot.links[: link_count(robot)], KEYS_OF_LINK, robot)
     found: dict[str, list[Any]] = {key: [] for key in OF_LINKS}
     every: dict[str, FittedSegment] = {}
     assert robot.package.manifest.tree is not None  # as `refuse_unmodelled` has seen
@@ -228,7 +230,7 @@ def _links(place: str, given: Any, robot: OpenedRobot) -> list[int]:
     """Return the numbers of links that are listed by name."""
     if not isinstance(given, list) or not given or not all(isinstance(name, str) for name in given):
         raise LinkwiseError(f"{place} needs links, a list of their names")
-    found = [place_of(place, "link", name, robot.links, robot) for name in given]
+    found = [place_of(place, "link", name, robot.links[: link_count(robot)], robot) for name in given]
     if len(set(found)) < len(found):
         raise LinkwiseError(f"{place}: links names one twice; name each once")
     return found

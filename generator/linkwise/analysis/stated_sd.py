@@ -37,5 +37,9 @@ def place_of(place: str, what: str, name: str, names: Sequence[str], robot: Open
     """Return the number of a link or a joint; raise LinkwiseError for one that is not there."""
     if name not in names:
         near = listed(nearest_first(name, names))
-        raise LinkwiseError(f"{place}: {robot.name} has no {what} {name!r}; its {what}s are {near}")
+        payloads = [one.title for one in robot.payloads]
+        if name in payloads:
+            raise LinkwiseError(f"{place}: payloads count as certain; leave the table out")
+        fixed = ", and bodies fixed to one are part of it" if what == "link" else ""
+        raise LinkwiseError(f"{place}: {robot.name} has no {what} {name!r}; its {what}s are {near}{fixed}")
     return names.index(name)

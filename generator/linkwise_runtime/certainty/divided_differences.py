@@ -38,7 +38,7 @@ def variances(
 
     here: the values at no deviation; note: is told the changes along each direction
     """
-    found = [0.0 * one for one in here]
+    found = [abs(0.0 * one) for one in here]
     for values, width, is_linear in directions:
         ahead = values(width)
         if is_linear:

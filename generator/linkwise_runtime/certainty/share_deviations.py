@@ -89,7 +89,10 @@ class ShareDeviations:
     def _piece(self, motion: Sequence[Numbers], with_sums: bool) -> PackedDeviations:
         xp, (q, qd, qdd) = self._backend.xp, motion
         flat = self._backend.coefficient_regressors(q, qd, 0.0 * q)
-        c2, c1, g = (rows.reshape(rows.shape[0], -1, PARAMETERS) for rows in flat)
+        counts = (len(getattr(self._layout, field)) for field in ("acceleration", "velocity", "gravity"))
+        c2, c1, g = (
+            rows.reshape(rows.shape[0], count, PARAMETERS) for rows, count in zip(flat, counts, strict=True)
+        )
         causes = self._backend.index(self._causes, q)
         every = self._backend.index(self._mirrored, q)
         moved = c2[..., every, :] * qdd[..., causes, None] + c1 * qd[..., causes, None]
@@ -186,7 +189,7 @@ def spread_of(backend: ArrayBackend, bodies: UncertainBodies) -> BodySpread:
 
 def root(xp: Any, variance: Numbers) -> Numbers:
     """Return square roots, through which a gradient runs that is zero where the variance is."""
-    there = variance > 0
+    there = xp.logical_not(variance <= 0)  # NaN stays
     roots = xp.where(there, variance, xp.ones_like(variance)) ** 0.5
     found: Numbers = xp.where(there, roots, xp.zeros_like(variance))
     return found
