@@ -93,7 +93,7 @@ class CertainSigns:
 
     @property
     def shares(self) -> tuple[LargestTorque, ...]:
-        """Shares through one link by one cause, and of loads, but for those that are surely next to nothing."""
+        """Shares through one link by one cause, and of loads, that are not surely next to nothing."""
         most: dict[int | None, float] = {}
         for peak in self.peaks:
             most[peak.column.joint] = max(most.get(peak.column.joint, 0.0), abs(peak.value))

@@ -16,7 +16,7 @@ from linkwise_runtime.certainty.share_deviations import ShareDeviations, share_d
 from linkwise.analysis.loads.placed import LoadShift
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.perturbed_robots import PerturbedRobots, perturbed_robots
-from linkwise.analysis.product_rows import Pairs, ProductRows
+from linkwise.analysis.product_rows import PairedDirections, ProductRows
 from linkwise.analysis.result_quantities import DEVIATION_OF, MOTION, NOISE_OF, OF_BODIES, OF_LOADS, TORQUE_OF
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.settings import Convention
@@ -60,11 +60,11 @@ class PerturbedRows(NamedTuple):
 
     of: Some
     borne: Index
-    """Those that are perturbed by bodies."""
+    """Rows that bodies perturb."""
     left: Array
-    """Whether each is such, (rows,)."""
+    """True for each row that bodies perturb, (rows,)."""
     places: Mapping[str, slice]
-    """Where each quantity, and the factors, are among them."""
+    """Places of each quantity, and of the factors, among them."""
     products: ProductRows | None
     """Products of what is uncertain; None where motion is not."""
 
@@ -153,10 +153,10 @@ class DeviationRows:
 
     def _variances(
         self, plain: Perturbable, every: "PerturbedRows", time: Array, motion: Motion
-    ) -> tuple[Array, Array, Pairs | None]:
+    ) -> tuple[Array, Array, PairedDirections | None]:
         """Return variances of rows by noise of motion, by all that is perturbed, and pairs of directions."""
         given, of = self.uncertain, every.of
-        pairs = None if every.products is None else Pairs(every.products, len(time))
+        pairs = None if every.products is None else PairedDirections(every.products, len(time))
         if given.motion is None and not any(given.loads) and not len(every.borne):
             found = np.zeros((len(every.left), len(time)))
             return found, found, pairs
@@ -197,7 +197,8 @@ class DeviationRows:
 
             def rows(size: float, off: PerturbedRobots = off) -> list[Array]:
                 try:
-                    return [plain.with_robot(off[0 if size > 0 else 1]).values(time, *motion)[of]]
+                    robot = off.ahead if size > 0 else off.behind
+                    return [plain.with_robot(robot).values(time, *motion)[of]]
                 except LinkwiseError as error:
                     raise LinkwiseError(
                         f"--uncertain: with a body off by {abs(size):.2g} standard deviations, {error}"

@@ -76,16 +76,14 @@ def _errors(
             return own._replace(centres=centres)
 
         yield moved, WIDTH
-    for j in np.flatnonzero(errors.radii):
+    for j, part in enumerate(errors.radii.tolist()):
         moments, principal = principal_moments(own.inertias[j], axes[j])
-        for x in range(3):
+        for x in range(3) if part else ():
+            change = moments[x] * np.outer(principal[:, x], principal[:, x])
 
-            def longer(
-                size: float, j: int = j, x: int = x, moments: Any = moments, e: Any = principal
-            ) -> Any:
-                inertias, turned = own.inertias.copy(), moments.copy()
-                turned[x] *= (1.0 + size * errors.radii[j]) ** 2
-                inertias[j] = (e * turned) @ e.T
+            def longer(size: float, j: int = j, part: float = part, change: Array = change) -> Bodies[Array]:
+                inertias = own.inertias.copy()
+                inertias[j] += ((1.0 + size * part) ** 2 - 1.0) * change
                 return own._replace(inertias=inertias)
 
             yield longer, WIDTH

@@ -53,7 +53,7 @@ class ProductRows(NamedTuple):
         return cls(*every, len(at[factors]))
 
 
-class Pairs:
+class PairedDirections:
     """Sums over directions of A_r B_r, and of their squares, from which those over pairs follow."""
 
     def __init__(self, rows: ProductRows, samples: int) -> None:
