@@ -15,6 +15,7 @@ from linkwise import (
     Contact,
     Contacts,
     LinkwiseError,
+    Load,
     Payload,
     Processing,
     generate,
@@ -151,6 +152,31 @@ def test_signs_and_sentence_are_those_of_the_largest_magnitudes(arm: Path) -> No
     assert record["sentence"] in result.provenance
 
 
+def test_shares_about_zero_and_loads_have_signs_too(arm: Path) -> None:
+    table = smooth(60, 3)
+    table[:, 1:] = table[7, 1:]
+    write_csv(arm / "still.csv", table, JOINTS)
+    (arm / "shaky.toml").write_text(
+        'schema = 1\n[motion]\nangle = "1 deg"\nlength = "1 mm"\n[loads]\nforce = "9 N"\n'
+    )
+    result = analyze(
+        arm / "still.csv",
+        arm / "arm",
+        loads=[Load("push", "d", [0.0, 3.0, 0.0])],
+        uncertain=arm / "shaky.toml",
+    )
+    told = {peak.column.name: peak for peak in result.signs.uncertain}
+    assert {"tau_qdd/ab/d/ab", "tau_load/ab/push"} <= set(told)
+    assert told["tau_qdd/ab/d/ab"].value == pytest.approx(0.0, abs=1e-9)
+    assert told["tau_load/ab/push"].deviation > abs(told["tau_load/ab/push"].value)
+
+
+def test_a_sentence_says_where_velocities_count_twice(arm: Path) -> None:
+    how = Processing(convention="gradient")
+    result = analyze(arm / "log.csv", arm / "arm", processing=how, uncertain=arm / "bodies.toml")
+    assert result.signs.sentence.endswith(" s (gradient convention)")
+
+
 def test_bands_of_the_figure_are_one_deviation_to_either_side(arm: Path) -> None:
     pytest.importorskip("matplotlib")
     result = analyze(arm / "log.csv", arm / "arm", uncertain=arm / "bodies.toml")
@@ -212,6 +238,11 @@ def test_a_value_has_as_many_digits_as_its_deviation_tells(value: float, deviati
             '[load.plate]\nforce = "5 kg"',
             "[load.plate]: force is '5 kg'; write a number and its unit, N, as in",
         ),
+        ('[all]\nmass = "0 %"', "all deviations of bodies are 0; give some, or leave these tables out"),
+        (
+            '[all]\nradii = "1 %"\n[correlation]\nlinks = ["link1", "link2"]\nmatrix = [[1, 0], [0, 1]]',
+            "[correlation]: the mass of 'link1' is certain; give it a deviation of its own",
+        ),
         ('[all]\naxis = "1 %"', "'axis' is not modelled: axes of joints count as certain"),
         ("[all\n", "malformed TOML"),
     ],
@@ -241,6 +272,8 @@ def test_what_is_not_modelled_is_refused_by_name(arm: Path, tmp_path: Path) -> N
     held = Contacts((Contact("d", "point"),), unactuated=("ab", "bc", "cd"))
     for more in ({"payloads": [Payload("d", 1.0)]}, {"contacts": held}, {"reactions": ["cd"]}):
         refused("lengths count", file="long", **more)
+    (arm / "carried.toml").write_text('schema = 1\n[link."payload d"]\nmass = "10 %"\n')
+    refused("payloads count as certain", file="carried", payloads=[Payload("d", 1.0)])
     (arm / "noise.toml").write_text('schema = 1\n[motion]\nangle = "1 mrad"\n')
     refused("leave --resample out", file="noise", reading=Reading(resample=50.0))
 

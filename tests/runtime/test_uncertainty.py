@@ -265,6 +265,22 @@ def test_deviations_that_cannot_be_are_refused_by_name(
     assert "\n" not in str(info.value)
 
 
+@pytest.mark.parametrize("backend", ["numpy", "torch", "native"])
+def test_motion_that_is_no_number_has_no_certainty(
+    backend: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    robot = package_of("planar3").load(backend)
+    tensors = pytest.importorskip("torch").tensor if backend == "torch" else np.array
+    q, qd, qdd = random_states(3, 2)
+    q[1, 2] = np.nan
+    for given in ({"bodies": UncertainBodies(0.1)}, {"motion": 1e-4 * np.eye(9)}):
+        found = np.array(robot.uncertainty(*map(tensors, (q, qd, qdd)), **given).joint_torque)
+        assert np.isnan(found[1]).all()
+        assert np.isfinite(found[0]).all()
+        nothing = robot.uncertainty(*(tensors(a[:0]) for a in (q, qd, qdd)), **given)
+        assert nothing.torque.shape == (0, 3, 3)
+
+
 def test_bodies_of_each_sample_and_other_things_are_refused(package_of: Callable[[str], ModuleType]) -> None:
     package = package_of("planar3")
     own = package.bodies()

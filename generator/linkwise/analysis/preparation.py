@@ -79,7 +79,8 @@ def prepared(
     beside_torques = outputs.induced or outputs.reactions or outputs.induced_power
     if uncertain is not None and uncertain.bodies is not None and beside_torques:
         check_lengths(uncertain.bodies, "leave --induced, --reaction and --induced-power out")
-    inputs = uncertain_inputs(asked.uncertain, uncertain, raw, samples, processing, robot, borne)
+    certain = [*(["payloads"] if robot.payloads else []), *(["traced velocities"] if traced else [])]
+    inputs = uncertain_inputs(asked.uncertain, uncertain, raw, samples, processing, robot, borne, certain)
     told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, inputs)
     decomposer = Decomposer.of(robot, processing.convention, borne, times, told)
     if unfiltered is None:

@@ -129,7 +129,7 @@ def _bodies(data: Mapping[str, Any], robot: OpenedRobot) -> tuple[UncertainBodie
         np.array(found["radii"]),
         part,
         segments,
-        _correlation(data, robot),
+        _correlation(data, robot, found["mass"]),
         _lengths(data, usual, robot),
     )
     return stated, every
@@ -204,7 +204,7 @@ def _body_mass(data: Mapping[str, Any], robot: OpenedRobot) -> tuple[float, Arra
     return value, segments
 
 
-def _correlation(data: Mapping[str, Any], robot: OpenedRobot) -> Array | None:
+def _correlation(data: Mapping[str, Any], robot: OpenedRobot, masses: Sequence[float]) -> Array | None:
     """Return the correlations of all links' masses; None where the file has none."""
     if "correlation" not in data:
         return None
@@ -221,6 +221,9 @@ def _correlation(data: Mapping[str, Any], robot: OpenedRobot) -> Array | None:
         own = checked_correlation([robot.links[j] for j in numbers], rows)
     except ValueError as error:
         raise LinkwiseError(f"{place}: {error}") from None
+    certain = [robot.links[j] for j in numbers if not masses[j]]
+    if certain:
+        raise LinkwiseError(f"{place}: the mass of {certain[0]!r} is certain; give it a deviation of its own")
     whole = np.eye(link_count(robot))
     whole[np.ix_(numbers, numbers)] = own
     return whole

@@ -26,6 +26,8 @@ class UncertainInputs:
     motion: MotionNoise | None = None
     loads: tuple[LoadSpread | None, ...] = ()
     load_names: tuple[str, ...] = ()
+    certain: tuple[str, ...] = ()
+    """More of this analysis that counts as certain, or has no deviation."""
 
     @property
     def bodies(self) -> UncertainBodies | None:
@@ -56,7 +58,7 @@ class UncertainInputs:
             **self.stated.record(),
             **({} if self.motion is None else {"motion": self.motion.record()}),
             **({"loads": loads} if loads else {}),
-            "certain": ", ".join([*certain, CERTAIN]),
+            "certain": ", ".join([*certain, *self.certain, CERTAIN]),
         }
 
     @property
@@ -76,11 +78,12 @@ def uncertain_inputs(
     processing: Processing,
     robot: OpenedRobot,
     loads: Sequence[PlacedLoad],
+    certain: Sequence[str] = (),
 ) -> UncertainInputs:
     """Return all that is uncertain of a log.
 
     file, stated: the file that says so, and what it says; raw: the log's first positions, as they were before
-    the filter
+    the filter; certain: what else counts as certain
 
     Raises LinkwiseError, which names the file, as `motion_noise` and `StatedLoads.placed` do.
     """
@@ -93,4 +96,4 @@ def uncertain_inputs(
             noise = motion_noise(stated.motion, raw, samples, processing, robot)
         if stated.loads is not None:
             spreads = stated.loads.placed(loads, robot)
-    return UncertainInputs(stated, noise, spreads, tuple(load.name for load in loads))
+    return UncertainInputs(stated, noise, spreads, tuple(load.name for load in loads), tuple(certain))
