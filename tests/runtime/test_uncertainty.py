@@ -274,7 +274,7 @@ def test_motion_that_is_no_number_has_no_certainty(
     q, qd, qdd = random_states(3, 2)
     q[1, 2] = np.nan
     for given in ({"bodies": UncertainBodies(0.1)}, {"motion": 1e-4 * np.eye(9)}):
-        found = np.array(robot.uncertainty(*map(tensors, (q, qd, qdd)), **given).joint_torque)
+        found = np.array(robot.uncertainty(*map(tensors, (q, qd, qdd)), **given).joint_torque.tolist())
         assert np.isnan(found[1]).all()
         assert np.isfinite(found[0]).all()
         nothing = robot.uncertainty(*(tensors(a[:0]) for a in (q, qd, qdd)), **given)
