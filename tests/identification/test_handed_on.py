@@ -163,7 +163,7 @@ def test_a_bad_covariance_ends_in_one_line(arm: Path, text: str, told: str) -> N
     ("text", "told"),
     [
         ('[all]\nlength = "1 mm"', "'length' counts as certain where links are identified; leave it out"),
-        ('[joint.ab]\nlength = "0 mm"', "'joint' counts as certain where links are identified; leave it out"),
+        ('[joint.ab]\nlength = "1 mm"', "'joint' counts as certain where links are identified; leave it out"),
         ('[all]\nmass = "-1 %"', "[all]: mass is -1 %"),
     ],
 )

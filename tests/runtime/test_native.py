@@ -259,7 +259,8 @@ def test_subclasses_and_negated_views_of_tensors_are_tensors(planar3: ModuleType
 def calls_of_motion(robot: Any) -> dict[str, int]:
     """Calls of a robot that ask for q, qd and qdd alone, and for how many of them."""
     asked = {}
-    for name in {*dir(robot)} - {"share_bounds"}:  # which programs answer, and no arrays
+    # Programs answer the one, and no arrays; the other asks for what is uncertain.
+    for name in {*dir(robot)} - {"share_bounds", "uncertainty"}:
         call = getattr(type(robot), name, None)
         if callable(call) and not name.startswith("_"):
             given = inspect.signature(call).parameters
