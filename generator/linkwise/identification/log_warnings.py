@@ -9,13 +9,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from linkwise.analysis.filtering import derivatives
+from linkwise.analysis.passed_noise import PassedNoise
 from linkwise.analysis.settings import Processing
 from linkwise.arrays import Array
 from linkwise.escape import listed
 from linkwise.identification.fit import POOR
 from linkwise.identification.identification_result import Identification
 from linkwise.identification.normal_factors import JointEquations
-from linkwise.identification.position_noise import LONGEST, noise_gain
+from linkwise.identification.position_noise import LONGEST
 from linkwise.identification.torque_log import TorqueLog
 
 LARGE = 100.0
@@ -34,7 +35,8 @@ def noisy_positions(log: TorqueLog, joints: Sequence[str], units: Sequence[str],
     """Return a warning where noise makes up much of an acceleration; "" where it does not."""
     stop = min(log.stop, log.start + LONGEST)
     found = np.sqrt(np.mean(derivatives(log.q, log.rate, log.start, stop, how)[2] ** 2, axis=0))
-    made = log.noise * noise_gain(log.rate, how)
+    passed = PassedNoise.of(len(log.q), log.rate, how)
+    made = log.noise * np.sqrt(passed.covariance(np.array([len(log.q) // 2]))[0, 2, 2])
     shares = made / np.where(found > 0, found, np.inf)
     at = int(shares.argmax())
     if shares[at] <= NOISY:

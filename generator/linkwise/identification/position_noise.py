@@ -1,8 +1,7 @@
-"""Noise of positions, and the noise of accelerations that comes from it.
+"""Noise of positions, from their sixth differences.
 
-Positions change so little between samples that their sixth differences are noise alone: independent noise of
-standard deviation sigma makes differences of sigma sqrt(924), 924 being the sum of the squares of their
-weights.
+Positions change so little between samples that these are noise alone: independent noise of standard deviation
+sigma makes differences of sigma sqrt(924), 924 being the sum of the squares of their weights.
 A second derivative multiplies noise by the square of the sampling rate: 1e-4 rad at 200 Hz are 12 rad/s^2.
 """
 
@@ -10,15 +9,11 @@ import math
 
 import numpy as np
 
-from linkwise.analysis.filtering import derivatives, lowpass
-from linkwise.analysis.settings import Processing
 from linkwise.arrays import Array
 
 ORDER = 6
 LONGEST = 1 << 16
 """Largest number of samples from which noise is estimated."""
-TRIED = 1 << 13
-"""Number of samples of simulated noise."""
 
 
 def position_noise(q: Array) -> Array:
@@ -28,12 +23,3 @@ def position_noise(q: Array) -> Array:
         return np.zeros(q.shape[1])
     sigma: Array = np.sqrt(np.mean(differences**2, axis=0) / math.comb(2 * ORDER, ORDER))
     return sigma
-
-
-def noise_gain(rate: float, processing: Processing) -> float:
-    """Return rad/s^2 (r.m.s.) of acceleration for each rad of noise, by differentiating simulated noise."""
-    noise = np.random.default_rng(0).standard_normal((TRIED, 1))
-    if processing.lowpass is not None:
-        lowpass(noise, rate, processing.lowpass)
-    middle = TRIED // 4, 3 * TRIED // 4
-    return float(np.std(derivatives(noise, rate, *middle, processing)[2]))
