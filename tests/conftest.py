@@ -39,8 +39,8 @@ SHARED: dict[str, Path] = {}
 """Packages of the session, by robot."""
 LARGEST = 1024
 """MB that a process of tests may hold when it is through with a file of tests."""
-COMPILES = "test_modules.py"
-"""File of tests after which torch's compilers leave most fragments of memory."""
+COMPILES = "torch.compile("
+"""Text of files of tests after which torch's compilers leave fragments of memory."""
 needs_compiler = needs("gcc")
 
 
@@ -109,8 +109,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     These take longest: the last file to begin would run alone.
     """
 
+    paths = {item.path for item in items}
+    compiles = {path for path in paths if COMPILES in path.read_text(encoding="utf-8")}
+
     def turn(item: pytest.Item) -> int:
-        return 0 if item.path.name == COMPILES else 1 if item.path.parent.name == "study" else 2
+        return 0 if item.path in compiles else 1 if item.path.parent.name == "study" else 2
 
     items.sort(key=turn)
 
