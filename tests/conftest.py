@@ -37,8 +37,10 @@ OPTIONS = {
 }
 SHARED: dict[str, Path] = {}
 """Packages of the session, by robot."""
-LARGEST = 1024
-"""MB that a process of tests may hold when it is through with a file of tests."""
+LARGEST = 512
+"""MB that a process of tests may hold, when it is through with a file, beyond what it held as tests began."""
+BEGAN: list[int] = []
+"""MB that it held then: imports of all files of tests, which libraries and Python's own cache decide on."""
 COMPILES = "torch.compile("
 """Text of files of tests after which torch's compilers leave fragments of memory."""
 needs_compiler = needs("gcc")
@@ -122,6 +124,8 @@ def pytest_collection_finish() -> None:
     """Keep what is imported by now out of the search for garbage."""
     gc.collect()
     gc.freeze()
+    if sys.platform == "linux":
+        BEGAN.append(held_megabytes())
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -142,8 +146,10 @@ def _forget() -> Iterator[None]:
     if sys.platform == "linux":
         with suppress(OSError, AttributeError):  # another C library than GNU's
             ctypes.CDLL("libc.so.6").malloc_trim(0)
-        held = held_megabytes()
-        assert held <= LARGEST, f"this process of tests holds {held} MB of memory, and {LARGEST} are the most"
+        more = held_megabytes() - BEGAN[0]
+        assert more <= LARGEST, (
+            f"tests have left {more} MB in this process' memory, and {LARGEST} are the most"
+        )
 
 
 def forget_packages() -> None:
