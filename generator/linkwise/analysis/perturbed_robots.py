@@ -9,10 +9,11 @@ from dataclasses import replace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
+from linkwise_runtime.certainty.body_errors import body_errors
 from linkwise_runtime.certainty.divided_differences import WIDTH
 from linkwise_runtime.certainty.parameter_moments import principal_moments
 from linkwise_runtime.certainty.share_bounds import bodies_of
-from linkwise_runtime.certainty.uncertain_bodies import body_axes, body_errors, tree_bodies
+from linkwise_runtime.certainty.uncertain_bodies import body_axes, tree_bodies
 from linkwise_runtime.rule.joint_tree import Bodies
 from linkwise_runtime.rule.regressors import inertial_parameters
 

@@ -48,6 +48,7 @@ class SumDeviations:
         self._deviations = RowSums([beside[at] for at in self.known.tolist()])
         self._samples, self._totals = 0, np.zeros(len(self.known))
         self._peaks = np.zeros((2, len(self.known)))
+        self._seen = np.full(len(self.known), -1.0)
 
     def __call__(self, values: Array) -> tuple[Array, Array]:
         """Return the known sums and their deviations, (known, S) each, of a part of a result (rows, S)."""
@@ -62,7 +63,8 @@ class SumDeviations:
         self._totals += deviations.sum(axis=1)
         at = np.abs(sums).argmax(axis=1)[:, None]
         found = np.array([np.take_along_axis(one, at, axis=1)[:, 0] for one in (sums, deviations)])
-        self._peaks = np.where(np.abs(found[0]) > np.abs(self._peaks[0]), found, self._peaks)
+        self._peaks = np.where(np.abs(found[0]) > self._seen, found, self._peaks)
+        self._seen = np.abs(self._peaks[0])
 
     def mean(self) -> Array:
         """Return the mean deviation of every sum over the samples, 0 where none is known.
@@ -74,7 +76,7 @@ class SumDeviations:
         return found
 
     def unsure(self, groups: Sequence[int] | Index) -> Mask:
-        """Return which sums have no certain sign where they are largest; next to nothing is left out.
+        """Return which sums have no certain sign where they are largest, but for those surely next to nothing.
 
         groups: the joint of each sum, of whose largest sum next to nothing is a part
         """
@@ -83,5 +85,6 @@ class SumDeviations:
         sizes = np.abs(self._peaks[0])
         np.maximum.at(most, own, sizes)
         found = np.zeros(self.count, np.bool_)
-        found[self.known] = (sizes > SMALL * most[own]) & (sizes < DEVIATIONS * self._peaks[1])
+        may_be = DEVIATIONS * self._peaks[1]
+        found[self.known] = (sizes + may_be > SMALL * most[own]) & (sizes < may_be)
         return found

@@ -90,10 +90,10 @@ def body_spread(links: Sequence[str], carried: Sequence[Floats], axes: Floats, g
     Raises ValueError, which names field and link, for what cannot be.
     """
     count, (masses, centres, inertias) = len(links), carried
-    own, radii = (_parts(links, name, getattr(given, name)) for name in ("masses", "radii"))
-    places = axes @ _covariances(links, "centres", given.centres) @ axes.mT
-    part = _parts(["body_mass"], "body_mass", given.body_mass)[0]
-    segments = part * _parts(links, "segments", given.segments)
+    own, radii = (known_parts(links, name, getattr(given, name)) for name in ("masses", "radii"))
+    places = axes @ place_covariances(links, "centres", given.centres) @ axes.mT
+    part = known_parts(["body_mass"], "body_mass", given.body_mass)[0]
+    segments = part * known_parts(links, "segments", given.segments)
     # cov(f_j, f_l) = segments_j segments_l + errors_jl
     together = checked_correlation(links, given.correlation)
     errors = (1.0 + np.outer(segments, segments)) * together * np.outer(own, own)
@@ -116,33 +116,8 @@ def body_spread(links: Sequence[str], carried: Sequence[Floats], axes: Floats, g
     padded = [np.pad(f, ((0, 0), (0, widest - f.shape[1]))) for f in apart]
     common = np.hstack([segments[:, None], factor(np.where(alone, 0.0, errors))])
     common = common[:, common.any(0)]
-    shared = [means[:, :, None] * common[:, None, :], _parameter_factor(links, given.parameters)]
+    shared = [means[:, :, None] * common[:, None, :], parameter_factor(links, given.parameters)]
     return BodySpread(np.array(padded), np.concatenate(shared, -1))
-
-
-class BodyErrors(NamedTuple):
-    """Errors of bodies, each by itself, of one standard deviation."""
-
-    masses: Sequence[Floats]
-    """Parts by which masses are off, (N,) for each error."""
-    centres: Sequence[tuple[int, Floats]]
-    """Links, and by how much their centre is off in the axes of its frame in m, (3,)."""
-    radii: Floats
-    """Part by which each of a link's radii is off, (N,)."""
-    parameters: Floats
-    """Factor of what all inertial parameters are off by together, (N, 10, Q)."""
-
-
-def body_errors(links: Sequence[str], axes: Floats, given: Any) -> BodyErrors:
-    """Return the errors of bodies; arguments and errors raised are as of `body_spread`."""
-    own, radii = (_parts(links, name, getattr(given, name)) for name in ("masses", "radii"))
-    places = axes @ _covariances(links, "centres", given.centres) @ axes.mT
-    part = _parts(["body_mass"], "body_mass", given.body_mass)[0]
-    together = checked_correlation(links, given.correlation) * np.outer(own, own)
-    masses = [part * _parts(links, "segments", given.segments), *factor(together).T]
-    centres = [(j, shift) for j, place in enumerate(places) for shift in factor(place).T]
-    parameters = _parameter_factor(links, given.parameters)
-    return BodyErrors([one for one in masses if one.any()], centres, radii, parameters)
 
 
 def tree_bodies(
@@ -187,7 +162,7 @@ def length_shifts(tree: JointTree, given: Any) -> Floats:
 
     given: `UncertainBodies.lengths`; raises as `body_spread` does
     """
-    covariances = _covariances([joint.name for joint in tree.joints], "lengths", given)
+    covariances = place_covariances([joint.name for joint in tree.joints], "lengths", given)
     own = {frame.name: np.array(frame.rotation) for frame in tree.frames}
     found = []
     for f, joint in enumerate(tree.joints):
@@ -227,7 +202,7 @@ def checked_correlation(names: Sequence[str], given: Any) -> Floats:
     return matrix
 
 
-def _parameter_factor(links: Sequence[str], given: Any) -> Floats:
+def parameter_factor(links: Sequence[str], given: Any) -> Floats:
     """Return H (N, 10, Q) of `UncertainBodies.parameters`."""
     count = len(links)
     if given is None:
@@ -256,7 +231,7 @@ def _parameter_factor(links: Sequence[str], given: Any) -> Floats:
     return factor(values).reshape(count, PARAMETERS, -1)
 
 
-def _covariances(names: Sequence[str], what: str, given: Any) -> Floats:
+def place_covariances(names: Sequence[str], what: str, given: Any) -> Floats:
     """Return covariances (count, 3, 3) of places in m^2."""
     count, values = len(names), _numbers(what, given)
     if values.shape == (count, 3, 3):
@@ -278,7 +253,7 @@ def _covariances(names: Sequence[str], what: str, given: Any) -> Floats:
     return squares[:, :, None] * np.eye(3)
 
 
-def _parts(links: Sequence[str], name: str, given: Any) -> Floats:
+def known_parts(links: Sequence[str], name: str, given: Any) -> Floats:
     """Return deviations (N,), each a part of what it is of."""
     values = _numbers(name, given)
     if values.shape not in ((), (len(links),)):
