@@ -76,7 +76,7 @@ class SumDeviations:
         return found
 
     def unsure(self, groups: Sequence[int] | Index) -> Mask:
-        """Return which sums have no certain sign where they are largest, but for those surely next to nothing.
+        """Return which sums have no certain sign where they are largest, and are not surely nothing.
 
         groups: the joint of each sum, of whose largest sum next to nothing is a part
         """
