@@ -38,8 +38,9 @@ class CertaintyCalls(MotionCalls):
         exactly; lengths, the places of joints, count to first order, by exact derivatives. Deviations are
         about the shares' means; where centres are uncertain these differ from the shares of the robot's own
         bodies, by what the mean of the inertia is more. Motion counts by `divided_differences`, to second
-        order along each direction of its covariance, without products of two directions. Axes of joints,
-        springs, damping, friction, armature and gravity count as certain. Raises ValueError, which names the
+        order along each direction of its covariance, and products, torques by cause and powers, by the
+        variances of both factors, see `product_moments`. Axes of joints, springs, damping, friction, armature
+        and gravity count as certain. Raises ValueError, which names the
         link, for deviations and covariances that cannot be, where nothing is uncertain, and as `regressor`
         does.
         """

@@ -174,6 +174,24 @@ def test_a_covariance_of_motion_counts_as_its_draws_do(
     np.testing.assert_allclose(both**2, alone**2 + found.torque**2, rtol=1e-9)
 
 
+def test_at_rest_products_deviate_by_bodies_and_motion_together(
+    package_at: Callable[[str], ModuleType],
+) -> None:
+    robot, draw = package_at("puma560").load("numpy"), np.random.default_rng(6)
+    n, draws = robot.n, 20_000
+    q, sizes = draw.uniform(-2.0, 2.0, n), np.repeat([3e-3, 5e-2, 1.0], n)
+    found = robot.uncertainty(q, np.zeros(n), np.zeros(n), UncertainBodies(0.1), np.diag(sizes**2))
+    noise = draw.normal(size=(draws, 3 * n)) * sizes
+    heavier = 1.0 + 0.1 * draw.normal(size=(draws, 1, robot.N))
+    at, qd, qdd = q + noise[:, :n], noise[:, n : 2 * n], noise[:, 2 * n :]
+    c2, c1, _ = (a * heavier.reshape(draws, 1, -1, *[1] * (a.ndim - 3)) for a in robot.coefficients(at, qd))
+    tau = robot.partial_torque(at, qd, qdd) * heavier
+    agree(found.acceleration, (c2 * qdd[:, None, None]).std(0))
+    agree(found.velocity, (c1 * qd[:, None, None]).std(0))
+    agree(found.joint_acceleration, (c2 * qdd[:, None, None]).sum(2).std(0))
+    agree(found.joint_power, (tau.sum(-1) * qd).std(0))
+
+
 @pytest.mark.parametrize(
     ("given", "told"),
     [

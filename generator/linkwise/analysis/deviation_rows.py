@@ -4,19 +4,20 @@ What bodies do to torques of an open tree, and to their powers, is known exactly
 else by perturbing what is uncertain, see `divided_differences`. All three are independent of each other.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from operator import itemgetter
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from linkwise_runtime.certainty.divided_differences import Direction, variances
+from linkwise_runtime.certainty.product_moments import Product, ProductMoments
 from linkwise_runtime.certainty.share_deviations import ShareDeviations, share_deviations
 
 from linkwise.analysis.loads.placed import LoadShift
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.perturbed_robots import PerturbedRobots, perturbed_robots
-from linkwise.analysis.product_rows import PairedDirections, ProductRows
 from linkwise.analysis.result_quantities import DEVIATION_OF, MOTION, NOISE_OF, OF_BODIES, OF_LOADS, TORQUE_OF
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.settings import Convention
@@ -51,22 +52,27 @@ class Perturbable(Protocol):
 
 Some = slice | Index
 """Rows, as a slice where they follow each other."""
-FACTORS = "factors"
-"""Name under which the factors c2 and c1 of torques by cause stand beside quantities."""
+FACTOR_OF = dict(zip(MOTION, ("c2", "c1"), strict=True))
+"""Names of the factors that stand beside quantities, by the torque that is each times the cause's motion."""
 
 
-class PerturbedRows(NamedTuple):
-    """Rows whose variances are found, among those of `Perturbable.values`."""
+class PerturbedArrays(NamedTuple):
+    """Arrays of rows whose variances are found, among those of `Perturbable.values`, and products of them."""
 
-    of: Some
-    borne: Index
-    """Rows that bodies perturb."""
-    left: Array
-    """True for each row that bodies perturb, (rows,)."""
-    places: Mapping[str, slice]
-    """Places of each quantity, and of the factors, among them."""
-    products: ProductRows | None
-    """Products of what is uncertain; None where motion is not."""
+    places: Mapping[str, Some]
+    """Rows of each, by quantity or factor."""
+    borne: tuple[str, ...]
+    """Those that bodies perturb."""
+    products: Mapping[str, Product]
+    """Torques by cause and powers, by quantity."""
+
+    def of(self, values: Array) -> list[Array]:
+        """Return all of the arrays, views where rows follow each other."""
+        return [values[some] for some in self.places.values()]
+
+    def of_borne(self, values: Array) -> list[Array]:
+        """Return the arrays that bodies perturb."""
+        return [values[self.places[name]] for name in self.borne]
 
 
 @dataclass(frozen=True)
@@ -117,88 +123,99 @@ class DeviationRows:
         motion: q, qd and qdd (S, n) in which ties close
         """
         rows = plain.rows
-        names = [name for name in DEVIATION_OF if name in rows]
-        if not names:
+        if not any(name in rows for name in DEVIATION_OF):
             return
-        into, apart = rows.numbers(*names), rows.numbers(*(name for name in NOISE_OF if name in rows))
         exact = {} if self._exact is None else self._of_bodies(self._exact, plain, motion)
-        every = self._perturbed(rows, [DEVIATION_OF[name] for name in names], frozenset(exact))
+        arrays = self._perturbed(rows, frozenset(exact))
         for at in range(0, len(time), AT_ONCE):
             some = slice(at, at + AT_ONCE)
             q, qd, qdd = motion
-            moved, found, pairs = self._variances(plain, every, time[some], (q[some], qd[some], qdd[some]))
-            for name, deviations in exact.items():
-                found[every.places[name]] += deviations[:, some] ** 2
-            for variance, numbers in ((moved, apart), (found, into)):
-                if pairs is not None and len(numbers):
-                    pairs.widen(variance)
-                out[numbers, some] = np.sqrt(variance[: len(numbers)])
+            bodies = {name: deviations[:, some] ** 2 for name, deviations in exact.items()}
+            moved, found = self._variances(plain, arrays, time[some], (q[some], qd[some], qdd[some]), bodies)
+            for variance, deviations in ((moved, NOISE_OF), (found, DEVIATION_OF)):
+                for deviation, quantity in deviations.items():
+                    if deviation in rows:
+                        out[rows[deviation].rows, some] = np.sqrt(np.maximum(variance[quantity], 0.0))
 
-    def _perturbed(self, rows: ResultRows, names: Sequence[str], exact: frozenset[str]) -> "PerturbedRows":
-        """Return the rows of these quantities, then the factors of torques by cause.
-
-        exact: quantities whose variances by bodies are known otherwise
-        """
-        count = sum(len(rows[name].numbers) for name in MOTION)
-        numbers = [*(rows[name].numbers for name in names), rows.plain + np.arange(count)]
-        ends = np.cumsum([len(some) for some in numbers])
-        spans = [slice(end - len(some), end) for end, some in zip(ends.tolist(), numbers, strict=True)]
-        places, every = dict(zip((*names, FACTORS), spans, strict=True)), np.concatenate(numbers)
-        left = np.zeros(len(every), bool)
-        if self.uncertain.bodies is not None:
-            for name in (OF_BODIES | {FACTORS}).difference(exact).intersection(places):
-                left[places[name]] = True
-        products = None if self.uncertain.motion is None else ProductRows.of(rows, places, FACTORS)
-        return PerturbedRows(together(every), every[left], left, places, products)
+    def _perturbed(self, rows: ResultRows, exact: frozenset[str]) -> PerturbedArrays:
+        """Return what is perturbed; exact: arrays whose variances by bodies are known otherwise."""
+        names = [quantity for name, quantity in DEVIATION_OF.items() if name in rows]
+        factors, start = {}, rows.plain
+        for torque, factor in FACTOR_OF.items():
+            factors[factor] = slice(start, start := start + len(rows[torque].numbers))
+        made = {name: of for name, of in (FACTOR_OF | TORQUE_OF).items() if name in names}
+        bases = [name for name in ("qd", "qdd", *names, *made.values()) if name not in (*made, *factors)]
+        places = {name: rows[name].rows for name in dict.fromkeys(bases)} | factors
+        borne = () if self.uncertain.bodies is None else {*OF_BODIES, *factors}.intersection(places) - exact
+        return PerturbedArrays(places, tuple(sorted(borne)), products(rows, places, made))
 
     def _variances(
-        self, plain: Perturbable, every: "PerturbedRows", time: Array, motion: Motion
-    ) -> tuple[Array, Array, PairedDirections | None]:
-        """Return variances of rows by noise of motion, by all that is perturbed, and pairs of directions."""
-        given, of = self.uncertain, every.of
-        pairs = None if every.products is None else PairedDirections(every.products, len(time))
-        if given.motion is None and not any(given.loads) and not len(every.borne):
-            found = np.zeros((len(every.left), len(time)))
-            return found, found, pairs
-        values = plain.values(time, *motion)[of]
-        note = None if pairs is None else pairs.add
-        [moved] = variances([values], self._moved(plain, time, motion, of), note)
-        found = moved + variances([values], self._loaded(plain, time, motion, of))[0]
-        if len(every.borne):
-            carried = self._carried(plain, time, motion, every.borne)
-            found[every.left] += variances([values[every.left]], carried)[0]
-        return moved, found, pairs
+        self,
+        plain: Perturbable,
+        arrays: PerturbedArrays,
+        time: Array,
+        motion: Motion,
+        exact: Mapping[str, Array],
+    ) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Return variances by noise of motion, and by all that is uncertain, by quantity.
 
-    def _moved(self, plain: Perturbable, time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
-        """Yield the directions of motion, along which rows `of` are known."""
+        exact: variances by bodies that are known
+        """
+        values = plain.values(time, *motion)
+        here = arrays.of(values)
+        moments = ProductMoments(tuple(arrays.products.values()), here)
+        moved = variances(here, self._moved(plain, time, motion, arrays), moments.add)
+        loaded = variances(here, self._loaded(plain, time, motion, arrays))
+        found = dict(zip(arrays.places, map(np.add, moved, loaded), strict=True))
+        if arrays.borne:
+            carried = variances(arrays.of_borne(values), self._carried(plain, time, motion, arrays))
+            for name, variance in zip(arrays.borne, carried, strict=True):
+                found[name] += variance
+        for name, variance in exact.items():
+            found[name] += variance
+        answers = []
+        for some in (moved, list(found.values())):
+            every = zip((*arrays.places, *arrays.products), (*some, *moments.variances(some)), strict=True)
+            answers.append(dict(every))
+        return answers[0], answers[1]
+
+    def _moved(
+        self, plain: Perturbable, time: Array, motion: Motion, arrays: PerturbedArrays
+    ) -> Iterator[Direction]:
+        """Yield the directions of motion."""
         noise = self.uncertain.motion
         moves = () if noise is None else noise.directions(time)
         for number, move in enumerate(moves):
 
             def rows(size: float, move: Motion = move) -> list[Array]:
-                return [plain.values(time, *(a + size * d for a, d in zip(motion, move, strict=True)))[of]]
+                moved = (a + size * d for a, d in zip(motion, move, strict=True))
+                return arrays.of(plain.values(time, *moved))
 
             yield Direction(rows, is_linear=3 * number >= 2 * len(moves))
 
-    def _loaded(self, plain: Perturbable, time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
+    def _loaded(
+        self, plain: Perturbable, time: Array, motion: Motion, arrays: PerturbedArrays
+    ) -> Iterator[Direction]:
         """Yield the directions of loads."""
         for e, spread in enumerate(self.uncertain.loads):
             for shift in () if spread is None else spread.directions():
 
                 def rows(size: float, e: int = e, shift: LoadShift = shift) -> list[Array]:
                     off = LoadShift(*(size * a for a in shift))
-                    return [plain.with_load_off(e, off).values(time, *motion)[of]]
+                    return arrays.of(plain.with_load_off(e, off).values(time, *motion))
 
                 yield Direction(rows)
 
-    def _carried(self, plain: Perturbable, time: Array, motion: Motion, of: Some) -> Iterator[Direction]:
-        """Yield the directions of bodies."""
+    def _carried(
+        self, plain: Perturbable, time: Array, motion: Motion, arrays: PerturbedArrays
+    ) -> Iterator[Direction]:
+        """Yield the directions of bodies, along which arrays are known that they perturb."""
         for off in self._bodies:
 
             def rows(size: float, off: PerturbedRobots = off) -> list[Array]:
                 try:
                     robot = off.ahead if size > 0 else off.behind
-                    return [plain.with_robot(robot).values(time, *motion)[of]]
+                    return arrays.of_borne(plain.with_robot(robot).values(time, *motion))
                 except LinkwiseError as error:
                     raise LinkwiseError(
                         f"--uncertain: with a body off by {abs(size):.2g} standard deviations, {error}"
@@ -207,28 +224,36 @@ class DeviationRows:
             yield Direction(rows, off.width)
 
     def _of_bodies(self, exact: ShareDeviations, plain: Perturbable, motion: Motion) -> dict[str, Array]:
-        """Return deviations by bodies of an open tree, (rows, S), by the quantity that they are of."""
-        rows, (_, qd, qdd) = plain.rows, motion
+        """Return deviations by bodies of an open tree, (rows, S), by array."""
         _, at = self.robot.model.door.read(dict(zip(("q", "qd", "qdd"), motion, strict=True)))
         found: Any = exact.packed(at, with_sums=False)
         c2, c1, gravity, torque, whole = (np.asarray(a) for a in found[:5])
         twice = 2.0 if self.convention == "gradient" else 1.0
-        answers = {"tau": whole[:, rows["tau"].at[:, 0]].T}
         sources = self.sources
-        factors = [c2[:, sources.acceleration].T, twice * c1[:, sources.velocity].T]
-        for name, values, moves in zip(MOTION, factors, (qdd, qd), strict=True):
-            answers[name] = values * np.abs(moves[:, rows[name].at[:, 2]]).T
-        answers["tau_link"] = torque[:, sources.torque].T
-        answers["tau_gravity"] = gravity[:, sources.gravity].T
-        answers[FACTORS] = np.concatenate(factors)
-        for power, of in TORQUE_OF.items():
-            if of in answers and power in rows:
-                answers[power] = answers[of] * np.abs(qd[:, rows[power].at[:, 0]]).T
-        return answers
+        return {
+            "tau": whole[:, plain.rows["tau"].at[:, 0]].T,
+            "tau_link": torque[:, sources.torque].T,
+            "tau_gravity": gravity[:, sources.gravity].T,
+            "c2": c2[:, sources.acceleration].T,
+            "c1": twice * c1[:, sources.velocity].T,
+        }
 
 
-def together(numbers: Index) -> Some:
-    """Return rows as a slice where they follow each other."""
-    if len(numbers) and (np.diff(numbers) == 1).all():
-        return slice(int(numbers[0]), int(numbers[-1]) + 1)
-    return numbers
+def products(rows: ResultRows, places: Iterable[str], made: Mapping[str, str]) -> dict[str, Product]:
+    """Return the products of a result, by quantity, as of arrays and then of products before.
+
+    places: names of the arrays; made: the torque or factor that each product is of
+    """
+    at = {name: number for number, name in enumerate((*places, *made))}
+    found = {}
+    for name, of in made.items():
+        motion, axis = ("qdd" if name == "tau_qdd" else "qd"), (2 if name in MOTION else 0)
+        second = partial(_rows, at[motion], rows[name].at[:, axis])
+        found[name] = Product(itemgetter(at[of]), second, is_factor=name in made.values())
+    return found
+
+
+def _rows(number: int, of: Index, arrays: Sequence[Any]) -> Array:
+    """Return rows of one of the arrays."""
+    found: Array = arrays[number][of]
+    return found

@@ -20,7 +20,7 @@ from linkwise.analysis.loads.placed import LoadShift, PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.reaction_forces import ReactionForces
 from linkwise.analysis.result_quantities import PASSIVE, QUANTITIES, TERMS, TORQUE_OF
-from linkwise.analysis.result_rows import QuantityRows, ResultRows, torque_places
+from linkwise.analysis.result_rows import ResultRows, torque_places
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.term_rows import TermArrays, term_rows
 from linkwise.analysis.traced_rows import ExtendedBlock, TracedRows
@@ -54,6 +54,16 @@ class ToldBeside(NamedTuple):
 
 
 NOTHING_BESIDE = ToldBeside()
+
+
+class Filled(NamedTuple):
+    """Packed values that rows were filled from, less what contacts bear, and what follows beside."""
+
+    packed: Any
+    partial: Array
+    """tau_ij (S, n, N) before contacts carry any; empty without contacts."""
+    standing: Standing | None
+    closure: Closure
 
 
 @dataclass(frozen=True)
@@ -165,11 +175,16 @@ class Decomposer:
         """Return all rows but those of a trace and of deviations, then factors; arguments are as of `fill`.
 
         They are (rows, S); factors are c2 of all rows tau_qdd and c1 of all rows tau_qd, which times the
-        cause's motion are these.
+        cause's motion are these. Such products, and powers, are not filled.
         """
         plain, (acceleration, velocity) = self.rows.plain, self.sources[:2]
-        out = np.empty((plain + len(acceleration) + len(velocity), len(time)))
-        self._fill(out[:plain], time, self._consistent(time, q, qd, qdd), out[plain:])
+        ends = plain + len(acceleration), plain + len(acceleration) + len(velocity)
+        out = np.empty((ends[1], len(time)))
+        packed, *_ = self._fill(out[:plain], time, self._consistent(time, q, qd, qdd))
+        _spread(out, slice(plain, ends[0]), packed.acceleration, acceleration)
+        _spread(out, slice(*ends), packed.velocity, velocity)
+        if self.convention == "gradient":
+            out[slice(*ends)] *= 2.0
         return out
 
     def fill(self, out: Array, time: Array, q: Array, qd: Array, qdd: Array) -> Closure:
@@ -178,15 +193,24 @@ class Decomposer:
         Where joints are tied, the motion of the independent ones counts. Raises LinkwiseError, with the time,
         where ties cannot be closed or joints do not follow.
         """
-        motion = self._consistent(time, q, qd, qdd)
-        closure = self._fill(out, time, motion)
+        motion = q, qd, qdd = self._consistent(time, q, qd, qdd)
+        packed, partial, standing, closure = self._fill(out, time, motion)
+        rows, sources = self.rows, self.sources
+        for name, values, places, moved in (
+            ("tau_qdd", packed.acceleration, sources.acceleration, qdd),
+            ("tau_qd", packed.velocity, sources.velocity, qd),
+        ):
+            _spread(out, rows[name].rows, values, places, (moved, rows[name].at[:, 2]))
+        closure |= self._closure(out, partial)
+        if self.convention == "gradient":
+            velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
+            rows.put(out, "tau_qd", _left(standing, velocity))
+        self._fill_power(out, qd)
         self.deviations.fill(out, self, time, motion)
         return closure
 
-    def _fill(
-        self, out: Array, time: Array, motion: tuple[Array, Array, Array], factors: Array | None = None
-    ) -> Closure:
-        """Fill `out` but for deviations; return how well it closes, unless `factors` are to be filled too."""
+    def _fill(self, out: Array, time: Array, motion: tuple[Array, Array, Array]) -> Filled:
+        """Fill `out` but for deviations, torques by cause and powers."""
         q, qd, qdd = motion
         packed: Any = self.robot.model.packed(q, qd, qdd)
         standing = self._standing(time, q)
@@ -201,27 +225,16 @@ class Decomposer:
         rows.put(out, "tau", _left(standing, free))
         self._add_passive(out, standing, q, qd, qdd)
         self._add_loads(out, standing, time, q)
-        _spread(out, rows["tau_link"], packed.torque, sources.torque)
-        _spread(out, rows["tau_qdd"], packed.acceleration, sources.acceleration, qdd)
-        _spread(out, rows["tau_qd"], packed.velocity, sources.velocity, qd)
+        _spread(out, rows["tau_link"].rows, packed.torque, sources.torque)
         if self.robot.is_written:
             rows.put(out, "tau_share", self.robot.model.named_shares(q, qd))
         else:
-            _spread(out, rows["tau_gravity"], packed.gravity, sources.gravity)
+            _spread(out, rows["tau_gravity"].rows, packed.gravity, sources.gravity)
         self.forces.fill(out, rows, standing, time, motion, partial)
-        closure = self._closure(out, partial) if factors is None else Closure()
-        closure |= self.induced.fill(out, unborne, standing, q, qd, qdd)
+        closure = self.induced.fill(out, unborne, standing, q, qd, qdd)
         self.reactions.fill(out, rows, standing, time, motion)
         closure |= self.power.fill(out, unborne, standing, time, motion)
-        if self.convention == "gradient":
-            velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
-            rows.put(out, "tau_qd", _left(standing, velocity))
-        self._fill_power(out, qd)
-        if factors is not None:
-            count, twice = len(sources.acceleration), 2.0 if self.convention == "gradient" else 1.0
-            factors[:count] = packed.acceleration.T[sources.acceleration]
-            factors[count:] = twice * packed.velocity.T[sources.velocity]
-        return closure
+        return Filled(packed, partial, standing, closure)
 
     def trace(
         self, out: Array, block: ExtendedBlock, state: TraceState | None
@@ -332,19 +345,21 @@ def _sums(rows: ResultRows, whole: str, *parts: str) -> tuple[Sum, ...]:
 
 
 def _spread(
-    out: Array, entries: QuantityRows, values: Array, places: Index, motion: Array | None = None
+    out: Array, rows: slice | Index, values: Array, places: Index, causes: tuple[Array, Index] | None = None
 ) -> None:
-    """Fill rows with the packed values (S, values) at these places, times the cause's motion (S, n) if given.
+    """Fill rows with the packed values (S, values) at these places, times the motion of causes if given.
 
     It goes by a few samples, which stay in the nearest cache while they are turned.
+
+    causes: motion (S, n), and the coordinate of each row
     """
-    causes = None if motion is None else entries.at[:, 2]
     for at in range(0, len(values), TURNED):
         some = slice(at, at + TURNED)
         found = values[some].T[places]
-        if motion is not None:
-            found *= motion[some].T[causes]
-        out[entries.rows, some] = found
+        if causes is not None:
+            motion, of = causes
+            found *= motion[some].T[of]
+        out[rows, some] = found
 
 
 def _left(standing: Standing | None, torque: Array) -> Array:

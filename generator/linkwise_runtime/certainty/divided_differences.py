@@ -40,17 +40,20 @@ def variances(
     """
     found = [abs(0.0 * one) for one in here]
     for values, width, is_linear in directions:
-        ahead = values(width)
-        if is_linear:
-            steps = [(a - one) * (1.0 / width) for a, one in zip(ahead, here, strict=True)]
-        else:
-            behind = values(-width)
-            steps = [(a - b) * (0.5 / width) for a, b in zip(ahead, behind, strict=True)]
+        ahead, steps = values(width), []
+        behind = here if is_linear else values(-width)
+        for number, (a, b, one) in enumerate(zip(ahead, behind, here, strict=True)):
+            # In place, as memory for what lies between costs more than the numbers.
+            step = a - b
+            step *= 1.0 / width if is_linear else 0.5 / width
+            found[number] += step * step
+            steps.append(step)
+            if not is_linear and width != 1.0:
+                bend = a + b
+                bend -= one
+                bend -= one
+                bend *= sqrt(width**2 - 1.0) / (2.0 * width**2)
+                found[number] += bend * bend
         if note is not None:
             note(steps)
-        found = [one + step * step for one, step in zip(found, steps, strict=True)]
-        if not is_linear and width != 1.0:
-            part = sqrt(width**2 - 1.0) / (2.0 * width**2)
-            bent = [(a + b - 2.0 * c) * part for a, b, c in zip(ahead, behind, here, strict=True)]
-            found = [one + bend * bend for one, bend in zip(found, bent, strict=True)]
     return found

@@ -11,7 +11,23 @@ from ..interface import side_by_side
 from ..share_uncertainty import Uncertainty
 from .divided_differences import Direction, variances
 from .parameter_moments import ROUNDING, Floats
+from .product_moments import Product, ProductMoments
 from .share_deviations import root, share_deviations
+
+SHARES = ("c2", "c1", "gravity", "torque", "joint_torque", "joint_c2", "joint_c1", "joint_gravity")
+"""Shares, and their sums over links, in the order of `PackedDeviations`."""
+BASES = (*SHARES, "qd", "qdd")
+"""Shares and motion, of which products are made."""
+C2, C1, _, TAU, WHOLE, JOINT_C2, JOINT_C1, _, QD, QDD = range(len(BASES))
+BY_PRODUCT = ("acceleration", "velocity", "joint_acceleration", "joint_velocity", "power", "joint_power")
+PRODUCTS = (
+    Product(lambda a: a[C2], lambda a: a[QDD][:, None, None, :]),
+    Product(lambda a: a[C1], lambda a: a[QD][:, None, None, :]),
+    Product(lambda a: a[JOINT_C2], lambda a: a[QDD][:, None, :]),
+    Product(lambda a: a[JOINT_C1], lambda a: a[QD][:, None, :]),
+    Product(lambda a: a[TAU], lambda a: a[QD][:, :, None]),
+    Product(lambda a: a[WHOLE], lambda a: a[QD]),
+)
 
 
 def uncertainty(robot: Any, q: object, qd: object, qdd: object, bodies: object, motion: object) -> Any:
@@ -22,48 +38,34 @@ def uncertainty(robot: Any, q: object, qd: object, qdd: object, bodies: object, 
     backend.answers.check_regresses()
     batch = tuple(read[0].shape[:-1])
     flat = [a.reshape(math.prod(batch), a.shape[-1]) for a in read]
-    found: list[Any] = []
-    if bodies is not None:
-        found.append([a**2 for a in _by_bodies(backend, flat, bodies)])
+    here = _shares(robot, flat)
+    moments = ProductMoments(PRODUCTS, here)
+    found = [abs(0.0 * a) for a in here]
     if motion is not None:
         roots = motion_roots(motion, batch, read[0].shape[-1])
-        found.append(variances(_shares(robot, flat), _directions(robot, flat, roots)))
-    together = [sum(parts) for parts in zip(*found, strict=True)]
-    deviations = (root(backend.xp, variance) for variance in together)
+        found = variances(here, _directions(robot, flat, roots), moments.add)
+    if bodies is not None:
+        for number, borne in enumerate(_by_bodies(backend, flat, bodies)):
+            found[number] = found[number] + borne**2
+    by_name = dict(zip((*BASES, *BY_PRODUCT), [*found, *moments.variances(found)], strict=True))
+    deviations = (root(backend.xp, by_name[name]) for name in Uncertainty._fields)
     return Uncertainty(*(side_by_side(a.reshape(*batch, *a.shape[1:])) for a in deviations))
 
 
 def _by_bodies(backend: Any, flat: Sequence[Any], bodies: object) -> Sequence[Any]:
-    """Return the deviations by bodies, in the order of `Uncertainty`."""
+    """Return the deviations by bodies of the shares, in the order of `SHARES`."""
     at = share_deviations(backend, bodies)
-    found, (_, rate, gain) = at.packed(flat), (abs(a) for a in flat)
-    c2, c1 = at.spread(found.c2, "acceleration"), at.spread(found.c1, "velocity")
-    torque = at.spread(found.torque, "torque")
-    return (
-        torque,
-        c2,
-        c1,
-        c2 * gain[:, None, None, :],
-        c1 * rate[:, None, None, :],
-        at.spread(found.gravity, "gravity"),
-        found.joint_torque,
-        found.joint_c2 * gain[:, None, :],
-        found.joint_c1 * rate[:, None, :],
-        found.joint_gravity,
-        torque * rate[:, :, None],
-        found.joint_torque * rate,
-    )
+    found = at.packed(flat)
+    fields = ("acceleration", "velocity", "gravity", "torque")
+    return [*map(at.spread, found[:4], fields), *found[4:]]
 
 
 def _shares(robot: Any, motion: Sequence[Any]) -> list[Any]:
-    """Return what the fields of `Uncertainty` are deviations of, (S, ...) each."""
+    """Return shares and sums over links, (S, ...) each, in the order of `BASES`."""
     q, qd, qdd = motion
     c2, c1, g = robot.coefficients(q, qd)
     tau = robot.partial_torque(q, qd, qdd)
-    by_acceleration, by_velocity = c2 * qdd[:, None, None, :], c1 * qd[:, None, None, :]
-    whole = tau.sum(-1)
-    sums = (whole, by_acceleration.sum(2), by_velocity.sum(2), g.sum(-1))
-    return [tau, c2, c1, by_acceleration, by_velocity, g, *sums, tau * qd[:, :, None], whole * qd]
+    return [c2, c1, g, tau, tau.sum(-1), c2.sum(2), c1.sum(2), g.sum(-1), qd, qdd]
 
 
 def _directions(robot: Any, flat: Sequence[Any], roots: Floats) -> Iterator[Direction]:
