@@ -85,7 +85,8 @@ class CertaintyCalls(MotionCalls):
         masses: limits of masses: a part of every claimed one, 0.1 for 10 % less or more, or by link such a
         part, or (least, greatest) in kg
         measured: as in `identifiability`
-        shares: "torque" (tau_ij), "acceleration", "velocity" or "gravity", or several of them
+        shares: "torque" (tau_ij), "acceleration", "velocity", "gravity" or "reactions", the components of
+        what joints of the tree bear through each link, or several of them
         joints: loaded joints whose shares are wanted, all unless given; each share is two programs
 
         Needs Clarabel and SciPy, and raises ImportError without. Raises as `identifiability` does, and

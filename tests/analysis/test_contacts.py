@@ -10,6 +10,7 @@ from helpers.command_line import run_linkwise
 from helpers.motion_logs import LEG, smooth, write_csv
 from linkwise import LinkwiseError, Load, generate, read_system, write_package
 from linkwise.analysis import Contact, Contacts, Processing, WhileColumn, analyze
+from linkwise.analysis.show.bands import FAINT
 
 JOINTS = ["pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r"]
 MASSES = {"pelvis": 50.85, "thigh": 7.5, "shank": 3.49, "foot": 1.09}
@@ -180,6 +181,22 @@ def test_a_tie_bears_what_the_ground_gives_to_a_joint_that_follows(folder: Path)
     panel = result.figure("contacts").axes[0]
     (drawn,) = (line for line in panel.get_lines() if line.get_label() == "found from the motion")
     np.testing.assert_allclose(drawn.get_ydata(), result["force/sole force_y"], rtol=0, atol=1e-9 * scale)
+
+
+def test_bands_of_what_the_ground_bears_are_one_deviation_to_either_side(folder: Path) -> None:
+    pytest.importorskip("matplotlib")
+    (folder / "bodies.toml").write_text('schema = 1\n[all]\nmass = "10 %"\n')
+    log = folder / "moving.csv"
+    result = analyze(log, folder / "leg", contacts=[FOOT], uncertain=folder / "bodies.toml")
+    figure = result.figure("contacts")
+    for panel, column in ((0, "sole force_y"), (-1, None)):
+        (band,) = (one for one in figure.axes[panel].patches if one.get_alpha() == FAINT)
+        low, high = band.get_xy()[:-1, 1].reshape(2, -1)
+        names = [f"sd/force/{column}"] if column else [f"sd/tau/{name}" for name in JOINTS[3:]]
+        half = (high[::-1] - low) / 2
+        assert any(np.allclose(half, result[name], rtol=1e-9, atol=1e-9) for name in names)
+        assert half.max() > 0.0
+    assert "Bands are one standard deviation" in figure.legends[0].get_title().get_text()
 
 
 @pytest.mark.parametrize("undriven", [JOINTS[:3], (*JOINTS[:2], "knee_angle_r")], ids=["base", "knee"])

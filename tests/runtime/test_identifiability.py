@@ -150,6 +150,33 @@ def _listed(bodies: Any) -> Any:
     return np.stack([bodies.masses, *(bodies.inertias[:, a, b] for a, b in at)], -1)
 
 
+def test_what_joints_bear_has_ends_that_bodies_attain(package_of: Packages) -> None:
+    """The wrench through each link is Pinocchio's of that link alone, of bodies with the same torques."""
+    package, model = package_of("puma560"), oracle_models.puma560()
+    state = [a[0] for a in draw(6, 1)]
+    bounds = package.load().share_bounds(
+        *state, masses=0.2, shares=("torque", "reactions"), joints=["joint2", "joint5"]
+    )
+    assert bounds.proved["reactions"][[1, 4]].all()
+    assert np.isnan(bounds.least["reactions"][2, 3]).all()  # was not asked for
+    data, moving = model.createData(), list(zip(*draw(6, 10, 4), strict=True))
+    expected = np.array([pin.rnea(model, data, *motion) for motion in moving])
+    own = oracle_models.link_alone(model, 5)
+    pin.rnea(own, data, *state)
+    wrench = np.concatenate([data.f[5].angular, data.f[5].linear])
+    np.testing.assert_allclose(bounds.value["reactions"][4, 4], wrench, atol=1e-9)
+    for kind, (f, j, component) in [key for key in bounds.ends if key[0] == "reactions"]:
+        for end, bound in (("least", bounds.least), ("greatest", bounds.greatest)):
+            bodies = bounds.bodies(f, j, kind=kind, end=end, component=component)
+            other = _with(model, bodies)
+            found = np.array([pin.rnea(other, data, *motion) for motion in moving])
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+            pin.rnea(oracle_models.link_alone(other, j + 1), data, *state)
+            share = [*data.f[f + 1].angular, *data.f[f + 1].linear][component]
+            size = max(abs(end_of[kind][f, j, component]) for end_of in (bounds.least, bounds.greatest))
+            assert abs(share - bound[kind][f, j, component]) < 1e-6 * size
+
+
 @pytest.mark.parametrize("masses", [None, 0.1, {"link2": (17.0, 18.0), "link3": (4.7, 4.7)}])
 def test_bodies_at_the_ends_have_the_same_torques_and_the_share_that_is_told(
     masses: Any, package_of: Packages
@@ -307,6 +334,7 @@ def test_every_back_end_of_rigid_links_says_the_same(package_of: Packages) -> No
         ({"measured": []}, "measured is empty"),
         ({"shares": "power"}, "shares has 'power'; choose among torque, acceleration"),
         ({"joints": [7]}, "joints is 7; choose a joint"),
+        ({"shares": "reactions", "joints": ["hip"]}, "joints is 'hip'; choose a joint"),
         ({"qd": [0.0, np.nan, 0.0]}, "NaN or infinite"),
         ({"q": np.zeros((4, 3))}, r"samples of shape \(4,\); give one position"),
     ],
@@ -334,6 +362,11 @@ def test_what_cannot_be_answered_is_refused_by_name(
     bounds = package.load().share_bounds(*README)
     with pytest.raises(ValueError, match="joint3, link3 is zero, follows from joint torques"):
         bounds.bodies("joint3", "link3")
+    borne = package.load().share_bounds(*README, shares="reactions")
+    with pytest.raises(
+        ValueError, match=r"component is 'up'; choose a component by number, 0\.\.5, or by name: moment_x"
+    ):
+        borne.bodies("joint1", "link3", kind="reactions", component="up")
     monkeypatch.setitem(sys.modules, "clarabel", None)
     with pytest.raises(ImportError, match="pip install clarabel"):
         package.load().share_bounds(*README)

@@ -1,27 +1,30 @@
 """Least and greatest value of each share over all bodies that could exist with the same joint torques."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..chosen_names import choice, position_of, short
 from ..door import Door
 from ..interface import array_of
+from ..robot_axes import WRENCH
 from ..rule.joint_tree import Bodies
 from .conic_program import solver
-from .feasible_bodies import End, FeasibleBodies, feasible_bodies
-from .identifiability import NONE, STATES, Masks, by_link, hidden_from
+from .feasible_bodies import feasible_bodies
+from .identifiability import STATES, Masks, by_link, hidden_from
 from .pseudo_inertia import Floats, central
+from .share_ends import Asked, Place, ShareEnds
 from .share_rows import LinearRobot, OnNumpy, RigidRobot
 
-TORQUES = ("torque", "acceleration", "velocity", "gravity")
+SHARES = ("torque", "acceleration", "velocity", "gravity", "reactions")
 """Kinds of shares that may be asked for."""
+BORNE = SHARES[-1]
+"""Kind of which a share is a component of the wrench that a joint of the tree bears."""
 TOLERANCE = 1e-6
 """Largest gap of an end that counts as proved, as a part of the largest of ends and value."""
-Place = tuple[int, ...]
 
 
 class MovedRobot(RigidRobot, Protocol):
@@ -34,12 +37,14 @@ class MovedRobot(RigidRobot, Protocol):
 class ShareBounds:
     """Ends of shares over all bodies with the same joint torques at every motion, by kind of share.
 
-    Arrays are those of `propagation`: torque and gravity (m, N), acceleration and velocity (m, N, m), in N m
-    or N. m joints have torques of their own: all, or the independent ones where joints are tied. Of shares
-    that follow from torques both ends are the value itself.
+    Arrays are those of `propagation`: torque and gravity (m, N), acceleration and velocity (m, N, m), and of
+    `reactions` their sums over causes (F, N, 6), in N m or N. m joints have torques of their own: all, or the
+    independent ones where joints are tied. Of shares that follow from torques both ends are the value itself.
     """
 
     joints: tuple[str, ...]
+    tree_joints: tuple[str, ...]
+    """Names of the F joints that bear wrenches."""
     links: tuple[str, ...]
     value: Mapping[str, Floats]
     """Shares of the robot's own bodies."""
@@ -75,10 +80,12 @@ class ShareBounds:
         coordinate: int | str | None = None,
         kind: str = "torque",
         end: str = "greatest",
+        component: int | str | None = None,
     ) -> Bodies[Floats]:
         """Return the bodies, as `load(bodies=...)` takes them, whose share is at one end.
 
         coordinate: k, of shares by acceleration or velocity
+        component: component of a wrench, such as "force_x", of kind "reactions"
         end: "least" or "greatest"; without an end, bodies of the largest size that was allowed
 
         Raises ValueError for a share that is not there or follows from torques.
@@ -89,15 +96,17 @@ class ShareBounds:
             )
         if end not in ("least", "greatest"):
             raise ValueError(f"end is {short(end)}; choose least or greatest")
-        asked: list[tuple[object, tuple[str, ...], str]] = [(joint, self.joints, "joint")]
-        asked.append((link, self.links, "link"))
-        if self.value[kind].ndim == 3:
-            asked.append((coordinate, self.joints, "coordinate"))
-        kinds = ("joint", "link", "joint")
-        place = tuple(position_of(*one[:2], what, one[2]) for one, what in zip(asked, kinds, strict=False))
+        bearing = self.tree_joints if kind == BORNE else self.joints
+        asked: list[tuple[object, tuple[str, ...], str, str]] = [(joint, bearing, "joint", "joint")]
+        asked.append((link, self.links, "link", "link"))
+        if kind == BORNE:
+            asked.append((component, WRENCH, "component", "component"))
+        elif self.value[kind].ndim == 3:
+            asked.append((coordinate, self.joints, "joint", "coordinate"))
+        place = tuple(position_of(*one) for one in asked)
         pair = self.ends.get((kind, place))
         if pair is None:
-            words = ", ".join(names[at] for at, (_, names, _) in zip(place, asked, strict=True))
+            words = ", ".join(names[at] for at, (_, names, *_) in zip(place, asked, strict=True))
             raise ValueError(
                 f"the {kind} share of {words} is zero, follows from joint torques, or was not asked for: "
                 "there are no bodies at its ends"
@@ -137,15 +146,19 @@ def share_bounds(
     places = linear.measured(measured)
     several = linear.random_motion(len(places))
     space = hidden_from(linear, places, several)
-    everywhere = linear.share_rows([a[:STATES] for a in several], reactions=False)
-    rows = linear.share_rows(_closed(linear, state), reactions=False)
+    borne, loaded = BORNE in kinds, _asked(joints, linear.joints, robot.tree_joint_names, kinds)
+    everywhere = linear.share_rows([a[:STATES] for a in several], reactions=borne)
+    rows = linear.share_rows(_closed(linear, state), reactions=borne)
     rows = {kind: _of_motion(kind, rows[kind][0], state, linear.own) for kind in kinds}
     bodies = feasible_bodies(linear.parameters, space.hidden_parameters, limits, robot.link_names)
     masks = {kind: by_link(everywhere, kind, space) for kind in kinds}
-    asked = Asked(linear.parameters, bodies, _asked(joints, linear.joints), tuple(places))
-    found = {kind: ShareEnds.of(rows[kind], masks[kind].follows, asked) for kind in kinds}
+    found = {}
+    for kind in kinds:
+        asked = Asked(linear.parameters, bodies, loaded[kind], () if kind == BORNE else tuple(places))
+        found[kind] = ShareEnds.of(rows[kind], masks[kind].follows, asked)
     return ShareBounds(
         linear.joints,
+        robot.tree_joint_names,
         robot.link_names,
         {kind: one.value for kind, one in found.items()},
         {kind: masks[kind].follows for kind in kinds},
@@ -161,10 +174,10 @@ def share_bounds(
 def _kinds(given: object) -> tuple[str, ...]:
     several = [given] if isinstance(given, str) else given
     if not isinstance(several, list | tuple) or not several:
-        raise ValueError(f"shares is {short(given)}; give some of {', '.join(TORQUES)}")
+        raise ValueError(f"shares is {short(given)}; give some of {', '.join(SHARES)}")
     for one in several:
-        if one not in TORQUES:
-            raise ValueError(f"shares has {short(one)}; choose among {', '.join(TORQUES)}")
+        if one not in SHARES:
+            raise ValueError(f"shares has {short(one)}; choose among {', '.join(SHARES)}")
     return tuple(dict.fromkeys(several))
 
 
@@ -216,70 +229,25 @@ def _limits(given: object, mass: float, where: str) -> tuple[float, float]:
     )
 
 
-def _asked(given: object, joints: Sequence[str]) -> tuple[int, ...]:
-    """Return the places of the loaded joints that were asked for, all unless given."""
-    if given is None:
-        return tuple(range(len(joints)))
-    several = given if isinstance(given, list | tuple) else [given]
-    return tuple(position_of(one, joints, "joint", "joints") for one in several)
+def _asked(
+    given: object, joints: Sequence[str], tree_joints: Sequence[str], kinds: Sequence[str]
+) -> dict[str, tuple[int, ...]]:
+    """Return the places of the loaded joints that were asked for, by kind, all unless given.
 
-
-class Asked(NamedTuple):
-    """Shares that are asked for, and over which bodies."""
-
-    own: Floats
-    """Parameters of the robot's own links, (N, 10)."""
-    bodies: FeasibleBodies
-    joints: tuple[int, ...]
-    """Loaded joints."""
-    measured: tuple[int, ...]
-    """Joints whose torques are measured."""
-
-    def least(self, row: Floats, place: Place) -> End:
-        """Return the least share at a place, by its row (10,)."""
-        y = np.zeros_like(self.own)
-        y[place[1]] = row
-        return self.bodies.least(y, may_end=place[0] in self.measured)
-
-
-@dataclass(frozen=True, eq=False)
-class ShareEnds:
-    """Ends of one kind of shares; of those that were not asked for, not a number."""
-
-    value: Floats
-    least: Floats
-    greatest: Floats
-    gap: Floats
-    sized: Masks
-    pairs: Mapping[Place, tuple[Floats, Floats]]
-
-    @classmethod
-    def of(cls, rows: Floats, follows: Masks, asked: Asked) -> "ShareEnds":
-        """Return the ends of shares with these rows (m, N, ..., 10)."""
-        over = (slice(None), *(None,) * (rows.ndim - 3))
-        value = (rows * asked.own[over]).sum(-1)
-        least, greatest, gap = value.copy(), value.copy(), np.zeros_like(value)
-        sized, pairs = np.zeros(value.shape, dtype=bool), {}
-        for place in _leaning(rows * asked.bodies.sizes[over], follows):
-            if place[0] not in asked.joints:
-                least[place] = greatest[place] = gap[place] = np.nan
-                continue
-            low, high = (asked.least(sign * rows[place], place) for sign in (1.0, -1.0))
-            least[place], greatest[place] = low.bound, -high.bound
-            gap[place], sized[place] = max(_gap(low), _gap(high)), low.sized or high.sized
-            pairs[place] = low.parameters, high.parameters
-        return cls(value, least, greatest, gap, sized, pairs)
-
-
-def _leaning(rows: Floats, follows: Masks) -> Iterator[Place]:
-    """Yield the places of shares that are not zero and lean on the file's masses.
-
-    rows: rows of shares, in units of the parameters' sizes
+    A name that only one of both lists has counts there; other kinds have nothing of it.
     """
-    lengths = np.linalg.norm(rows, axis=-1)
-    for place in np.argwhere((lengths > NONE * lengths.max(initial=0.0)) & ~follows).tolist():
-        yield tuple(place)
-
-
-def _gap(end: End) -> float:
-    return max(end.attained - end.bound, 0.0) if np.isfinite(end.bound) else 0.0
+    lists = {kind: tree_joints if kind == BORNE else joints for kind in kinds}
+    if given is None:
+        return {kind: tuple(range(len(names))) for kind, names in lists.items()}
+    several = given if isinstance(given, list | tuple) else [given]
+    every = tuple(dict.fromkeys(name for names in lists.values() for name in names))
+    for one in several:
+        position_of(one, every, "joint", "joints")
+    return {
+        kind: tuple(
+            position_of(one, names, "joint", "joints")
+            for one in several
+            if not isinstance(one, str) or one in names
+        )
+        for kind, names in lists.items()
+    }

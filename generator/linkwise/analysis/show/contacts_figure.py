@@ -3,11 +3,13 @@
 import textwrap
 from collections.abc import Iterable
 from functools import reduce
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from linkwise.analysis.result import AnalysisResult
+from linkwise.analysis.show.bands import Bands, draw_band
 from linkwise.analysis.show.drawn_curves import (
     drawn_curves,
     foot,
@@ -42,14 +44,20 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
     alone = largest_few(asked.sum(axis=(0, 1))[:-1], MOST)[0]
     joints = [_joints(result, c) for c in range(len(ground.names))]
     count = len(shown) + max(map(len, joints))
+    banded = {(c, axis): _rows_of(result, "force", c, axis) for c in range(len(joints)) for axis in shown}
+    banded |= {i: result.rows.numbers("tau", joint=i) for i in dict.fromkeys(chain.from_iterable(joints))}
+    bands = Bands(result, list(banded.values()))
+    band = {place: bands[number] for number, place in enumerate(banded)}
     figure = new_figure(WIDTH * len(ground.names) + 1.4, HEIGHT * count + 1.3)
     panels = figure.subplots(count, len(ground.names), sharex=True, sharey="row", squeeze=False)
     for c, name in enumerate(ground.names):
         panels[0, c].set_title(drawn(name))
         for panel, axis in zip(panels[:, c], shown, strict=False):
             _draw_force(panel, result, (c, axis), alone, np.flatnonzero(asked[c, axis]).tolist())
+            draw_band(panel, band[c, axis], INK)
         for panel, i in zip(panels[len(shown) :, c], joints[c], strict=False):
             _draw_torque(panel, result, c, i)
+            draw_band(panel, band[i], INK)
         drawn_here = len(shown) + len(joints[c])
         for panel in panels[drawn_here:, c]:
             panel.set_axis_off()
@@ -58,7 +66,7 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
     for panel, axis in zip(panels[:, 0], shown, strict=False):
         panel.set_ylabel(f"force {PARTS[axis]} (N)")
     figure.align_ylabels(panels[:, 0])
-    _legend(figure, panels.flat, foot(result))
+    _legend(figure, panels.flat, " ".join([*bands.notes, foot(result)]))
     write_title(figure, result, "What the ground bears")
     return figure
 
@@ -120,8 +128,8 @@ def _joints(result: AnalysisResult, contact: int) -> list[int]:
     """Return the driven joints between the base and a contact, the nearest to the contact first."""
     robot, ground = result.robot, result.robot.ground
     assert robot.tree is not None
-    chain = robot.tree.chain(robot.joint_of(ground.contacts[contact].frame))
-    moving = dict.fromkeys(robot.tree.joints[f].coordinate for f in reversed(chain))
+    path = robot.tree.chain(robot.joint_of(ground.contacts[contact].frame))
+    moving = dict.fromkeys(robot.tree.joints[f].coordinate for f in reversed(path))
     return [k for k in moving if k in robot.driven and k not in ground.unactuated][:JOINTS]
 
 
@@ -157,14 +165,21 @@ def _draw_force(
 
 
 def _draw_measured(panel: Any, result: AnalysisResult, contact: int, axis: int) -> None:
-    ground = result.robot.ground
-    first = result.robot.contact_rows.start
-    for row in result.rows["force_measured"].at[:, 0].tolist():
-        if ground.owners[row - first] == contact and ground.rows[row - first].endswith(
-            f" force_{PARTS[axis]}"
-        ):
-            rows = result.rows.numbers("force_measured", constraint=row)
-            _draw_rows(panel, result, rows, color="#C21E56", linestyle="dashed", label="measured")
+    rows = _rows_of(result, "force_measured", contact, axis)
+    _draw_rows(panel, result, rows, color="#C21E56", linestyle="dashed", label="measured")
+
+
+def _rows_of(result: AnalysisResult, quantity: str, contact: int, axis: int) -> Index:
+    """Return the numbers of the rows of a component of a contact's force."""
+    ground, first = result.robot.ground, result.robot.contact_rows.start
+    rows = [
+        row
+        for row in dict.fromkeys(result.rows[quantity].at[:, 0].tolist())
+        if row >= first
+        and ground.owners[row - first] == contact
+        and ground.rows[row - first].endswith(f" force_{PARTS[axis]}")
+    ]
+    return result.rows.numbers(quantity, constraint=rows)
 
 
 def _draw_torque(panel: Any, result: AnalysisResult, contact: int, i: int) -> None:
