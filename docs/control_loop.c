@@ -46,7 +46,7 @@ static void start(void)
 /* What the controller does in a period: torques from what is measured. */
 static int control(void)
 {
-    return puma560_partial_impedance(q, qd, &wanted, q_d, NULL, NULL, NULL, push, tau);
+    return puma560_partial_impedance(q, qd, &wanted, q_d, NULL, NULL, NULL, push, tau, NULL);
 }
 
 /* What the robot does meanwhile: it is simulated here, by a step of Euler's. */

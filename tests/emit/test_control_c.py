@@ -182,7 +182,8 @@ def test_where_a_sliding_base_is_does_not_matter(tmp_path: Path) -> None:
         assert (here == there).all()
 
 
-FREE = {"forward_dynamics", "forward_dynamics_of_links", "partial_impedance", "frame_partial_impedance"}
+CONTROLLERS = {"partial_impedance", "frame_partial_impedance", "cancel"}
+FREE = {"forward_dynamics", "forward_dynamics_of_links", *CONTROLLERS}
 """Calls that move joints that nothing ties."""
 OF_PASSIVE = {"forward_dynamics_of_links", "passive_torque"}
 """Calls that only robots have a use for whose joints have anything of their own."""
@@ -244,6 +245,7 @@ def in_python(package: ModuleType, robot: Any) -> dict[str, Callable[[], Any]]:
         "forward_dynamics_of_links": lambda: robot.forward_dynamics(q, q, q, passive=False),
         "partial_impedance": lambda: robot.partial_impedance()(q, q),
         "frame_partial_impedance": of_frame,
+        "cancel": lambda: robot.cancel({(0, 0, 0, 1)})(q, q, qdd=q),
     }
 
 

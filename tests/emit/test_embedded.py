@@ -41,7 +41,7 @@ MATH = r"(?:_ZGV\w+_)?(?:sin|cos|sincos|sqrt|fabs|atan2|exp|log|pow|tan|tanh)f?"
 """Functions of math.h, also those of glibc for vectors, which come with -lm."""
 CONTROL = (
     r"(pose|jacobian|jacobian_rate|mass_matrix|passive_torque|forward_dynamics|forward_dynamics_of_links|"
-    r"partial_impedance|frame_partial_impedance)f?$"
+    r"partial_impedance|frame_partial_impedance|cancel)f?$"
 )
 SMALL = "-DLINKWISE_SMALL"
 ARM = ("arm-none-eabi-gcc", "-std=c99", "-mthumb", "-mfloat-abi=hard", "-mcpu=cortex-m7", "-mfpu=fpv5-d16")

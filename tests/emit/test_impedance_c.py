@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import DATA, PANDA, needs_compiler
 from helpers.compiled import WARNED, name_of
-from helpers.impedance_in_c import ImpedanceInC, formula, frame_formula
+from helpers.impedance_in_c import ImpedanceInC, cancel_formula, formula, frame_formula
 from helpers.kept import run_kept
 from helpers.urdf_text import chain, joint
 from linkwise import generate, read_system, write_package
@@ -96,7 +96,7 @@ def wishes(generator: np.random.Generator, n: int, links: int) -> dict[str, dict
 
 @pytest.mark.parametrize("dtype", PRECISION, ids=["double", "float"])
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_torques_of_the_joints_are_the_formulas(robot: str, dtype: Any, robots: Any) -> None:
+def test_torques_and_accelerations_of_joints_are_the_formulas(robot: str, dtype: Any, robots: Any) -> None:
     model, c = robots(robot)
     generator = np.random.default_rng(3)
     errors: dict[str, float] = {}
@@ -104,17 +104,34 @@ def test_torques_of_the_joints_are_the_formulas(robot: str, dtype: Any, robots: 
         for form, wanted in wishes(generator, model.n, model.N).items():
             q, qd, q_d, qd_d, qdd_d, task, external = generator.uniform(-1.0, 1.0, (7, model.n))
             for to, pushed in (((q_d, qd_d, qdd_d), (task, external)), ((q_d, None, None), (None, None))):
-                tau = formula(model, q, qd, wanted, to, *pushed)[1]
+                qdd, tau = formula(model, q, qd, wanted, to, *pushed)
+                follows = np.full(model.n, 7.0, dtype)
                 refused, found = c.joints(q, qd, wanted, to, *pushed, dtype=dtype)
-                assert refused == 0, form
-                error = np.abs(found - tau).max() / max(1.0, np.abs(tau).max())
-                errors[form] = max(errors.get(form, 0.0), error)
+                solved, again = c.joints(q, qd, wanted, to, *pushed, dtype=dtype, follows=follows)
+                assert (refused, solved) == (0, 0), form
+                for is_of, of in ((found, tau), (again, tau), (follows, qdd)):
+                    error = np.abs(is_of - of).max() / max(1.0, np.abs(of).max())
+                    errors[form] = max(errors.get(form, 0.0), error)
     assert max(errors.values()) <= PRECISION[dtype], errors
 
 
 @pytest.mark.parametrize("dtype", PRECISION, ids=["double", "float"])
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_what_is_cancelled_at_an_acceleration_is_the_formula(robot: str, dtype: Any, robots: Any) -> None:
+    model, c = robots(robot)
+    generator = np.random.default_rng(11)
+    for wanted in wishes(generator, model.n, model.N).values():
+        q, qd, qdd, task = generator.uniform(-1.0, 1.0, (4, model.n))
+        wanted = {name: given for name, given in wanted.items() if name != "stiffness"}
+        for asked, beside in ((wanted, task), (wanted, None), (None, task)):
+            tau = cancel_formula(model, q, qd, qdd, asked or {}, beside)
+            found = c.cancelled(q, qd, qdd, asked, beside, dtype)
+            assert np.abs(found - tau).max() <= PRECISION[dtype] * max(1.0, np.abs(tau).max())
+
+
+@pytest.mark.parametrize("dtype", PRECISION, ids=["double", "float"])
 @pytest.mark.parametrize("robot", [p for p in ROBOTS if p.id != "energies"])
-def test_torques_of_a_frame_are_the_formulas(robot: str, dtype: Any, robots: Any) -> None:
+def test_torques_and_accelerations_of_a_frame_are_the_formulas(robot: str, dtype: Any, robots: Any) -> None:
     model, c = robots(robot)
     frame, generator = model.kinematics.frames[-1], np.random.default_rng(5)
     errors: dict[tuple[int, ...], float] = {}
@@ -131,11 +148,13 @@ def test_torques_of_a_frame_are_the_formulas(robot: str, dtype: Any, robots: Any
             wanted = {**form, "rows": rows, "point": [0.1, 0.2, -0.1]}
             for posture in list(wishes(generator, model.n, model.N).values())[:4]:
                 given = (wanted, target, posture, (q_d, qd_d, qdd_d), external)
-                tau = frame_formula(model, q, qd, frame, *given)[1]
-                refused, found = c.frame(q, qd, frame, *given, dtype=dtype)
+                qdd, tau = frame_formula(model, q, qd, frame, *given)
+                follows = np.full(model.n, 7.0, dtype)
+                refused, found = c.frame(q, qd, frame, *given, dtype=dtype, follows=follows)
                 assert refused == 0
-                error = np.abs(found - tau).max() / max(1.0, np.abs(tau).max())
-                errors[rows] = max(errors.get(rows, 0.0), error)
+                for is_of, of in ((found, tau), (follows, qdd)):
+                    error = np.abs(is_of - of).max() / max(1.0, np.abs(of).max())
+                    errors[rows] = max(errors.get(rows, 0.0), error)
     assert errors
     assert max(errors.values()) <= 10 * PRECISION[dtype], errors
 

@@ -36,10 +36,24 @@ class ImpedanceInC:
         task: Any = None,
         external: Any = None,
         dtype: Any = np.float64,
+        follows: Any = None,
     ) -> tuple[int, Any]:
-        """Return what the function for joints returns, and tau; `to` is q_d, qd_d, qdd_d."""
+        """Return what the function for joints returns, and tau; `to` is q_d, qd_d, qdd_d.
+
+        follows: array that the acceleration is written to
+        """
         wanted, kept = joint_struct(given, dtype)
-        return self._call("partial_impedance", (q, qd), (wanted, *to, task, external), len(q), dtype, kept)
+        asked = (wanted, *to, task, external)
+        return self._call("partial_impedance", (q, qd), asked, len(q), dtype, kept, [follows])
+
+    def cancelled(
+        self, q: Any, qd: Any, qdd: Any, given: Given | None, task: Any = None, dtype: Any = np.float64
+    ) -> Any:
+        """Return what is cancelled at an acceleration."""
+        wanted, kept = joint_struct(given, dtype)
+        refused, tau = self._call("cancel", (q, qd, qdd), (wanted, task), len(q), dtype, kept)
+        assert refused == 0
+        return tau
 
     def frame(
         self,
@@ -52,22 +66,32 @@ class ImpedanceInC:
         to: Any = (None, None, None),
         external: Any = None,
         dtype: Any = np.float64,
+        follows: Any = None,
     ) -> tuple[int, Any]:
         """Return what the function for a frame returns, and tau; `target` is its pose, velocity and
         acceleration."""
         of_joints, kept = joint_struct(posture, dtype)
         of_frame, kept_too = frame_struct(self.frames.index(frame), given, dtype)
         arguments = (of_joints, *to, of_frame, *target, external)
-        return self._call("frame_partial_impedance", (q, qd), arguments, len(q), dtype, [*kept, *kept_too])
+        every = [*kept, *kept_too]
+        return self._call("frame_partial_impedance", (q, qd), arguments, len(q), dtype, every, [follows])
 
     def _call(
-        self, function: str, state: Any, arguments: Any, n: int, dtype: Any, kept: list[Any]
+        self,
+        function: str,
+        state: Any,
+        arguments: Any,
+        n: int,
+        dtype: Any,
+        kept: list[Any],
+        follows: Sequence[Any] = (),
     ) -> tuple[int, Any]:
         tau = np.full(n, 7.0, dtype)
         entry = getattr(self.library, f"{self.name}_{function}{_suffix(dtype)}")
         motion = [*state, *([self.parameters] if len(self.parameters) else [])]
         pointers = [pointer_to(a, dtype, kept) for a in (*motion, *arguments)]
-        return entry(*pointers, ctypes.c_void_p(tau.ctypes.data)), tau
+        written = [ctypes.c_void_p(None if a is None else a.ctypes.data) for a in (tau, *follows)]
+        return entry(*pointers, *written), tau
 
 
 def formula(model: Any, q: Any, qd: Any, given: Given, to: Any, task: Any, external: Any) -> Any:
@@ -76,6 +100,14 @@ def formula(model: Any, q: Any, qd: Any, given: Given, to: Any, task: Any, exter
     force = natural.zeros if external is None else external
     qdd = natural.followed(given, to, force if task is None else force + task)
     return qdd, natural.torque(qdd, given) - force
+
+
+def cancel_formula(model: Any, q: Any, qd: Any, qdd: Any, given: Given, task: Any) -> Any:
+    """What is not kept at qdd, and what moves without motion."""
+    natural = Natural(model, q, qd)
+    inertia, damping = natural.wanted(given)
+    kept = inertia @ qdd + damping @ qd
+    return natural.torque(qdd, given) - kept + (0.0 if task is None else task)
 
 
 def frame_formula(
@@ -123,13 +155,18 @@ class Natural:
     def followed(self, given: Given, to: Any, force: Any) -> Any:
         """q̈* of what is wanted of the joints."""
         q_d, qd_d, qdd_d = (self.zeros if a is None else a for a in to)
-        ones = np.ones_like(self.c2)
-        inertia = (given.get("keep_inertia", ones) * self.c2).sum(1) + self.armature
-        damping = (given.get("keep_velocity", ones) * self.c1).sum(1) + given.get("damping", 0.0)
+        inertia, damping = self.wanted(given)
         pull = force - damping @ (self.qd - qd_d)
         if "stiffness" in given:
             pull = pull - given["stiffness"] @ (self.q - q_d)
-        return qdd_d + np.linalg.solve(inertia + given.get("inertia", 0.0), pull)
+        return qdd_d + np.linalg.solve(inertia, pull)
+
+    def wanted(self, given: Given) -> tuple[Any, Any]:
+        """M* and B*."""
+        ones = np.ones_like(self.c2)
+        inertia = (given.get("keep_inertia", ones) * self.c2).sum(1) + self.armature
+        damping = (given.get("keep_velocity", ones) * self.c1).sum(1)
+        return inertia + given.get("inertia", 0.0), damping + given.get("damping", 0.0)
 
     def torque(self, qdd: Any, given: Given) -> Any:
         """Return the torque that the motion asks of the joints, and the wanted part of their friction."""

@@ -436,6 +436,7 @@ def test_the_header_of_c_has_the_rows_and_nothing_else(which: str, package_at: L
         "passive_torque": own,
         "reactions": rigid and which != "tied",
         "partial_impedance": which != "tied",
+        "cancel": which != "tied",
         "frame_partial_impedance": rigid and which != "tied",
     }
     links = {f"link_{j + 1}" for j in range(load(which).N)}

@@ -60,6 +60,7 @@ BESIDE_IN_C = {
     "passive_torque": "the sum of `passive_torque`, of one sample, where joints have any",
     "reactions": "the wrenches of links, of which `reactions` are made; not of joints that are tied",
     "partial_impedance": "a [controller](control.md)",
+    "cancel": "what a [controller](control.md) cancels at a given acceleration",
     "frame_partial_impedance": "a [controller](control.md) of a frame",
 }
 """Functions of C that no row has."""

@@ -77,7 +77,9 @@ def calls(n: int, links: int) -> dict[str, Call]:
         "mass_matrix": Call("NAME_mass_matrixF(q[s], out)", n * n),
         "forward_dynamics": Call(f"(void)NAME_forward_dynamicsF({motion}, out)", n),
         "partial_impedance": Call(
-            "(void)NAME_partial_impedanceF(q[s], qd[s], &wanted, qdd[s], qd[s], qdd[s], NULL, NULL, out)", n
+            "(void)NAME_partial_impedanceF(q[s], qd[s], &wanted, qdd[s], qd[s], qdd[s], NULL, NULL, out, "
+            "NULL)",
+            n,
         ),
     }
 

@@ -235,12 +235,20 @@ typedef struct {
    beside (v), and `external` (f). To cancel motions alone, leave q_d, qd_d, qdd_d and stiffness NULL, have weights 0 for
    them and `regular` 1: tau is then v, what they ask for, and g.
    Returns 0, or the number of a joint, from 1: where M* is not positive along it and those before it, or not regular, or
-   its torque is not finite; tau is then as it was. Near there, where rounding leaves fewer than half of the digits of qdd, it
-   writes tau and returns the number of such a joint, negative, as forward_dynamics does of M. With all inertia kept and none
-   added, f takes no part, M* is not looked at, and a call costs about as much as inverse dynamics.
-   Reads q, qd (JOINTS), q_d, qd_d, qdd_d, task, external (JOINTS); writes tau (JOINTS). */
+   its torque is not finite; tau and qdd are then as they were. Near there, where rounding leaves fewer than half of the digits
+   of qdd, it writes both and returns the number of such a joint, negative, as forward_dynamics does of M. With all inertia
+   kept and none added, and NULL for qdd, f takes no part, M* is not looked at, and a call costs about as much as inverse
+   dynamics.
+   Reads q, qd (JOINTS), q_d, qd_d, qdd_d, task, external (JOINTS); writes tau and the acceleration qdd
+   that follows, (JOINTS) each; one of them may be NULL. */
 int planar3_partial_impedance(const double *q, const double *qd, const planar3_impedance *wanted,
-    const double *q_d, const double *qd_d, const double *qdd_d, const double *task, const double *external, double *tau);
+    const double *q_d, const double *qd_d, const double *qdd_d, const double *task, const double *external, double *tau,
+    double *qdd);
+
+/* What is not kept, at a given acceleration, measured or wanted: tau = (H - M*) qdd + (C - B*) qd + g + v. Stiffness
+   has no part; `wanted` and task may be NULL. Returns 0, or the number of a joint, from 1, whose torque is not finite; tau is
+   then as it was. Reads q, qd, qdd (JOINTS), task (JOINTS); writes tau (JOINTS). */
+int planar3_cancel(const double *q, const double *qd, const double *qdd, const planar3_impedance *wanted, const double *task, double *tau);
 
 /* Partial impedance of a frame. `rows` of six count: turns about the world's x, y and z, 0 to 2, and moves of the point along
    them, 3 to 5. With those of the Jacobian, J, and nu = J qd, the frame has L = (J H^-1 J')^-1 for inertia,
@@ -265,13 +273,15 @@ typedef struct {
    for zeros; both are of the point, and all six are there, whichever rows count.
    Returns 0; the number of a joint, as above, also where H is not positive; - the number of a row, from 1, along which the
    frame cannot move beside those before it, or its M_e is not positive; or -7 where the frame is half a turn away from a
-   pose_d to which it is to turn, or that is no rotation. tau is then as it was. Below -7 tau is written, and fewer than half of the digits are known:
+   pose_d to which it is to turn, or that is no rotation. tau and qdd are then as they were. Below -7 they are written, and fewer
+   than half of the digits are known:
    -7 - the number of a joint, as above, or -7 - JOINTS - the number of a row, as near where the frame cannot move along it.
    Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
-   velocity_d, acceleration_d (6); writes tau (JOINTS). */
+   velocity_d, acceleration_d (6); writes tau and the acceleration qdd that follows, (JOINTS) each; one may be NULL. */
 int planar3_frame_partial_impedance(const double *q, const double *qd, const planar3_impedance *posture,
     const double *q_d, const double *qd_d, const double *qdd_d, const planar3_frame_impedance *wanted,
-    const double *pose_d, const double *velocity_d, const double *acceleration_d, const double *external, double *tau);
+    const double *pose_d, const double *velocity_d, const double *acceleration_d, const double *external, double *tau,
+    double *qdd);
 
 /* ---- All links, many samples, in float ---- */
 
@@ -412,12 +422,20 @@ typedef struct {
    beside (v), and `external` (f). To cancel motions alone, leave q_d, qd_d, qdd_d and stiffness NULL, have weights 0 for
    them and `regular` 1: tau is then v, what they ask for, and g.
    Returns 0, or the number of a joint, from 1: where M* is not positive along it and those before it, or not regular, or
-   its torque is not finite; tau is then as it was. Near there, where rounding leaves fewer than half of the digits of qdd, it
-   writes tau and returns the number of such a joint, negative, as forward_dynamics does of M. With all inertia kept and none
-   added, f takes no part, M* is not looked at, and a call costs about as much as inverse dynamics.
-   Reads q, qd (JOINTS), q_d, qd_d, qdd_d, task, external (JOINTS); writes tau (JOINTS). */
+   its torque is not finite; tau and qdd are then as they were. Near there, where rounding leaves fewer than half of the digits
+   of qdd, it writes both and returns the number of such a joint, negative, as forward_dynamics does of M. With all inertia
+   kept and none added, and NULL for qdd, f takes no part, M* is not looked at, and a call costs about as much as inverse
+   dynamics.
+   Reads q, qd (JOINTS), q_d, qd_d, qdd_d, task, external (JOINTS); writes tau and the acceleration qdd
+   that follows, (JOINTS) each; one of them may be NULL. */
 int planar3_partial_impedancef(const float *q, const float *qd, const planar3_impedancef *wanted,
-    const float *q_d, const float *qd_d, const float *qdd_d, const float *task, const float *external, float *tau);
+    const float *q_d, const float *qd_d, const float *qdd_d, const float *task, const float *external, float *tau,
+    float *qdd);
+
+/* What is not kept, at a given acceleration, measured or wanted: tau = (H - M*) qdd + (C - B*) qd + g + v. Stiffness
+   has no part; `wanted` and task may be NULL. Returns 0, or the number of a joint, from 1, whose torque is not finite; tau is
+   then as it was. Reads q, qd, qdd (JOINTS), task (JOINTS); writes tau (JOINTS). */
+int planar3_cancelf(const float *q, const float *qd, const float *qdd, const planar3_impedancef *wanted, const float *task, float *tau);
 
 /* Partial impedance of a frame. `rows` of six count: turns about the world's x, y and z, 0 to 2, and moves of the point along
    them, 3 to 5. With those of the Jacobian, J, and nu = J qd, the frame has L = (J H^-1 J')^-1 for inertia,
@@ -442,13 +460,15 @@ typedef struct {
    for zeros; both are of the point, and all six are there, whichever rows count.
    Returns 0; the number of a joint, as above, also where H is not positive; - the number of a row, from 1, along which the
    frame cannot move beside those before it, or its M_e is not positive; or -7 where the frame is half a turn away from a
-   pose_d to which it is to turn, or that is no rotation. tau is then as it was. Below -7 tau is written, and fewer than half of the digits are known:
+   pose_d to which it is to turn, or that is no rotation. tau and qdd are then as they were. Below -7 they are written, and fewer
+   than half of the digits are known:
    -7 - the number of a joint, as above, or -7 - JOINTS - the number of a row, as near where the frame cannot move along it.
    Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
-   velocity_d, acceleration_d (6); writes tau (JOINTS). */
+   velocity_d, acceleration_d (6); writes tau and the acceleration qdd that follows, (JOINTS) each; one may be NULL. */
 int planar3_frame_partial_impedancef(const float *q, const float *qd, const planar3_impedancef *posture,
     const float *q_d, const float *qd_d, const float *qdd_d, const planar3_frame_impedancef *wanted,
-    const float *pose_d, const float *velocity_d, const float *acceleration_d, const float *external, float *tau);
+    const float *pose_d, const float *velocity_d, const float *acceleration_d, const float *external, float *tau,
+    float *qdd);
 
 #ifdef __cplusplus
 }

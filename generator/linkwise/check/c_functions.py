@@ -14,6 +14,7 @@ from linkwise.check.compiled_c import CompiledPackage, Numbers, Prototype, wrong
 from linkwise.check.control_functions import (
     CONTROL,
     NOT_CALLED,
+    cancel_calls,
     control_calls,
     control_prototypes,
     impedance_calls,
@@ -112,6 +113,8 @@ class CFunctions:
                     calls = self._of_bodies(function, wrenches)
                 elif function.short.endswith("partial_impedance"):
                     calls = impedance_calls(self._call, function, self.manifest, reference)
+                elif function.short == "cancel":
+                    calls = cancel_calls(self._call, function, self.manifest, reference)
                 elif function.short in CONTROL:
                     calls = control_calls(self._call, function, self.manifest, reference, frames)
                 else:

@@ -101,22 +101,26 @@ class CompiledPackage:
     ) -> dict[str, Numbers] | None:
         """Return outputs of the given sizes, flat; None where the function wrote beyond one of them.
 
+        Outputs without a size are NULL.
+
         count: samples, blocks or a frame's number; given: arrays by name, None for NULL
         shift: how many numbers each output starts behind a cache line
         """
         read = [given[name] for name in function.inputs]
         inputs = [None if a is None else np.ascontiguousarray(a, function.dtype) for a in read]
-        guarded = [_Guarded(sizes[name], function.dtype, shift) for name in function.outputs]
+        outputs = [(name, sizes.get(name)) for name in function.outputs]
+        guarded = {name: _Guarded(size, function.dtype, shift) for name, size in outputs if size is not None}
         entry = getattr(self.library, f"{self.name}_{function.name}")
         entry.restype = None if function.returns == "void" else ctypes.c_int
         kind = ctypes.c_int if function.counted == "frame" else ctypes.c_size_t
         counts = [kind(count)] if function.counted else []
-        arrays = (*inputs, *(g.array for g in guarded))
+        written = [guarded[name].array if name in guarded else None for name in function.outputs]
+        arrays = (*inputs, *written)
         pointers = [ctypes.c_void_p(None if a is None else a.ctypes.data) for a in arrays]
         entry(*counts, *pointers)
-        if not all(g.whole for g in guarded):
+        if not all(g.whole for g in guarded.values()):
             return None
-        return {name: g.array for name, g in zip(function.outputs, guarded, strict=True)}
+        return {name: g.array for name, g in guarded.items()}
 
 
 class _Guarded:

@@ -166,37 +166,83 @@ def impedance_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Pro
         real,
         "",
         (*state, "wanted", *TARGETS, "task", "external"),
-        ("tau",),
+        ("tau", "qdd"),
         "int",
         (("wanted", kind),),
     )
+    given = (*state[:2], "qdd", *state[2:])
+    cancelled = Prototype(
+        f"cancel{suffix}", real, "", (*given, "wanted", "task"), ("tau",), "int", (("wanted", kind),)
+    )
     if tree is None:
-        return [joints]
+        return [joints, cancelled]
     frame = Prototype(
         NOT_CALLED + suffix,
         real,
         "",
         (*state, "posture", *TARGETS, "wanted", *FRAME_TARGETS, "external"),
-        ("tau",),
+        ("tau", "qdd"),
         "int",
         (("posture", kind), ("wanted", f"{manifest.name}_frame_impedance{suffix}")),
     )
-    return [joints, frame]
+    return [joints, cancelled, frame]
 
 
 def impedance_calls(
-    call: Callable[..., dict[str, Numbers]], function: Prototype, manifest: Manifest, reference: Reference
+    call: Call, function: Prototype, manifest: Manifest, reference: Reference
 ) -> Iterator[Entries]:
-    """Yield torques of natural impedance on a motion without error: inverse dynamics and passive torques."""
+    """Yield what natural impedance asks for: torques of a motion without error, and accelerations of a task.
+
+    The first are inverse dynamics and passive torques, which `qdd` = NULL leaves unsolved. The task asks of
+    joints whose wanted velocity is zero, M qdd + C qd = v, which gives qdd and again these torques.
+    """
     states, none = reference.states, dict.fromkeys(("wanted", "q_d", "task", "external"))
     for row in range(0, len(states.q), max(1, len(states.q) // MOST)):
         state = states.at(row)
         given: dict[str, Any] = {"q": state.q, "qd": state.qd, "qd_d": state.qd, "qdd_d": state.qdd, **none}
         found = call(function, 0, given, {"tau": state.q.shape[-1]}, row % 2)["tau"]
-        value, scale = (kept["tau"][row].sum(-1) for kept in (reference.values, reference.scales))
-        if manifest.passive:
-            taken, sizes = passive_reference(manifest.passive, states.at(np.array([row])))
-            friction = SHARES.index("friction")  # its compensation is not asked for
-            value = value + (taken.sum(0) - taken[friction])[0]
-            scale = scale + sizes.sum(0)[0]
+        value, scale = _asked(manifest, reference, row, "tau")
         yield Entries("tau", found[None], value[None], scale[None])
+    armature = passive_reference(manifest.passive, _accelerated(states))[0][SHARES.index("armature")]
+    least = SINGLE if function.real == "float" else REGULAR
+    for row in _some(np.flatnonzero(regular(reference, least))):
+        q, qd, qdd = states.at(row).motion
+        moving = (reference.values["tau"] - reference.values["g"])[row].sum(-1) + armature[row] * qdd
+        given = {"q": q, "qd": qd, "qd_d": None, "qdd_d": None, **none, "task": moving}
+        both = call(function, 0, given, {"tau": len(q), "qdd": len(q)}, int(row) % 2)
+        value, scale = _asked(manifest, reference, row, "tau")
+        sizes = acceleration_scales(reference, row, np.diag(armature[row]), scale)
+        yield Entries("qdd", both["qdd"][None], qdd[None], sizes[None])
+        mass = np.abs(reference.values["c2"][row].sum(1) + np.diag(armature[row]))
+        yield Entries("tau", both["tau"][None], value[None], (scale + mass @ sizes)[None])
+
+
+def cancel_calls(
+    call: Call, function: Prototype, manifest: Manifest, reference: Reference
+) -> Iterator[Entries]:
+    """Yield what is left to ask for where nothing is cancelled: weight and passive torques, and a task's."""
+    states = reference.states
+    for row in range(0, len(states.q), max(1, len(states.q) // MOST)):
+        q, qd, qdd = states.at(row).motion
+        given = {"q": q, "qd": qd, "qdd": qdd, "wanted": None, "task": qdd}
+        found = call(function, 0, given, {"tau": len(q)}, row % 2)["tau"]
+        value, scale = _asked(manifest, reference, row, "g")
+        yield Entries("tau", found[None], (value + qdd)[None], (scale + np.abs(qdd))[None])
+
+
+def _accelerated(states: States) -> States:
+    return States(states.q, states.qd, np.ones_like(states.q))
+
+
+def _asked(manifest: Manifest, reference: Reference, row: int, what: str) -> tuple[Numbers, Numbers]:
+    """Return what links, joints' springs, damping and armature ask for, with sizes; of "g" without armature.
+
+    Compensation of friction is not asked for.
+    """
+    value, scale = (kept[what][row].sum(-1) for kept in (reference.values, reference.scales))
+    if manifest.passive:
+        taken, sizes = passive_reference(manifest.passive, reference.states.at(np.array([row])))
+        left = [SHARES.index("friction"), *([SHARES.index("armature")] if what == "g" else [])]
+        value = value + (taken.sum(0) - taken[left].sum(0))[0]
+        scale = scale + sizes.sum(0)[0]
+    return value, scale

@@ -32,6 +32,9 @@ class TorqueOfOne(Protocol):
     def torque(self, given: Mapping[str, Numbers]) -> Numbers | None:
         """Return the torque (n,) for motion and targets by name; None where the function has no answer."""
 
+    def acceleration(self, given: Mapping[str, Numbers]) -> Numbers | None:
+        """Return the acceleration (n,) that follows, likewise."""
+
 
 class PackedBackend(Library):
     """Base of back ends: packed values (..., count) in the order of `Layout`, for motion (..., n)."""

@@ -123,32 +123,52 @@ class NativeTorque:
         self._known = fixed and compensated and is_rigid
 
     def torque(self, given: Mapping[str, Numbers]) -> NumberArray | None:
-        """Return the torque (n,); None where C has no answer: the calls for arrays then say what is wrong."""
+        """Return the torque (n,); None where C has no answer: the calls for arrays then say what is wrong.
+
+        With an acceleration qdd among the arguments it is what is cancelled there.
+        """
+        return self._answer("cancel" if "qdd" in given else "tau", given)
+
+    def acceleration(self, given: Mapping[str, Numbers]) -> NumberArray | None:
+        """Return the acceleration (n,) that follows, likewise."""
+        return self._answer("qdd", given)
+
+    def _answer(self, asked: str, given: Mapping[str, Numbers]) -> NumberArray | None:
         q = given["q"]
         if not self._known or self._calls.learned or type(q) is not np.ndarray or q.ndim > 1:
             return None
         of_one = cast("Mapping[str, NumberArray]", given)
         if self._aims and "target.pose" not in given:
             return None
-        names = tuple(name for name in self._beside if name in of_one)
+        names = tuple(name for name in ("qdd", *self._beside) if name in of_one)
         numbers = b"".join(of_one[name].tobytes() for name in ("q", "qd", *names))
-        found = self._of_one.results((q.dtype, names), numbers)
+        found = self._of_one.results((asked, q.dtype, names), numbers)
         return found[0] if found else None
 
-    def _one_sample(self, key: tuple[NumberType, tuple[str, ...]]) -> OneSampleCall:
-        """Return a call that is given these arrays besides q and qd."""
-        kind, names = key
+    def _one_sample(self, key: tuple[str, NumberType, tuple[str, ...]]) -> OneSampleCall:
+        """Return a call for "tau", "qdd" or "cancel" that is given these arrays besides q and qd."""
+        asked, kind, names = key
         n, settings = self._structure.n, self._set(kind)
         sizes = [n, n, *(ON_FRAME.get(name, n) for name in names)]
         memory = np.empty(sum(sizes), kind)
         q, qd, *parts = np.split(memory, np.cumsum(sizes)[:-1])
         placed = dict(zip(names, parts, strict=True))
         told = [placed.get(name) for name in self._beside]
-        given: list[object] = [q, qd, self._calls.constants(kind), ctypes.byref(settings.joints), *told[:3]]
+        constants, wanted, answer = (
+            self._calls.constants(kind),
+            ctypes.byref(settings.joints),
+            np.empty(n, kind),
+        )
+        if asked == "cancel":
+            found = symbol(self._calls.sources, asked, kind.str[1:])
+            given: list[object] = [q, qd, placed["qdd"], constants, wanted, placed.get("task")]
+            return one_sample_call(found, True, given, memory, [answer])
+        given = [q, qd, constants, wanted, *told[:3]]
         if settings.frame is not None:
             given.append(ctypes.byref(settings.frame))
         found = symbol(self._calls.sources, IMPEDANCE[settings.frame is not None], kind.str[1:])
-        return one_sample_call(found, True, [*given, *told[3:]], memory, [np.empty(n, kind)])
+        results = [answer, None] if asked == "tau" else [None, answer]
+        return one_sample_call(found, True, [*given, *told[3:]], memory, results)
 
     def _set(self, kind: NumberType) -> Settings:
         """Return the settings for a number type, made once."""

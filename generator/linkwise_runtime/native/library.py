@@ -4,7 +4,7 @@ One sample is copied to and from a fixed place in memory: finding the addresses 
 """
 
 import ctypes
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from contextlib import suppress
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
@@ -30,8 +30,8 @@ class Control(NamedTuple):
 
 CONTROL = {row.c: Control(len(row.motion), "point" in row.options) for row in CALLS.values() if row.one}
 """Functions that take one sample and no count."""
-IMPEDANCE = ("partial_impedance", "frame_partial_impedance")
-"""Functions of one sample for control; the second one is for a frame."""
+IMPEDANCE = ("partial_impedance", "frame_partial_impedance", "cancel")
+"""Functions of one sample for control: of joints, of a frame, and of what is cancelled at an acceleration."""
 
 
 @cache
@@ -90,18 +90,20 @@ def one_sample_call(
     may_fail: bool,
     given: Iterable[object],
     motion: NumberArray,
-    results: list[NumberArray],
+    results: Sequence[NumberArray | None],
 ) -> OneSampleCall:
     """Return a call of a C function that takes what is given, then results, and no arrays that are empty.
 
     given: numbers of ctypes, None for NULL, and arrays; those of the motion lie in its memory
+    results: arrays that are written to, None for NULL
     """
     # Without argtypes: the arguments are converted here, not at every call.
     bare = ctypes.CFUNCTYPE(ctypes.c_int if may_fail else None)(start_of(function))
     arguments = [
         _argument(value) for value in (*given, *results) if not isinstance(value, np.ndarray) or value.size
     ]
-    return OneSampleCall(partial(bare, *arguments), motion.data.cast("B"), results)
+    asked = [a for a in results if a is not None]
+    return OneSampleCall(partial(bare, *arguments), motion.data.cast("B"), asked)
 
 
 def _argument(value: object) -> object:

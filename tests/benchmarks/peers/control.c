@@ -20,17 +20,17 @@ static const CALL(_frame_impedance) frame = {SIZE(_FRAMES) - 1, NULL, ROWS, row,
 
 static int joints(int s)
 {
-    return CALL(_partial_impedance)(q[s], qd[s], &natural, q_d, NULL, NULL, NULL, NULL, tau);
+    return CALL(_partial_impedance)(q[s], qd[s], &natural, q_d, NULL, NULL, NULL, NULL, tau, NULL);
 }
 
 static int links(int s)
 {
-    return CALL(_partial_impedance)(q[s], qd[s], &scaled, q_d, NULL, NULL, NULL, NULL, tau);
+    return CALL(_partial_impedance)(q[s], qd[s], &scaled, q_d, NULL, NULL, NULL, NULL, tau, NULL);
 }
 
 static int hand(int s)
 {
-    return CALL(_frame_partial_impedance)(q[s], qd[s], &natural, q_d, NULL, NULL, &frame, pose_d[s], NULL, NULL, NULL, tau);
+    return CALL(_frame_partial_impedance)(q[s], qd[s], &natural, q_d, NULL, NULL, &frame, pose_d[s], NULL, NULL, NULL, tau, NULL);
 }
 
 static double now(void)

@@ -126,14 +126,14 @@ static inline int frame_acceleration(const struct sample *s, const API(frame_imp
 
 int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const real *q_d, const real *qd_d, const real *qdd_d,
     const API(frame_impedance) * wanted, const real *pose_d, const real *velocity_d, const real *acceleration_d,
-    const real *external, real *tau)
+    const real *external, real *tau, real *follows)
 {
     const API(impedance) natural = all_natural();
     const int rows = wanted->rows;
     struct deviation from;
     struct frame_motion frame;
     struct pivot joint[2] = {{0, 1}, {0, 1}}, row[2] = {{0, 1}, {0, 1}};
-    real mass[N * N], kept[N * N], force[N], qdd[N], torque[N], velocity[6], asked[6], change[6], follows[6];
+    real mass[N * N], kept[N * N], force[N], qdd[N], torque[N], velocity[6], asked[6], change[6], reached[6];
     OFFSETS(o);
     SAMPLE(s);
     if (!posture)
@@ -157,9 +157,9 @@ int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const 
     for (int r = 0; acceleration_d && r < rows; ++r)
         asked[r] += acceleration_d[wanted->row[r]];
     times(6, N, frame.rate, qd, change);
-    times(6, N, frame.jacobian, qdd, follows);
+    times(6, N, frame.jacobian, qdd, reached);
     for (int r = 0; r < 6; ++r)
-        asked[r] -= change[r] + follows[r];
+        asked[r] -= change[r] + reached[r];
     times(6, 6, frame.inertia, asked, change);
     times(N, 6, frame.moved, change, force);
     join_force(force, qdd);
@@ -170,5 +170,5 @@ int API(frame_partial_impedance)(AT_REST, const API(impedance) * posture, const 
         torque[i] -= external[i];
     const int moving = vague(&joint[0]) ? vague(&joint[0]) : vague(&joint[1]);
     const int along = vague(&row[0]) ? vague(&row[0]) : vague(&row[1]);
-    return command(torque, moving ? -7 - moving : along ? -7 - N - along : 0, tau);
+    return command(torque, qdd, moving ? -7 - moving : along ? -7 - N - along : 0, tau, follows);
 }

@@ -44,20 +44,20 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
     alone = largest_few(asked.sum(axis=(0, 1))[:-1], MOST)[0]
     joints = [_joints(result, c) for c in range(len(ground.names))]
     count = len(shown) + max(map(len, joints))
-    banded = {(c, axis): _rows_of(result, "force", c, axis) for c in range(len(joints)) for axis in shown}
-    banded |= {i: result.rows.numbers("tau", joint=i) for i in dict.fromkeys(chain.from_iterable(joints))}
-    bands = Bands(result, list(banded.values()))
-    band = {place: bands[number] for number, place in enumerate(banded)}
+    loaded = list(dict.fromkeys(chain.from_iterable(joints)))
+    places = [(c, axis) for c in range(len(joints)) for axis in shown]
+    forces = [_rows_of(result, "force", *place) for place in places]
+    bands = Bands(result, [*forces, *(result.rows.numbers("tau", joint=i) for i in loaded)])
     figure = new_figure(WIDTH * len(ground.names) + 1.4, HEIGHT * count + 1.3)
     panels = figure.subplots(count, len(ground.names), sharex=True, sharey="row", squeeze=False)
     for c, name in enumerate(ground.names):
         panels[0, c].set_title(drawn(name))
         for panel, axis in zip(panels[:, c], shown, strict=False):
             _draw_force(panel, result, (c, axis), alone, np.flatnonzero(asked[c, axis]).tolist())
-            draw_band(panel, band[c, axis], INK)
+            draw_band(panel, bands[places.index((c, axis))], INK)
         for panel, i in zip(panels[len(shown) :, c], joints[c], strict=False):
             _draw_torque(panel, result, c, i)
-            draw_band(panel, band[i], INK)
+            draw_band(panel, bands[len(places) + loaded.index(i)], INK)
         drawn_here = len(shown) + len(joints[c])
         for panel in panels[drawn_here:, c]:
             panel.set_axis_off()
