@@ -36,7 +36,7 @@ from .quantities import (
     Power,
     Propagation,
 )
-from .targets import FrameImpedance, Natural
+from .targets import FrameImpedance, Grip, Natural
 
 
 class Dynamics(CertaintyCalls):
@@ -451,6 +451,7 @@ class Dynamics(CertaintyCalls):
         constraints: Any = None,
         actuated: Sequence[int | str] | None = None,
         torque_weight: Sequence[float] | None = None,
+        grips: Sequence[Grip] = (),
     ) -> PartialImpedance[Array]:
         """Return a controller under which shares of inertia, damping and stiffness are as asked.
 
@@ -475,6 +476,8 @@ class Dynamics(CertaintyCalls):
         the file's ties
         torque_weight: W of the least u^T W u where several torques of these do the same, a number above 0 for
         each; ones unless given
+        grips: limits of contacts, each a `Grip`: of the torques that do, the least that keep all of them, as
+        `Grips` says; calls raise ValueError with the contacts where none do, and need Clarabel and SciPy
 
         Tensors among the targets are read anew at each call, so that gains can be learned, and are refused
         there where they are no longer positive.
@@ -483,7 +486,7 @@ class Dynamics(CertaintyCalls):
         an inertia that is not positive definite or not symmetric, a stiffness or a damping that adds energy;
         and for a frame of a robot with motions that nothing drives.
         """
-        stance = Stance(constraints, actuated, torque_weight)
+        stance = Stance(constraints, actuated, torque_weight, grips)
         return partial_impedance(self, stance, inertia, damping, stiffness, frame, passive, friction_width)
 
     def cancel(
@@ -494,6 +497,7 @@ class Dynamics(CertaintyCalls):
         constraints: Any = None,
         actuated: Sequence[int | str] | None = None,
         torque_weight: Sequence[float] | None = None,
+        grips: Sequence[Grip] = (),
     ) -> Cancellation[Array]:
         """Return a controller that cancels gravity and chosen motion propagation torques, and no others.
 
@@ -506,5 +510,5 @@ class Dynamics(CertaintyCalls):
         link, or that is given twice. Calls raise it where what is left has no regular mass matrix, and warn
         where rounding leaves fewer than half of the digits of the acceleration, unless they are given qdd.
         """
-        stance = Stance(constraints, actuated, torque_weight)
+        stance = Stance(constraints, actuated, torque_weight, grips)
         return cancellation(self, stance, entries, passive, friction_width)

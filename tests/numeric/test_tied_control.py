@@ -204,7 +204,7 @@ def test_torques_are_the_least_that_do(standing: Standing) -> None:
 
 
 def test_a_leg_is_cancelled_from_the_trunk(standing: Standing) -> None:
-    """What a limb's motion asks of the trunk, by all its links, is given by the other joints."""
+    """Joints of the other limbs give all that this limb's links ask of the trunk by moving."""
     robot, q, qd = standing.robot, standing.q, standing.qd
     limb = robot.link_names[1:4]
     entries = {(base, link, None, None) for base in range(6) for link in limb}

@@ -21,6 +21,7 @@ mechanical systems, 1994.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -32,10 +33,12 @@ from ..chosen_names import listed, sample_of, short
 from ..constraints.chosen_constraints import TreeConstraints
 from ..constraints.independent_joints import RANK, loose_base
 from ..constraints.robot_constraints import Constraints
-from ..constraints.tied_joints import without_gradient
 from ..interface import Namespace, Numbers, array_of, epsilon_of, is_traced, namespace
 from ..structure import Structure
 from .freedom import Freedom
+
+BESIDE = 0.05
+"""Distance, in rad and m, to the place beside a chosen one where ranks are looked at again."""
 
 
 class Drive(NamedTuple):
@@ -70,15 +73,28 @@ class Actuators:
         self.drive_all = constraints is None and len(self.joints) == structure.n
 
     def _rank_of_freedoms(self) -> tuple[int, int]:
-        """Return the rank of E where the constraints were chosen, and the number of coordinates y."""
+        """Return the rank of E, and the number of coordinates y.
+
+        It is the larger of those where the constraints were chosen, which may be a place of symmetry, and
+        beside it.
+        """
         if self._constraints is None:
             return len(self.joints), self._structure.n
-        with without_gradient(np.zeros(0)):
-            found = self._constraints.velocity_map(self._constraints.closed_position)
-        mapped = array_of(found).astype(float)
+        chosen = self._constraints.closed_position
+        chosen = chosen.reshape(-1, chosen.shape[-1])[0]
+        aside = BESIDE * np.random.default_rng(0).uniform(-1.0, 1.0, len(chosen))
+        ranks = [self._rank_at(chosen)]
+        with suppress(ValueError):  # where the ties do not close from there, or joints tell nothing
+            ranks.append(self._rank_at(array_of(self._constraints.closed(chosen + aside))))
+        return max(ranks), len(self._constraints.independent)
+
+    def _rank_at(self, q: NDArray[Any]) -> int:
+        """Return the rank of E at a closed position (n,)."""
+        assert self._constraints is not None  # who has none has no E
+        mapped = array_of(self._constraints.velocity_map(q)).astype(float)
         own = mapped.reshape(-1, *mapped.shape[-2:])[0][list(self.joints)]
         values = np.linalg.svd(own, compute_uv=False)
-        return int((values > RANK * max(1.0, values.max(initial=0.0))).sum()), own.shape[1]
+        return int((values > RANK * max(1.0, values.max(initial=0.0))).sum())
 
     def driving(self, backend: ArrayBackend, freedom: Freedom, inertia: Numbers, needed: Numbers) -> Drive:
         """Return the torques for what a motion needs of the joints.
@@ -105,6 +121,15 @@ class Actuators:
         at[list(self.joints)] = np.arange(len(self.joints))
         at[[i for i in range(self._structure.n) if i not in self.joints]] = list(rest)
         return Drive(every[..., backend.index(at, needed)], left)
+
+    def idle(self, mapped: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return W^(-1/2) V of one sample, (driven joints, X): orthonormal changes V that move nothing.
+
+        mapped: G (n, m)
+        """
+        size = self.weight**-0.5
+        across = np.linalg.svd(mapped[list(self.joints)].T * size)[2]
+        return np.asarray(size[:, None] * across[self._rank :].T)
 
     def _own(self, backend: ArrayBackend, freedom: Freedom, like: Numbers) -> Numbers:
         """Return E (..., driven joints, m)."""

@@ -9,7 +9,7 @@ from ..arrays.backend import ArrayBackend
 from ..constraints.closed_places import times
 from ..interface import Array
 from ..motion.induced_accelerations import DrivenRobot
-from .controller import Controller, Given, Made, Need, Stance, Standing, errors_of, standing_of
+from .controller import Controller, Given, Made, Need, Stance, StanceRead, errors_of, standing_of
 from .gains import TargetShares
 from .joint_impedance import ORDERS, JointTargets, cancelled_motions, friction_width_of
 
@@ -32,7 +32,7 @@ class Cancellation(Controller, Generic[Array]):
     def __init__(
         self,
         robot: DrivenRobot,
-        standing: Standing,
+        standing: StanceRead,
         targets: JointTargets,
         entries: tuple[tuple[str, str, str, int], ...],
         made: Made,
@@ -61,7 +61,12 @@ class Cancellation(Controller, Generic[Array]):
         backend, given = self._given(q, qd, tau, external, qdd)
         if "qdd" not in given and (torque := self._torque_of_one(backend, given)) is not None:
             return cast("Array", torque)
-        return cast("Array", self._drive(self._followed(backend, given)).torque)
+        if self._grips and qdd is not None:
+            raise ValueError(
+                "qdd is given, but what contacts bear depends on the acceleration that follows; leave it "
+                "out, or the grips"
+            )
+        return cast("Array", self._torque(self._followed(backend, given, bool(self._grips))))
 
     def acceleration(
         self, q: Array, qd: Array, tau: Array | None = None, external: Array | None = None
@@ -71,19 +76,21 @@ class Cancellation(Controller, Generic[Array]):
 
     def forces(self, q: Array, qd: Array, tau: Array | None = None, external: Array | None = None) -> Array:
         """Return the forces lambda of ties and contacts that follow, (..., C), as `Constraints` has them."""
-        backend, given = self._given(q, qd, tau, external)
-        need = self._followed(backend, given)
-        assert need.qdd is not None  # none was given in its place
-        whole = self._joints.torque(need.state, need.qdd, given.get("external"))
-        return cast("Array", self._borne(need._replace(torque=whole)))
+        need = self._followed(*self._given(q, qd, tau, external), whole=True)
+        return cast("Array", self._borne(need))
 
-    def _followed(self, backend: ArrayBackend, given: Given) -> Need:
-        """Return what the acceleration that follows, or one that is given, needs of the joints."""
+    def _followed(self, backend: ArrayBackend, given: Given, whole: bool = False) -> Need:
+        """Return what the acceleration that follows, or one that is given, needs of the joints.
+
+        whole: whether what ties bear is asked for, which tau + M_S qdd + C_S qd + g + p leaves out
+        """
         state, given = self._state(backend, given)
         qdd = given.get("qdd")
         follows = qdd is None
         if qdd is None:
             qdd = self._joints.acceleration(backend, state, errors_of(given))
+        if whole:
+            return Need(backend, state, self._joints.torque(state, qdd, given.get("external")), qdd)
         # tau + M_S qdd + C_S qd + g + p
         cancelled = times(state.inertia - state.target_inertia, qdd)
         cancelled = cancelled + times(state.coriolis - state.target_damping, given["qd"]) + state.rest

@@ -13,6 +13,7 @@ from ..motion.induced_accelerations import DrivenRobot, constraints_of
 from .actuators import Actuators, Drive
 from .frame_impedance import FrameTargets
 from .freedom import freedom_of
+from .grips import ContactTorques, Grips
 from .joint_impedance import Errors, JointImpedance, JointState, JointTargets
 
 Made = tuple[str, tuple[object, ...]]
@@ -21,28 +22,31 @@ Given = Mapping[str, Numbers]
 
 
 class Stance(NamedTuple):
-    """What holds a robot and what drives it, as `Dynamics.partial_impedance` is given it."""
+    """Constraints and drives of a robot, as `Dynamics.partial_impedance` is given it."""
 
     constraints: object
     actuated: object
     torque_weight: object
+    grips: object
 
 
-class Standing(NamedTuple):
-    """Constraints and actuators that were read."""
+class StanceRead(NamedTuple):
+    """Constraints, actuators and limits of contacts that were read."""
 
     constraints: Constraints[Any] | None
     actuators: Actuators
+    grips: Grips
 
 
-def standing_of(robot: DrivenRobot, stance: Stance) -> Standing:
+def standing_of(robot: DrivenRobot, stance: Stance) -> StanceRead:
     """Return what holds a robot and what drives it; raises as `Dynamics.partial_impedance` does."""
     held = constraints_of(robot, stance.constraints)
-    return Standing(held, Actuators(robot.structure, held, stance.actuated, stance.torque_weight))
+    actuators = Actuators(robot.structure, held, stance.actuated, stance.torque_weight)
+    return StanceRead(held, actuators, Grips(held, actuators, stance.grips))
 
 
 class Need(NamedTuple):
-    """What a wanted motion needs of the joints."""
+    """Torques that a wanted motion needs of the joints."""
 
     backend: ArrayBackend
     state: JointState
@@ -58,7 +62,7 @@ class Controller:
     def __init__(
         self,
         robot: DrivenRobot,
-        standing: Standing,
+        standing: StanceRead,
         targets: JointTargets,
         frame: FrameTargets | None,
         made: Made,
@@ -68,7 +72,7 @@ class Controller:
         made: the robot's method that makes the controller again, as for a copy, and its arguments
         """
         self._robot, self._frame, self._made = robot, frame, made
-        self._constraints, self._actuators = standing
+        self._constraints, self._actuators, self._grips = standing
         self._joints = JointImpedance(robot.structure, targets)
         self._of_one: dict[ArrayBackend, TorqueOfOne | None] = {}
 
@@ -118,8 +122,18 @@ class Controller:
         return self._joints.state(backend, given["q"], freedom), {**given, "qd": freedom.qd}
 
     def _drive(self, need: Need) -> Drive:
-        """Return the torques of the driven joints."""
+        """Return the torques of the driven joints that are the least, whatever contacts bear."""
         return self._actuators.driving(need.backend, need.state.freedom, need.state.inertia, need.torque)
+
+    def _torque(self, need: Need) -> Numbers:
+        """Return the torques of the driven joints, (..., n)."""
+        drive = self._drive(need)
+        return self._kept(need, drive).torque if self._grips else drive.torque
+
+    def _kept(self, need: Need, drive: Drive) -> ContactTorques:
+        """Return the torques under which contacts with limits hold, and what these bear."""
+        total = _total(need, drive)
+        return self._grips.borne(need.backend, need.state.freedom, total, drive.torque)
 
     def _moved(self, need: Need) -> Numbers:
         """Return the acceleration that follows, (..., n)."""
@@ -138,10 +152,14 @@ class Controller:
                 "robot.constrained(contacts=[...])"
             )
         drive = self._drive(need)
-        open_by = need.torque - drive.torque
-        if drive.left is not None:
-            open_by = open_by + times(need.state.inertia, drive.left)
-        return tie_forces(place.found, open_by[..., None])[..., 0]
+        if self._grips:
+            return self._kept(need, drive).forces
+        return tie_forces(place.found, (_total(need, drive) - drive.torque)[..., None])[..., 0]
+
+
+def _total(need: Need, drive: Drive) -> Numbers:
+    """Return what the motion that follows needs of joints, (..., n): what driven joints and ties give."""
+    return need.torque if drive.left is None else need.torque + times(need.state.inertia, drive.left)
 
 
 def errors_of(given: Given) -> Errors:

@@ -72,11 +72,11 @@ class PartialImpedance(Controller, Generic[Array]):
         torque = self._torque_of_one(backend, given)
         if torque is not None:
             return cast("Array", torque)
-        if self._frame is None and self._joints.targets.inertia.natural:
+        if self._frame is None and self._joints.targets.inertia.natural and not self._grips:
             state, given = self._state(backend, given)
             natural = self._joints.natural_torque(backend, state, errors_of(given))
-            return cast("Array", self._drive(Need(backend, state, natural, None)).torque)
-        return cast("Array", self._drive(self._followed(backend, given)).torque)
+            return cast("Array", self._torque(Need(backend, state, natural, None)))
+        return cast("Array", self._torque(self._followed(backend, given)))
 
     def acceleration(
         self, q: Array, qd: Array, target: object = None, external: Array | None = None

@@ -21,7 +21,7 @@ class Freedom(NamedTuple):
     qd: Numbers
     """Velocities of all joints, (..., n), in which the dependent ones follow."""
     place: ClosedPlace | None
-    """How joints follow; None where all are free."""
+    """Closed position, and how joints follow there; None where all are free."""
 
     def projected(self, forces: Numbers) -> Numbers:
         """Return G^T F (..., m, X), for columns of forces on joints (..., n, X)."""
