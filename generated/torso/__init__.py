@@ -30,7 +30,7 @@ from linkwise_runtime.quantities import (
 from linkwise_runtime.rule.joint_tree import Bodies
 from linkwise_runtime.rule.regressors import inertial_parameters
 from linkwise_runtime.structure import Layout
-from linkwise_runtime.targets import FrameImpedance, Natural, Target
+from linkwise_runtime.targets import FrameImpedance, Grip, Natural, Target
 
 from .names import ROBOT
 
@@ -190,6 +190,7 @@ __all__ = [
     "Dynamics",
     "FrameImpedance",
     "GradientPropagation",
+    "Grip",
     "InducedAccelerations",
     "Layout",
     "Natural",

@@ -18,7 +18,9 @@ from numpy.typing import ArrayLike
 
 from .arguments import Beside, check_numbers
 from .certainty_calls import CertaintyCalls
-from .control.controllers import Cancellation, PartialImpedance, cancellation, partial_impedance
+from .control.cancellation import Cancellation, cancellation
+from .control.controller import Stance
+from .control.controllers import PartialImpedance, partial_impedance
 from .file_joints import Order
 from .html_tables import robot_table
 from .interface import Array
@@ -34,7 +36,7 @@ from .quantities import (
     Power,
     Propagation,
 )
-from .targets import FrameImpedance, Natural
+from .targets import FrameImpedance, Grip, Natural
 
 
 class Dynamics(CertaintyCalls):
@@ -446,6 +448,10 @@ class Dynamics(CertaintyCalls):
         frame: FrameImpedance | None = None,
         passive: bool = True,
         friction_width: float | None = None,
+        constraints: Any = None,
+        actuated: Sequence[int | str] | None = None,
+        torque_weight: Sequence[float] | None = None,
+        grips: Sequence[Grip] = (),
     ) -> PartialImpedance[Array]:
         """Return a controller under which shares of inertia, damping and stiffness are as asked.
 
@@ -464,27 +470,45 @@ class Dynamics(CertaintyCalls):
         would torques, with the noise of a sensor. Else a velocity w in rad/s or m/s: friction tanh(qd / w) is
         compensated, 0.76 of the friction at w and 0.999 of it at 3.8 w.
 
+        constraints: as in `induced_accelerations`: ties and contacts under which the targets hold
+        actuated: joints that something drives, by number or name; unless given, all of an open tree, of ties
+        the independent joints, and with contacts all but those of a floating base and those that follow by
+        the file's ties
+        torque_weight: W of the least u^T W u where several torques of these do the same, a number above 0 for
+        each; ones unless given
+        grips: limits of contacts, each a `Grip`: of the torques that do, the least that keep all of them, as
+        `Grips` says; calls raise ValueError with the contacts where none do, and need Clarabel and SciPy
+
         Tensors among the targets are read anew at each call, so that gains can be learned, and are refused
         there where they are no longer positive.
 
         Raises ValueError for names that do not exist or wrong shapes, and for a target that is not positive:
         an inertia that is not positive definite or not symmetric, a stiffness or a damping that adds energy;
-        and for robots with ties, whose joints are not free.
+        and for a frame of a robot with motions that nothing drives.
         """
-        return partial_impedance(self, inertia, damping, stiffness, frame, passive, friction_width)
+        stance = Stance(constraints, actuated, torque_weight, grips)
+        return partial_impedance(self, stance, inertia, damping, stiffness, frame, passive, friction_width)
 
     def cancel(
-        self, entries: Iterable[Any], passive: bool = True, friction_width: float | None = None
+        self,
+        entries: Iterable[Any],
+        passive: bool = True,
+        friction_width: float | None = None,
+        constraints: Any = None,
+        actuated: Sequence[int | str] | None = None,
+        torque_weight: Sequence[float] | None = None,
+        grips: Sequence[Grip] = (),
     ) -> Cancellation[Array]:
         """Return a controller that cancels gravity and chosen motion propagation torques, and no others.
 
         entries: (joint, link, coordinate, order): c2_ijk qdd_k for the order 2 and c1_ijk qd_k for 1 (closing
         convention), by name or number; None in a place stands for all. The effect of link 3's motion on the
         root is {("joint1", "link3", None, None)}.
-        passive, friction_width: as in `partial_impedance`
+        other arguments: as in `partial_impedance`
 
         Raises ValueError for an entry that does not exist, such as a joint that is not on the path of the
         link, or that is given twice. Calls raise it where what is left has no regular mass matrix, and warn
         where rounding leaves fewer than half of the digits of the acceleration, unless they are given qdd.
         """
-        return cancellation(self, entries, passive, friction_width)
+        stance = Stance(constraints, actuated, torque_weight, grips)
+        return cancellation(self, stance, entries, passive, friction_width)

@@ -36,6 +36,23 @@ class FrameImpedance(NamedTuple):
     """Point of the frame, in its axes, in m."""
 
 
+class Grip(NamedTuple):
+    """Limits of what the ground bears at a contact: it pushes, and friction holds up to a share of that.
+
+    At each point where the frame touches the force keeps within a cone, |f_t| <= friction f_n.
+    """
+
+    contact: str
+    """Name of a contact of `Dynamics.constrained`: held, a point, or rolling."""
+    friction: float
+    """Coefficient of friction, 0 or above."""
+    corners: tuple[tuple[float, float, float], ...] = ()
+    """Points of the frame where what is held touches the ground, in m, not all in one line: the wrench is
+    what forces at these give. A point, and what rolls, touch at one place, and have none."""
+    normal: tuple[float, float, float] | None = None
+    """Normal of the ground, in the world, away from the ground; against gravity unless given."""
+
+
 class Target(NamedTuple):
     """Motion that joints, or a frame, are to follow; at rest unless given."""
 

@@ -12,6 +12,7 @@ from linkwise.oracle.loop_reference import loop_reference
 from linkwise.oracle.states import random_states
 from linkwise.package.load import import_package
 from linkwise.package.manifest import Manifest
+from linkwise_runtime.targets import Natural
 
 pytest.importorskip("pinocchio")
 
@@ -141,3 +142,83 @@ def theirs_end(theirs: Cassie, body: str, end: Any) -> tuple[Any, Any]:
     twist = pin.getFrameVelocity(theirs.model, theirs.data, frame, pin.LOCAL_WORLD_ALIGNED)
     arm = place.translation - theirs.data.oMf[frame].translation
     return place.translation, twist.linear + np.cross(twist.angular, arm)
+
+
+MOTORS = ("roll-op", "yaw-op", "pitch-op", "knee-op", "tarsus-crank-joint")
+"""Joints of a leg with motors; the shin and the heel are on springs."""
+
+
+def test_legs_obey_an_impedance_that_their_motors_give(robot: Any) -> None:
+    """Rods close both legs, springs are driven by nothing, and Pinocchio moves them by the torques."""
+    theirs, ties, rng = Cassie(), robot.constrained(tolerance=ROUNDED), np.random.default_rng(2)
+    motors = [f"{side}-{name}" for side in ("left", "right") for name in MOTORS]
+    driven = sorted(robot.joint_index(name) for name in motors)
+    at = np.zeros(robot.n)
+    at[driven] = rng.uniform(-0.05, 0.05, len(driven))
+    q = ties.closed(at)
+    qd = ties.velocity(q, rng.uniform(-1.0, 1.0, len(ties.independent)))
+    stiffness, damping, push = rng.uniform(1.0, 3.0, (3, robot.n))
+    wanted = {"stiffness": stiffness, "damping": Natural(plus=damping), "passive": False}
+    control = robot.partial_impedance(**wanted, constraints=ties, actuated=motors)
+    assert control.actuated == tuple(robot.joint_names[k] for k in driven)
+    assert control.undriven == len(ties.independent) - len(motors) == 2
+    tau = control(q, qd, 0.9 * q, push)
+    assert not np.delete(tau, driven).any()
+    order = theirs.order(robot.joint_names)
+    rows, rate = rods(theirs, order, q, qd)
+    moved = moved_by(theirs, order, q, qd, (rows, rate), tau + push)
+    size = np.abs(moved).max()
+    np.testing.assert_allclose(control.acceleration(q, qd, 0.9 * q, push), moved, atol=1e-9 * size)
+    # With motors at all joints that are free, M qdd + (C + D) qd + K e = f along all that rods leave.
+    asked = moved_by(
+        theirs, order, q, qd, (rows, rate), push - damping * qd - 0.1 * stiffness * q, gravity=False
+    )
+    np.testing.assert_allclose(moved[driven], asked[driven], atol=1e-9 * size)
+    assert np.abs(moved - asked).max() > 1e-3 * size  # of the springs
+
+
+def rods(theirs: Cassie, order: Any, q: Any, qd: Any) -> tuple[Any, Any]:
+    """A (rows, n) and dA/dt qd (rows,) of the rods' balls, in the order of linkwise's coordinates."""
+    there, speed = np.zeros_like(q), np.zeros_like(q)
+    there[order], speed[order] = q, qd
+    model, data, axes = theirs.model, theirs.data, pin.LOCAL_WORLD_ALIGNED
+    pin.forwardKinematics(model, data, there, speed, 0.0 * speed)
+    pin.computeJointJacobians(model, data, there)
+    pin.updateFramePlacements(model, data)
+    rows, rates = [], []
+    for ends in theirs.balls.values():
+        both = []
+        for body, end in ends:
+            at = model.getFrameId(body)
+            whole = pin.getFrameJacobian(model, data, at, axes)
+            turned = pin.getFrameVelocity(model, data, at, axes).angular
+            change = pin.getFrameClassicalAcceleration(model, data, at, axes)
+            arm = data.oMf[at].rotation @ end.translation
+            both.append(
+                (
+                    whole[:3] - pin.skew(arm) @ whole[3:],
+                    change.linear + np.cross(change.angular, arm) + np.cross(turned, np.cross(turned, arm)),
+                )
+            )
+        rows.append(both[0][0] - both[1][0])
+        rates.append(both[0][1] - both[1][1])
+    return np.concatenate(rows)[:, order], np.concatenate(rates)
+
+
+def moved_by(
+    theirs: Cassie, order: Any, q: Any, qd: Any, rods: tuple[Any, Any], tau: Any, gravity: bool = True
+) -> Any:
+    """qdd (n,) under torques, in the null space of the rods' rows that are not rounding alone."""
+    there, speed = np.zeros_like(q), np.zeros_like(q)
+    there[order], speed[order] = q, qd
+    rest, weight = 0.0 * there, pin.computeGeneralizedGravity(theirs.model, theirs.data, there)
+    # Not by crba: it wants each joint's subtree in one piece, in which this model was not made.
+    each = [pin.rnea(theirs.model, theirs.data, there, rest, unit) - weight for unit in np.eye(len(q))]
+    mass = np.array(each)[np.ix_(order, order)]
+    bias = pin.nonLinearEffects(theirs.model, theirs.data, there, speed)
+    if not gravity:
+        bias = bias - weight
+    rows, rate = rods
+    free = np.linalg.svd(rows)[2][np.linalg.matrix_rank(rows, ROUNDED) :]
+    own = -np.linalg.pinv(rows, rcond=ROUNDED) @ rate
+    return own + free.T @ np.linalg.solve(free @ mass @ free.T, free @ (tau - bias[order] - mass @ own))

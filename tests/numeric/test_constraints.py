@@ -14,11 +14,11 @@ from linkwise_runtime.quantities import Contact
 
 pytest.importorskip("pinocchio")
 
-import pinocchio as pin
 from tools.corpus import ROBOTS
 
 from numeric.loops import MECHANISMS, LoopOracle, constraint_dynamics
 from numeric.pinocchio_model import PinocchioModel
+from numeric.standing import standing_acceleration
 
 LIMIT = 1e-9
 SAMPLES = 6
@@ -235,23 +235,7 @@ def test_a_floating_robot_with_feet_on_the_ground_moves_as_pinocchios(name: str,
     tau = draw.uniform(-5.0, 5.0, robot.n)
     qd = constraints.velocity(q, draw.uniform(-1.0, 1.0, len(constraints.independent)))
     own = PinocchioModel(path, system, floating=True)
-    model, data = own.model, own.data
-    models = pin.StdVec_RigidConstraintModel()
-    state = own._state(q, qd, qd)
-    pin.forwardKinematics(model, data, state[0])
-    pin.updateFramePlacements(model, data)
-    for contact in FEET[name]:
-        frame = model.frames[model.getFrameId(contact.frame)]
-        kind = pin.PointAnchorConstraintModel if contact.kind == "point" else pin.FrameAnchorConstraintModel
-        place = data.oMf[model.getFrameId(contact.frame)]
-        anchor = kind(model, frame.parentJoint, frame.placement, 0, place)
-        models.append(pin.convertToRigidConstraintModel(model, anchor, pin.LOCAL))
-    datas = pin.StdVec_RigidConstraintData()
-    datas.extend([one.createData() for one in models])
-    pin.initConstraintDynamics(model, data, models, datas)
-    back = np.linalg.inv(own.tie)
-    settings = pin.ProximalSettings(1e-14, 1e-10, 200)
-    expected = back @ pin.constraintDynamics(model, data, *state[:2], back.T @ tau, models, datas, settings)
+    expected = standing_acceleration(own, FEET[name], q, qd, tau)
     found = constraints.forward_dynamics(q, qd, tau, passive=False)
     assert relative_error(found.qdd, expected) <= LIMIT
     # What nobody drives follows: coordinates of the base are not among the independent ones.

@@ -424,11 +424,3 @@ def test_states_that_cannot_be_controlled_are_refused_with_the_sample(package_of
         robot.partial_impedance(stiffness=1.0)(q[0], rest)
     with pytest.raises(ValueError, match=r"the shapes do not go together: .*external \(4, 3\)"):
         robot.partial_impedance()(q, rest, None, np.zeros((4, 3)))
-
-
-def test_tied_robots_are_refused(tmp_path: Path) -> None:
-    write_package(generate(read_system(DATA / "fourbar.toml"), ["numpy"]), tmp_path / "fourbar")
-    robot = import_package(tmp_path / "fourbar").load()
-    for made in (robot.partial_impedance, lambda: robot.cancel({(0, 0, 0, 1)})):
-        with pytest.raises(ValueError, match="are tied, and are not free to have an impedance each"):
-            made()

@@ -74,7 +74,7 @@ LOADING = Grammar(
     imports=_table(
         "typing: TYPE_CHECKING Any Literal overload;collections.abc: Callable Iterable Mapping"
         ";pathlib: Path;names: ROBOT;tree: RULE;forms: LINKS;energies: LAGRANGIANS"
-        ";RUN.version: require;RUN.targets: FrameImpedance Natural Target;RUN.dynamics: Dynamics"
+        ";RUN.version: require;RUN.targets: FrameImpedance Grip Natural Target;RUN.dynamics: Dynamics"
         ";RUN.arrays.backend: ArrayBackend refuse_choice refuse_learning"
         ";RUN.structure: Layout;RUN.rule.joint_tree: Bodies"
         ";RUN.quantities: AppliedLoad Coefficients Contact GradientPropagation InducedAccelerations Packed"

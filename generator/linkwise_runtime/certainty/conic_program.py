@@ -1,4 +1,4 @@
-"""Semidefinite programs of (4, 4) matrices, solved by Clarabel.
+"""Semidefinite programs of (4, 4) matrices, solved by Clarabel, and Clarabel for programs of other rooms.
 
 P. Goulart, Y. Chen, arXiv:2405.12762
 """
@@ -16,13 +16,16 @@ CLOSE = 1e-12
 """Tolerances of the solver: it goes on until it cannot do better, and the certificate judges."""
 
 
-def solver() -> tuple[Any, Any]:
-    """Return Clarabel and SciPy's sparse matrices; raise ImportError that says how to install them."""
+def solver(whose: str = "intervals of shares") -> tuple[Any, Any]:
+    """Return Clarabel and SciPy's sparse matrices; raise ImportError that says how to install them.
+
+    whose: what needs them, in words
+    """
     try:
         return import_module("clarabel"), import_module("scipy.sparse")
     except ImportError:
         raise ImportError(
-            "intervals of shares need Clarabel and SciPy, which are not installed here: pip install clarabel "
+            f"{whose} need Clarabel and SciPy, which are not installed here: pip install clarabel "
             "scipy, or with linkwise pip install 'linkwise[identify]'"
         ) from None
 

@@ -245,7 +245,7 @@ class TreeConstraints(ChosenConstraints):
         self, structure: Structure, tree: JointTree, independent: object, contacts: object, at: object
     ) -> None:
         """Choose constraints and independent joints; raises as `Dynamics.constrained` does."""
-        self._structure, self._tree = structure, tree
+        self._structure, self.tree = structure, tree
         self._own, self._own_position = tree.independent, tree.closed_position
         self.held: Sequence[Held] = held_by(tree, contacts)
         if not self.held and not tree.couplings:
@@ -271,8 +271,13 @@ class TreeConstraints(ChosenConstraints):
         self.of_positions = not any(any(one.arm) for one in self.held)
         self._choose(independent, at, loose_base(tree) if contacts else (), bool(contacts))
 
+    @property
+    def has_contacts(self) -> bool:
+        """True if the ground holds frames, beside the ties of the tree."""
+        return any(one.second is None for one in self.held)
+
     def _closed(self) -> Closing:
-        tree, n = self._tree, self._structure.n
+        tree, n = self.tree, self._structure.n
         if tree.tied:
             q = self._best(TieEquations(tree, n, [one for one in self.held if one.second is not None])).q
         else:

@@ -6,6 +6,8 @@ With r rows of the frame's Jacobian J, its velocity nu = J qd, and H, C, f as fo
     M_e (nud - nud_d) + B_e (nu - nu_d) + E' K_e x = F          x = (rotation vector, place) of the error
     qdd = qdd_0 + Jd (nud - dJ/dt qd - J qdd_0)
 
+Under ties H, C, J, f are those of the coordinates that these leave free: G^T H G, G^T (H dG/dt + C G), J G
+and G^T f.
 L and mu are the frame's natural inertia and velocity forces: dL/dt - 2 mu is skew-symmetric. E maps angular
 velocities to rates of the rotation vector. qdd_0 is the acceleration that the joints' targets ask for; see O.
 Khatib, A unified approach for motion and force control of robot manipulators, 1987.
@@ -21,13 +23,14 @@ from ..answers.inertia_solve import Told
 from ..arguments import refuse_gradient
 from ..arrays.backend import ArrayBackend
 from ..chosen_names import known_kind, short
+from ..constraints.closed_places import times
 from ..interface import Library, Namespace, Numbers, namespace
 from ..kinematics.frame_answers import FrameAnswers, frame_index
 from ..rule.joint_tree import JointTree
 from ..targets import ROWS, FrameImpedance, Natural
 from .frame_rotation import rates_of_turning, rotation_vector
 from .gains import Gain
-from .joint_impedance import JointState, times
+from .joint_impedance import JointState
 from .target_solve import TargetInertia, solve_target
 
 SIX = "turns about and moves along the world's x, y, z, whichever rows are controlled"
@@ -114,28 +117,33 @@ class FrameTargets:
 
     def state(self, backend: ArrayBackend, joints: JointState, given: Mapping[str, Numbers]) -> FrameState:
         """Return the frame's state at q and qd and for a target, which are all in `given` by name."""
-        xp, frames, q, qd = backend.xp, backend.frames, given["q"], given["qd"]
+        xp, frames, q, qd, freedom = backend.xp, backend.frames, given["q"], given["qd"], joints.freedom
         rows = backend.index(np.array(self.rows, np.intp), q)
         point = backend.constant(self.point, q)
         motion, vectors = (q, qd), {"point": xp.broadcast_to(point, (*q.shape[:-1], 3))}
         whole = frames.answer("jacobian", motion[:1], self.number, vectors)
         j = whole[..., rows, :]
         rate = frames.answer("jacobian_rate", motion, self.number, vectors)[..., rows, :]
-        sizes = joints.inertia.diagonal(0, -2, -1)
+        inner = freedom.inner(joints.inertia)
+        sizes = inner.diagonal(0, -2, -1)
         vague = Told(
             "the mass matrix is nearly singular",
-            backend.structure.joint_names,
+            freedom.names,
             beside=", and torques for a frame perhaps by fewer digits",
         )
         about = TargetInertia("the mass matrix is not positive", vague)
-        moved = solve_target(about, joints.inertia, xp.swapaxes(j, -1, -2), sizes)
+        along = freedom.projected(xp.swapaxes(j, -1, -2))
+        moved = freedom.moved(solve_target(about, inner, along, sizes))
         compliance = j @ moved
         ones = backend.constant(np.eye(len(self.rows)), q) + 0.0 * compliance
         hardly = f"frame {self.frame!r} can hardly move along rows each by itself"
         about = TargetInertia(self._unmovable(), Told(hardly, self.names, of_frame=True))
-        inertia = solve_target(about, compliance, ones, _reach(whole, sizes)[..., rows])
+        inertia = solve_target(about, compliance, ones, _reach(freedom.columns(whole), sizes)[..., rows])
         dual = moved @ inertia
         natural = (inertia @ (xp.swapaxes(moved, -1, -2) @ joints.coriolis - rate)) @ dual
+        turned = freedom.rates(dual)
+        if turned is not None:
+            natural = natural + (inertia @ (xp.swapaxes(moved, -1, -2) @ joints.inertia - j)) @ turned
         place, turning = self._place(backend, q, given.get("target.pose"))
         velocity, wanted = (
             given[name][..., rows] if name in given else None

@@ -2,6 +2,8 @@
 
     M* (qdd - qdd_d) + B* (qd - qd_d) + K* (q - q_d) = f + v        u = H qdd + C qd + g + p - f
 
+Under ties both hold along what these leave free: G^T times each of them, for qdd = G ydd + dG/dt yd
+(`Freedom`).
 H is the inertia of links and armature; p is the torque of the joints' own springs and damping, and of the
 part of their friction that is to be compensated; v is what a task asks for where motions are cancelled.
 """
@@ -15,8 +17,10 @@ import numpy as np
 from ..answers.inertia_solve import Told
 from ..arrays.backend import ArrayBackend
 from ..chosen_names import short
+from ..constraints.closed_places import times
 from ..interface import Numbers
 from ..structure import Structure, passive_torques, smooth_friction
+from .freedom import Freedom
 from .gains import Gain, TargetShares
 from .target_solve import TargetInertia, solve_target
 
@@ -43,6 +47,8 @@ class JointTargets(NamedTuple):
 class JointState(NamedTuple):
     """Robot at q and qd: the terms that its joints obey, and the targets for it."""
 
+    freedom: Freedom
+    """Coordinates that ties leave, and the velocities qd."""
     inertia: Numbers
     """H (..., n, n)."""
     coriolis: Numbers
@@ -73,9 +79,9 @@ class JointImpedance:
         self.targets, self._structure = targets, structure
         self._shares = any(not isinstance(t.kept, float) for t in (targets.inertia, targets.damping))
 
-    def state(self, backend: ArrayBackend, q: Numbers, qd: Numbers) -> JointState:
-        """Return the terms that the joints obey at q and qd (..., n), and their targets there."""
-        targets, c2, c1 = self.targets, None, None
+    def state(self, backend: ArrayBackend, q: Numbers, freedom: Freedom) -> JointState:
+        """Return the terms that the joints obey at q (..., n) and velocities, and their targets there."""
+        targets, c2, c1, qd = self.targets, None, None, freedom.qd
         if self._shares:
             c2, c1, by_link = backend.answers.coefficients(q, qd)
             mass, coriolis, rest = c2.sum(-2), c1.sum(-2), by_link.sum(-1)
@@ -91,7 +97,8 @@ class JointImpedance:
                 rest = rest + smooth_friction(backend, sums, qd, targets.friction_width)
             # a share of the links leaves out the armature, a sum that is given whole includes it
             wanted = wanted if targets.inertia.whole else wanted + armature
-        return JointState(inertia, coriolis, rest, wanted, targets.damping.of(backend, coriolis, c1, q))
+        damping = targets.damping.of(backend, coriolis, c1, q)
+        return JointState(freedom, inertia, coriolis, rest, wanted, damping)
 
     def pull(self, backend: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
         """Return -B* ed - K* e, (..., n)."""
@@ -103,38 +110,42 @@ class JointImpedance:
     def acceleration(
         self, backend: ArrayBackend, state: JointState, errors: Errors, told: bool = False
     ) -> Numbers:
-        """Return qdd = qdd_d + M*^-1 (f + v - B* ed - K* e), (..., n).
+        """Return qdd = qdd_d + M*^-1 (f + v - B* ed - K* e), (..., n), or what ties leave of it.
+
+        Under ties, from any qdd_0 that they allow, qdd = qdd_0 + G (G^T M* G)^-1 G^T F, where F is
+        f + v - B* ed - K* e - M* (qdd_0 - qdd_d).
 
         told: whether the accuracy that a natural M* allows is reported elsewhere
         """
         pull = self.pull(backend, state, errors)
         if errors.force is not None:
             pull = pull + errors.force
-        names, positive = self._structure.joint_names, self.targets.positive
+        freedom, positive = state.freedom, self.targets.positive
+        allowed, off = freedom.beside(errors.wanted)
+        if off is not None:
+            pull = pull - times(state.target_inertia, off)
         whose = "what is left of the mass matrix"
         if positive:
             whose = "the mass matrix" if self.targets.inertia.natural else "the wanted inertia"
         singular = "the wanted inertia is not positive" if positive else f"{whose} is singular"
-        about = TargetInertia(singular, Told(f"{whose} is nearly singular", names))
-        natural = state.inertia.diagonal(0, -2, -1)
+        about = TargetInertia(singular, Told(f"{whose} is nearly singular", freedom.names))
+        natural = freedom.inner(state.inertia).diagonal(0, -2, -1)
         told = told and self.targets.inertia.natural
-        solved = solve_target(about, state.target_inertia, pull[..., None], natural, positive, told)
-        moved = solved[..., 0]
-        return moved if errors.wanted is None else errors.wanted + moved
+        force, wanted = freedom.projected(pull[..., None]), freedom.inner(state.target_inertia)
+        moved = freedom.moved(solve_target(about, wanted, force, natural, positive, told))[..., 0]
+        return moved if allowed is None else allowed + moved
 
-    def natural_torque(
-        self, backend: ArrayBackend, state: JointState, qd: Numbers, errors: Errors
-    ) -> Numbers:
+    def natural_torque(self, backend: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
         """Return u = H qdd_d + C qd + g + p - B* ed - K* e, (..., n).
 
-        f drops out where all inertia stays natural.
+        f drops out where all inertia stays natural, and so does what ties leave of qdd.
         """
-        torque = times(state.coriolis, qd) + state.rest + self.pull(backend, state, errors)
+        torque = times(state.coriolis, state.freedom.qd) + state.rest + self.pull(backend, state, errors)
         return torque if errors.wanted is None else torque + times(state.inertia, errors.wanted)
 
-    def torque(self, state: JointState, qd: Numbers, qdd: Numbers, external: Numbers | None) -> Numbers:
+    def torque(self, state: JointState, qdd: Numbers, external: Numbers | None) -> Numbers:
         """Return u = H qdd + C qd + g + p - f, (..., n)."""
-        torque = times(state.inertia, qdd) + times(state.coriolis, qd) + state.rest
+        torque = times(state.inertia, qdd) + times(state.coriolis, state.freedom.qd) + state.rest
         return torque if external is None else torque - external
 
     def stored(self, backend: ArrayBackend, state: JointState, errors: Errors) -> Numbers:
@@ -144,11 +155,6 @@ class JointImpedance:
             return energy
         stiffness = self.targets.stiffness.matrix(backend, errors.place)
         return energy + (errors.place * times(stiffness, errors.place)).sum(-1) / 2.0
-
-
-def times(matrix: Numbers, vector: Numbers) -> Numbers:
-    """Return matrices (..., r, n) times vectors (..., n)."""
-    return (matrix @ vector[..., None])[..., 0]
 
 
 def dissipates(inertia: TargetShares, damping: TargetShares) -> bool:
