@@ -12,6 +12,7 @@ from helpers.answers import random_states, relative_error
 from helpers.urdf_text import chain, joint
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
+from linkwise_runtime.control.joint_impedance import JointImpedance
 
 torch = pytest.importorskip("torch")
 
@@ -88,9 +89,30 @@ def test_every_back_end_says_the_same_of_one_state_and_of_many(
         assert relative_error(np.asarray(same(*as_kind(backend, q, qd), moved)), expected) <= 1e-11
         single = same(*as_kind(backend, q[0], qd[0]), targets[0])
         assert relative_error(np.asarray(single), expected[0]) <= 1e-11
+        follows = same.acceleration(*as_kind(backend, q[0], qd[0]), targets[0])
+        assert relative_error(np.asarray(follows), controller.acceleration(q[0], qd[0], targets[0])) <= 1e-11
     names = {(0, link, None, None), (0, joint_link(known), 0, 1)}
     expected = np.stack([known.cancel(names)(a, b, c) for a, b, c in zip(q, qd, qdd, strict=True)])
-    assert relative_error(np.asarray(model.cancel(names)(*as_kind(backend, q, qd, qdd))), expected) <= 1e-11
+    known_cancel, cancel = known.cancel(names), model.cancel(names)
+    assert relative_error(np.asarray(cancel(*as_kind(backend, q, qd, qdd))), expected) <= 1e-11
+    one, task = as_kind(backend, q[0], qd[0]), as_kind(backend, row)[0]
+    given = known_cancel(q[0], qd[0], row, qdd=qdd[0])
+    assert relative_error(np.asarray(cancel(*one, task, qdd=as_kind(backend, qdd[0])[0])), given) <= 1e-11
+    follows = known_cancel.acceleration(q[0], qd[0], row)
+    assert relative_error(np.asarray(cancel.acceleration(*one, task)), follows) <= 1e-11
+
+
+@needs_compiler
+def test_c_answers_accelerations_and_what_is_cancelled_at_one(
+    package_of: Packages, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, state = package_of("torso").load("native"), np.full(7, 0.3)
+    spring, cancel = robot.partial_impedance(stiffness=2.0), robot.cancel({(0, 0, 0, 1)})
+    monkeypatch.setattr(JointImpedance, "state", None)  # what arrays go through
+    assert np.isfinite(
+        [spring.acceleration(state, state, 0.0 * state), cancel.acceleration(state, state)]
+    ).all()
+    assert np.isfinite(cancel(state, state, qdd=state)).all()
 
 
 def joint_link(model: Any) -> int:

@@ -59,7 +59,8 @@ class Cancellation(Controller, Generic[Array]):
         except for armature, which belongs to no link.
         """
         backend, given = self._given(q, qd, tau, external, qdd)
-        if "qdd" not in given and (torque := self._torque_of_one(backend, given)) is not None:
+        torque = self._torque_of_one(backend, given)
+        if torque is not None:
             return cast("Array", torque)
         if self._grips and qdd is not None:
             raise ValueError(
@@ -72,7 +73,9 @@ class Cancellation(Controller, Generic[Array]):
         self, q: Array, qd: Array, tau: Array | None = None, external: Array | None = None
     ) -> Array:
         """Return the acceleration qdd that follows, (..., n), in rad/s^2 or m/s^2."""
-        return cast("Array", self._moved(self._followed(*self._given(q, qd, tau, external))))
+        backend, given = self._given(q, qd, tau, external)
+        found = self._acceleration_of_one(backend, given)
+        return cast("Array", self._moved(self._followed(backend, given)) if found is None else found)
 
     def forces(self, q: Array, qd: Array, tau: Array | None = None, external: Array | None = None) -> Array:
         """Return the forces lambda of ties and contacts that follow, (..., C), as `Constraints` has them."""

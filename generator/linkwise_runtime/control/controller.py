@@ -101,12 +101,20 @@ class Controller:
 
     def _torque_of_one(self, backend: ArrayBackend, given: Given) -> Numbers | None:
         """Return the torque if the back end has it for one sample without these arrays, else None."""
+        of_one = self._for_one(backend)
+        return None if of_one is None else of_one.torque(given)
+
+    def _acceleration_of_one(self, backend: ArrayBackend, given: Given) -> Numbers | None:
+        """Return the acceleration that follows, likewise."""
+        of_one = self._for_one(backend)
+        return None if of_one is None else of_one.acceleration(given)
+
+    def _for_one(self, backend: ArrayBackend) -> TorqueOfOne | None:
         if not self._actuators.drive_all:
             return None
         if backend not in self._of_one:
             self._of_one[backend] = backend.controller(self._joints.targets, self._frame)
-        of_one = self._of_one[backend]
-        return None if of_one is None else of_one.torque(given)
+        return self._of_one[backend]
 
     def _arrays(
         self, q: object, qd: object, motion: Mapping[str, object], beside: Mapping[str, Beside] = NOTHING

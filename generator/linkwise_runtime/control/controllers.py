@@ -82,7 +82,9 @@ class PartialImpedance(Controller, Generic[Array]):
         self, q: Array, qd: Array, target: object = None, external: Array | None = None
     ) -> Array:
         """Return the acceleration qdd that follows, (..., n), in rad/s^2 or m/s^2."""
-        return cast("Array", self._moved(self._followed(*self._given(q, qd, target, external))))
+        backend, given = self._given(q, qd, target, external)
+        found = self._acceleration_of_one(backend, given)
+        return cast("Array", self._moved(self._followed(backend, given)) if found is None else found)
 
     def forces(self, q: Array, qd: Array, target: object = None, external: Array | None = None) -> Array:
         """Return the forces lambda of ties and contacts that follow, (..., C), as `Constraints` has them."""
