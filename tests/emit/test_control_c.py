@@ -19,6 +19,7 @@ from helpers.urdf_text import joint, link, robot
 from linkwise import Options, generate, read_system, write_package
 from linkwise.check.compiled_c import declarations
 from linkwise.package.load import import_package
+from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
 from linkwise_runtime.targets import ROWS
 from runtime.test_passive_torque import HAND
 
@@ -235,6 +236,7 @@ def in_python(package: ModuleType, robot: Any) -> dict[str, Callable[[], Any]]:
         "dense_position_gradient": lambda: robot.position_gradient(q, q, q),
         "regressor": lambda: robot.regressor(q, q, q),
         "coefficient_regressors": lambda: robot.coefficient_regressors(q, q),
+        "share_variances": lambda: robot.uncertainty(q, q, q, UncertainBodies(0.1)),
         "reactions": lambda: robot.reactions(q, q, q, constraints=False),
         "pose": lambda: robot.kinematics.pose(q, frame),
         "jacobian": lambda: robot.kinematics.jacobian(q, frame),

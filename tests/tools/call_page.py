@@ -59,6 +59,8 @@ BESIDE_IN_C = {
     "position_gradient": "`position_gradient` without its zeros",
     "passive_torque": "the sum of `passive_torque`, of one sample, where joints have any",
     "reactions": "the wrenches of links, of which `reactions` are made; not of joints that are tied",
+    "share_variances": "what bodies do to shares through one link, squared, of which "
+    "[`uncertainty`](package.md#how-certain-a-share-is) is made",
     "partial_impedance": "a [controller](control.md)",
     "cancel": "what a [controller](control.md) cancels at a given acceleration",
     "frame_partial_impedance": "a [controller](control.md) of a frame",

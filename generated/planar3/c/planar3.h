@@ -160,6 +160,13 @@ void planar3_regressor(size_t count, const double *q, const double *qd, const do
 void planar3_coefficient_regressors(size_t count, const double *q, const double *qd,
     double *acceleration, double *velocity, double *gravity);
 
+/* Variances of c2(i, j, k), c1(i, j, k), g(i, j) and tau(i, j) where what links carry is uncertain: of pi(j), see above, the
+   covariance is F F' with F = factor(j, 10, 10). Squares of these in their own units; a share through one link does not depend
+   on how links' errors go together.
+   Reads q, qd, qdd (count, JOINTS), factor (LINKS, 10, 10); writes c2 (count, C2), c1 (count, C1), g, tau (count, G). */
+void planar3_share_variances(size_t count, const double *q, const double *qd, const double *qdd, const double *factor,
+    double *c2, double *c1, double *g, double *tau);
+
 /* Reactions: the whole wrenches that joints carry of each link, by cause, of which c2(i, j, k), c1(i, j, k) and g(i, j) are the
    parts along the joints' axes. Where tau(k, j) stands in a row of tau, acceleration has six numbers, N_x, N_y, N_z, f_x, f_y
    and f_z, in the world's axes: the force that link j needs for each unit of qdd_k, and the moment about the origin p of the joint
@@ -346,6 +353,13 @@ void planar3_regressorf(size_t count, const float *q, const float *qd, const flo
    writes acceleration, velocity (count, JOINTS, LINKS, JOINTS, 10), gravity (count, JOINTS, LINKS, 10). */
 void planar3_coefficient_regressorsf(size_t count, const float *q, const float *qd,
     float *acceleration, float *velocity, float *gravity);
+
+/* Variances of c2(i, j, k), c1(i, j, k), g(i, j) and tau(i, j) where what links carry is uncertain: of pi(j), see above, the
+   covariance is F F' with F = factor(j, 10, 10). Squares of these in their own units; a share through one link does not depend
+   on how links' errors go together.
+   Reads q, qd, qdd (count, JOINTS), factor (LINKS, 10, 10); writes c2 (count, C2), c1 (count, C1), g, tau (count, G). */
+void planar3_share_variancesf(size_t count, const float *q, const float *qd, const float *qdd, const float *factor,
+    float *c2, float *c1, float *g, float *tau);
 
 /* Reactions: the whole wrenches that joints carry of each link, by cause, of which c2(i, j, k), c1(i, j, k) and g(i, j) are the
    parts along the joints' axes. Where tau(k, j) stands in a row of tau, acceleration has six numbers, N_x, N_y, N_z, f_x, f_y

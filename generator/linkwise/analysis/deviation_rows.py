@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol, Self
 import numpy as np
 from linkwise_runtime.certainty.divided_differences import Direction, variances
 from linkwise_runtime.certainty.product_moments import Product, ProductMoments
-from linkwise_runtime.certainty.share_deviations import ShareDeviations, share_deviations
+from linkwise_runtime.certainty.share_variances import ShareVariances, share_variances
 
 from linkwise.analysis.loads.placed import LoadShift
 from linkwise.analysis.opened_robot import OpenedRobot
@@ -104,12 +104,12 @@ class DeviationRows:
         return found | (OF_LOADS if any(given.loads) else frozenset())
 
     @cached_property
-    def _exact(self) -> ShareDeviations | None:
-        """Deviations of the shares of an open tree by its bodies, packed."""
+    def _exact(self) -> ShareVariances | None:
+        """Variances of the shares of an open tree by its bodies, packed."""
         given, robot = self.uncertain.bodies, self.robot
         if given is None or not is_closed_form(robot):
             return None
-        return share_deviations(robot.model.backend, given)
+        return share_variances(robot.model.backend, given)
 
     @cached_property
     def _bodies(self) -> Sequence[PerturbedRobots]:
@@ -130,7 +130,7 @@ class DeviationRows:
         for at in range(0, len(time), AT_ONCE):
             some = slice(at, at + AT_ONCE)
             q, qd, qdd = motion
-            bodies = {name: deviations[:, some] ** 2 for name, deviations in exact.items()}
+            bodies = {name: variance[:, some] for name, variance in exact.items()}
             moved, found = self._variances(plain, arrays, time[some], (q[some], qd[some], qdd[some]), bodies)
             for variance, deviations in ((moved, NOISE_OF), (found, DEVIATION_OF)):
                 for deviation, quantity in deviations.items():
@@ -223,12 +223,12 @@ class DeviationRows:
 
             yield Direction(rows, off.width)
 
-    def _of_bodies(self, exact: ShareDeviations, plain: Perturbable, motion: Motion) -> dict[str, Array]:
-        """Return deviations by bodies of an open tree, (rows, S), by array."""
+    def _of_bodies(self, exact: ShareVariances, plain: Perturbable, motion: Motion) -> dict[str, Array]:
+        """Return variances by bodies of an open tree, (rows, S), by array."""
         _, at = self.robot.model.door.read(dict(zip(("q", "qd", "qdd"), motion, strict=True)))
         found: Any = exact.packed(at, with_sums=False)
         c2, c1, gravity, torque, whole = (np.asarray(a) for a in found[:5])
-        twice = 2.0 if self.convention == "gradient" else 1.0
+        twice = 4.0 if self.convention == "gradient" else 1.0
         sources = self.sources
         return {
             "tau": whole[:, plain.rows["tau"].at[:, 0]].T,

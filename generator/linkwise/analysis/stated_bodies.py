@@ -26,7 +26,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from linkwise_runtime.certainty.share_deviations import share_deviations
+from linkwise_runtime.certainty.share_variances import share_variances
 from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies, checked_correlation
 
 from linkwise.analysis.covariance_table import covariance_of
@@ -73,7 +73,7 @@ def read_bodies(data: Mapping[str, Any], robot: OpenedRobot) -> StatedBodies:
         raise LinkwiseError("all deviations of bodies are 0; give some, or leave these tables out")
     if is_closed_form(robot):
         try:
-            share_deviations(robot.model.backend, bodies)
+            share_variances(robot.model.backend, bodies)
         except ValueError as error:
             raise LinkwiseError(str(error)) from None
     else:

@@ -162,3 +162,63 @@ void API(coefficient_regressors)(size_t count, AT_REST, real *acceleration, real
         }
     }
 }
+
+/* The squares of F' Y of a row Y in a block, summed: its variance where F F' is the covariance of what the link carries. */
+static void variance_of_row(const real *factor, const real *y10, real *variance)
+{
+    for (int part = 0; part < BLOCK_PARTS; ++part) {
+        lanes y[INERTIAL], sum = same(0);
+        for (int a = 0; a < INERTIAL; ++a)
+            y[a] = TAKE(y10 + a * W + part * LANES);
+        for (int r = 0; r < INERTIAL; ++r) {
+            lanes along_r = same(0);
+            for (int a = 0; a < INERTIAL; ++a)
+                along_r += same(factor[a * INERTIAL + r]) * y[a];
+            sum += along_r * along_r;
+        }
+        PUT(variance + part * LANES, sum);
+    }
+}
+
+void API(share_variances)(size_t count, INPUTS, const real *factor, real *c2, real *c1, real *g, real *tau)
+{
+    if (!count)
+        return;
+    NUMBERS(x);
+    ALIGNED motion m[BLOCK_PARTS];
+    ALIGNED carried l[BLOCK_PARTS];
+    ALIGNED real y10[INERTIAL * BLOCK], variance[BLOCK];
+    size_t pairs = 0;
+    for (int j = 0; j < LINKS; ++j)
+        pairs += (size_t)((path_start[j + 1] - path_start[j]) * (path_start[j + 1] - path_start[j]));
+    const size_t entries = (size_t)path_start[LINKS], halves = (pairs + entries) / 2;
+    for (size_t s = 0; s < count; s += BLOCK) {
+        const size_t samples = count - s < BLOCK ? count - s : BLOCK;
+        size_t pair = s * pairs, half = s * halves, entry = s * entries;
+        rows_moved(x, samples, q + s * N, qd + s * N, qdd + s * N, m);
+        for (int j = 0; j < LINKS; ++j) {
+            const real *const own = factor + j * INERTIAL * INERTIAL;
+            const int length = path_start[j + 1] - path_start[j];
+            for (int part = 0; part < BLOCK_PARTS; ++part)
+                carry(x, &m[part], j, &l[part]);
+            for (int i = 0; i < length; ++i, ++entry) {
+                rows_of_block(m, l, OF_G, i, 0, y10);
+                variance_of_row(own, y10, variance);
+                scatter(samples, 1, entries, variance, g + entry);
+                rows_of_block(m, l, OF_TAU, i, 0, y10);
+                variance_of_row(own, y10, variance);
+                scatter(samples, 1, entries, variance, tau + entry);
+                for (int k = 0; k < length; ++k, ++pair) {
+                    rows_of_block(m, l, OF_C1, i, k, y10);
+                    variance_of_row(own, y10, variance);
+                    scatter(samples, 1, pairs, variance, c1 + pair);
+                }
+                for (int k = i; k < length; ++k, ++half) {
+                    rows_of_block(m, l, OF_C2, i, k, y10);
+                    variance_of_row(own, y10, variance);
+                    scatter(samples, 1, halves, variance, c2 + half);
+                }
+            }
+        }
+    }
+}

@@ -50,6 +50,11 @@ REGRESSORS = {
 """Functions of robots of rigid links alone whose results include zeros: quantities, and names in the
 header."""
 
+VARIANCES = "share_variances"
+"""Function that takes a covariance of what links carry beside the motion."""
+VARIED = {"c2": "Y c2", "c1": "Y c1", "g": "Y g", "tau": "Y"}
+"""Its outputs, and the rows by which they lean on what links carry."""
+
 REACTIONS = {
     "reactions": (("acceleration", "velocity", "gravity"), ("acceleration", "velocity", "gravity")),
 }
@@ -109,6 +114,8 @@ class CFunctions:
             try:
                 if function.short in REGRESSORS:
                     calls = self._of_bodies(function, regressors)
+                elif function.short == VARIANCES:
+                    calls = self._variances(function, regressors)
                 elif function.short in REACTIONS:
                     calls = self._of_bodies(function, wrenches)
                 elif function.short.endswith("partial_impedance"):
@@ -178,6 +185,30 @@ class CFunctions:
             expected = {what: (value, reference.scales[what]) for what, value in reference.values.items()}
             yield from self._dense(function, reference, expected)
 
+    def _variances(self, function: Prototype, reference: Reference | None) -> Iterator[Entries]:
+        """Yield variances, |F' Y|^2, for factors F that differ in every entry."""
+        if reference is None:
+            return
+        links = len(self.manifest.links)
+        factor = np.cos(np.arange(100.0 * links)).reshape(links, 10, 10)
+        states, sizes = reference.states, {what: len(self.rows.of(what)) for what in VARIED}
+        for count, shift in product(ROWS[:-1], (0, 1)):
+            at = np.arange(count) * 3 % max(len(states.q), 1)
+            given = dict(zip(("q", "qd", "qdd"), states.at(at).motion, strict=True)) | {"factor": factor}
+            asked = {what: count * size for what, size in sizes.items()}
+            found = self._call(function, count, given, asked, shift)
+            for what, rows in VARIED.items():
+                places = self.rows.of(what)
+                own, scale = (
+                    of[rows][(at[:, None], *places.T)] for of in (reference.values, reference.scales)
+                )
+                of_links = factor[places[:, 1]]
+                along = np.einsum("spa,par->spr", own, of_links)
+                most = np.einsum("spa,par->spr", scale, np.abs(of_links))
+                yield Entries(
+                    what, found[what].reshape(count, sizes[what]), (along**2).sum(-1), (most**2).sum(-1)
+                )
+
     def _link(self, function: Prototype, reference: Reference, link: int) -> Iterator[Entries]:
         own = {what: self.rows.of(what)[self.rows.of(what)[:, 1] == link] for what in function.outputs}
         for row in range(0, len(reference.states.q), max(1, len(reference.states.q) // 8)):
@@ -216,6 +247,7 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
         ("torque", "count", ("tau",)),
         ("position_gradient", "count", ("c0",)),
         *((name, "count", outputs) for name, (_, outputs) in (DENSE | rigid).items()),
+        *([(VARIANCES, "count", tuple(VARIED))] if rigid else []),
     ]
     for j in range(len(manifest.links)):
         own = tuple(what for what in every if j in rows.of(what)[:, 1])
@@ -235,7 +267,8 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
 
 def _inputs(name: str, every: tuple[str, ...]) -> tuple[str, ...]:
     """Return the arrays that a function reads: coefficients do not depend on qdd."""
-    return tuple(what for what in every if name not in AT_REST or what != "qdd")
+    told = ("factor",) if name == VARIANCES else ()
+    return (*(what for what in every if name not in AT_REST or what != "qdd"), *told)
 
 
 def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[CompiledPackage | None, Result]:

@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
-from linkwise_runtime.certainty.share_deviations import spread_of
+from linkwise_runtime.certainty.share_variances import spread_of
 from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
 
 from linkwise.analysis.opened_robot import OpenedRobot

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..interface import Dtype, Library, Namespace, Numbers, TableKind
 from ..quantities import PARAMETERS
@@ -89,6 +89,17 @@ class PackedBackend(Library):
     def coefficient_regressors(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return the rows of 10 of c2, c1 and g, flat: (..., 10 count) each."""
         raise NotImplementedError
+
+    def share_variances(
+        self, q: Numbers, qd: Numbers, qdd: Numbers, factors: ArrayLike
+    ) -> Sequence[Numbers] | None:
+        """Return the variances of c2, c1, g and tau, (S, count) each, where what links carry is uncertain.
+
+        None where a back end has no more than the regressors that they follow from.
+
+        factors: F (N, 10, 10), with F F^T the covariance of the inertial parameters of each link
+        """
+        return None
 
     def product(self, a: Numbers, b: Numbers) -> Numbers:
         """Return the matrix products (..., l, n) of arrays (..., l, m) and (..., m, n)."""

@@ -12,10 +12,10 @@ from ..share_uncertainty import Uncertainty
 from .divided_differences import Direction, variances
 from .parameter_moments import ROUNDING, Floats
 from .product_moments import Product, ProductMoments
-from .share_deviations import root, share_deviations
+from .share_variances import root, share_variances
 
 SHARES = ("c2", "c1", "gravity", "torque", "joint_torque", "joint_c2", "joint_c1", "joint_gravity")
-"""Shares, and their sums over links, in the order of `PackedDeviations`."""
+"""Shares, and their sums over links, in the order of `PackedVariances`."""
 BASES = (*SHARES, "qd", "qdd")
 """Shares and motion, of which products are made."""
 C2, C1, _, TAU, WHOLE, JOINT_C2, JOINT_C1, _, QD, QDD = range(len(BASES))
@@ -46,15 +46,15 @@ def uncertainty(robot: Any, q: object, qd: object, qdd: object, bodies: object, 
         found = variances(here, _directions(robot, flat, roots), moments.add)
     if bodies is not None:
         for number, borne in enumerate(_by_bodies(backend, flat, bodies)):
-            found[number] = found[number] + borne**2
+            found[number] = found[number] + borne
     by_name = dict(zip((*BASES, *BY_PRODUCT), [*found, *moments.variances(found)], strict=True))
     deviations = (root(backend.xp, by_name[name]) for name in Uncertainty._fields)
     return Uncertainty(*(side_by_side(a.reshape(*batch, *a.shape[1:])) for a in deviations))
 
 
 def _by_bodies(backend: Any, flat: Sequence[Any], bodies: object) -> Sequence[Any]:
-    """Return the deviations by bodies of the shares, in the order of `SHARES`."""
-    at = share_deviations(backend, bodies)
+    """Return the variances by bodies of the shares, in the order of `SHARES`."""
+    at = share_variances(backend, bodies)
     found = at.packed(flat)
     fields = ("acceleration", "velocity", "gravity", "torque")
     return [*map(at.spread, found[:4], fields), *found[4:]]

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..answers.answers import Answers
 from ..answers.packed import TorqueOfOne
@@ -20,7 +21,7 @@ from ..interface import ClosedForms, Numbers
 from ..kinematics.link_wrenches import CauseWrenches
 from ..rule.calls import RigidRule
 from ..structure import Structure
-from .calls import FUNCTIONS, LINK_WRENCHES, NativeCalls, checked_threads
+from .calls import FUNCTIONS, LINK_WRENCHES, SHARE_VARIANCES, NativeCalls, checked_threads
 from .compiled_calls import QuickCalls
 from .control import ControlCalls, NativeTorque
 from .memory import NumberArray, NumberType, memory
@@ -207,6 +208,14 @@ class NativeBackend(NumpyBackend):
         if self.ties_joints:
             return super().link_wrenches(q, qd)
         return self.wrenches.of_packed(q, self._run(LINK_WRENCHES, q, qd))
+
+    def share_variances(
+        self, q: Numbers, qd: Numbers, qdd: Numbers, factors: ArrayLike
+    ) -> Sequence[Numbers] | None:
+        """Return the variances of packed values by uncertain bodies, (S, count) each."""
+        motion = cast(Arrays, (q, qd, qdd))
+        told = np.ascontiguousarray(factors, motion[0].dtype)
+        return self.calls.run(SHARE_VARIANCES, motion, told=[told])
 
     def _run(self, call: str, *motion: Numbers) -> Arrays:
         return self.calls.run(call, cast(Arrays, motion))

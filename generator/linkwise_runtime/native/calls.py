@@ -30,11 +30,14 @@ PER_THREAD = 1 << 20
 
 PACKED_GRADIENT = "packed_position_gradient"
 """Packed derivatives by position; no row of the call table, as no call of Python answers with them."""
+SHARE_VARIANCES = "share_variances"
+"""Variances of packed values by uncertain bodies, which `uncertainty` takes the roots of; no row either."""
 LINK_WRENCHES = "link_wrenches"
 """Wrenches of links by cause, of which `reactions` are made; they too are no row."""
 FUNCTIONS = {key: row.c for key, row in CALLS.items() if row.c and not row.one} | {
     PACKED_GRADIENT: "position_gradient",
     LINK_WRENCHES: "reactions",
+    SHARE_VARIANCES: SHARE_VARIANCES,
 }
 """Names in C of the calls for many samples."""
 
@@ -84,7 +87,8 @@ class NativeCalls:
         self.sources = loaded(structure, sources)
         self.threads_set, self._cores = threads, os.cpu_count() or 1
         wrenches = (structure.sizes.tau, 6), (structure.sizes.tau, 6), (structure.N, 6)
-        beside = {PACKED_GRADIENT: ((structure.sizes.c1,),), LINK_WRENCHES: wrenches}
+        packed = tuple((size,) for size in structure.sizes[:4])
+        beside = {PACKED_GRADIENT: ((structure.sizes.c1,),), LINK_WRENCHES: wrenches, SHARE_VARIANCES: packed}
         self.shapes = answer_shapes(structure) | beside
         self.sizes = {call: [math.prod(shape) for shape in shapes] for call, shapes in self.shapes.items()}
         self._complete = {call: all(sizes) for call, sizes in self.sizes.items()}
@@ -123,13 +127,20 @@ class NativeCalls:
         return self._of_one.results(key, numbers)
 
     def run(
-        self, call: str, motion: Sequence[NumberArray], into: Sequence[NumberArray] | None = None
+        self,
+        call: str,
+        motion: Sequence[NumberArray],
+        into: Sequence[NumberArray] | None = None,
+        told: Sequence[NumberArray] = (),
     ) -> Sequence[NumberArray]:
-        """Return a call's results for arrays of one shape (..., n), written to `into`, or to new memory."""
+        """Return a call's results for arrays of one shape (..., n), written to `into`, or to new memory.
+
+        told: arrays that are the same for all samples
+        """
         q = motion[0]
         kind, batch = q.dtype, q.shape[:-1]
         count = q.size // q.shape[-1]
-        if count == 1 and into is None and not self.learned:
+        if count == 1 and into is None and not self.learned and not told:
             results = self._of_one.results((call, kind), b"".join(a.tobytes() for a in motion))
             return [a.reshape(*batch, *a.shape) for a in results] if batch else results
         shapes = self.shapes[call]
@@ -137,10 +148,11 @@ class NativeCalls:
             into = [memory((*batch, *shape), kind) for shape in shapes]
         if not count:
             return into
-        compute = self._functions.get((call, kind)) or self._function(call, kind)
+        compute = self._functions.get((call, kind)) or self._function(call, kind, len(told))
         read = [plain(a) for a in motion]
         if self.parameters:
             read.append(self.constants(kind))
+        read += told
         sizes = self.sizes[call]
         # A robot may lack entries of some kind; its functions then take no array for them.
         written = into if self._complete[call] else [a for a, size in zip(into, sizes, strict=True) if size]
@@ -175,9 +187,9 @@ class NativeCalls:
         """Return the address of the C function of a call that has been made before."""
         return start_of(self._functions[call, kind])
 
-    def _function(self, call: str, kind: NumberType) -> "CFunction":
-        """Return the C function of a call for a dtype, compiled if it is not there yet."""
-        reads = 2 if call in AT_REST else 3
+    def _function(self, call: str, kind: NumberType, told: int = 0) -> "CFunction":
+        """Return the C function of a call for a dtype, compiled if it is not there yet; told: see `run`."""
+        reads = told + (2 if call in AT_REST else 3)
         arrays = reads + bool(self.parameters) + sum(size > 0 for size in self.sizes[call])
         found = self._functions[call, kind] = function(self.sources, FUNCTIONS[call], kind.str[1:], arrays)
         return found

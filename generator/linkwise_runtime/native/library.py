@@ -67,7 +67,9 @@ def _library_of(call: str) -> str:
         return "control"
     if call.endswith("position_gradient"):
         return "gradient"
-    return "regressors" if "regressor" in call or call == "reactions" else "decomposition"
+    return (
+        "regressors" if "regressor" in call or call in ("reactions", "share_variances") else "decomposition"
+    )
 
 
 def start_of(function: "CFunction") -> int:

@@ -1,4 +1,4 @@
-"""Standard deviations of shares of torque, from the covariance of what links carry.
+"""Variances of shares of torque, from the covariance of what links carry.
 
 Shares are linear in inertial parameters, s = sum_j Y_j . pi_j, so that with the covariance of `BodySpread`
 
@@ -36,15 +36,15 @@ AT_ONCE = 1 << 21
 """Most numbers of the regressors of a piece of samples."""
 
 
-class PackedDeviations(NamedTuple):
-    """Standard deviations of one robot's shares, packed in the order of `Layout`, (S, count) each."""
+class PackedVariances(NamedTuple):
+    """Variances of one robot's shares, packed in the order of `Layout`, (S, count) each."""
 
     c2: Numbers
     c1: Numbers
     gravity: Numbers
     torque: Numbers
     joint_torque: Numbers
-    """Deviations of the sums over all links, (S, n)."""
+    """Variances of the sums over all links, (S, n)."""
     joint_c2: Numbers
     """(S, n, n)"""
     joint_c1: Numbers
@@ -53,15 +53,18 @@ class PackedDeviations(NamedTuple):
     """(S, n)"""
 
 
-class ShareDeviations:
-    """Standard deviations of shares of a robot on one back end, whose bodies are spread."""
+class ShareVariances:
+    """Variances of shares of a robot on one back end, whose bodies are spread."""
 
     def __init__(self, backend: ArrayBackend, spread: BodySpread, shifts: Any = ()) -> None:
-        """Set up the deviations; shifts: those of joints' places, as of `length_shifts`."""
+        """Set up the variances; shifts: those of joints' places, as of `length_shifts`."""
         self._backend, self._tables = backend, PackedTables(backend)
         layout, links = backend.structure.layout, range(backend.structure.N)
         self._layout, self._causes = layout, layout.velocity[:, 2].copy()  # writable, as torch wants it
         self._spread, self._by_link = spread, spread.by_link
+        # By QR, however many columns there are: ten by ten for each link.
+        wide = np.pad(self._by_link.mT, ((0, 0), (0, PARAMETERS), (0, 0)))
+        self._triangles = np.asarray(np.linalg.qr(wide, mode="r")).mT
         self._slices = {
             field: [slice(*np.searchsorted(getattr(layout, field)[:, 1], [j, j + 1])) for j in links]
             for field in ("acceleration", "velocity", "gravity", "torque")
@@ -71,8 +74,8 @@ class ShareDeviations:
         self._rule = backend.rule or RigidRule(cast(JointTree, backend.tree))
         self._mirrored = np.array([place[min(i, k), j, max(i, k)] for i, j, k in layout.velocity.tolist()])
 
-    def packed(self, motion: Sequence[Numbers], with_sums: bool = True) -> PackedDeviations:
-        """Return the deviations for q, qd and qdd (S, n), as many samples at once as memory wants.
+    def packed(self, motion: Sequence[Numbers], with_sums: bool = True) -> PackedVariances:
+        """Return the variances for q, qd and qdd (S, n), as many samples at once as memory wants.
 
         with_sums: whether sums over the links by cause are wanted; else they are left out, (S, 0)
         """
@@ -84,9 +87,30 @@ class ShareDeviations:
             return self._piece(motion, with_sums)
         starts = range(0, samples, size)
         pieces = [self._piece([a[at : at + size] for a in motion], with_sums) for at in starts]
-        return PackedDeviations(*(self._backend.xp.concat(some, 0) for some in zip(*pieces, strict=True)))
+        return PackedVariances(*(self._backend.xp.concat(some, 0) for some in zip(*pieces, strict=True)))
 
-    def _piece(self, motion: Sequence[Numbers], with_sums: bool) -> PackedDeviations:
+    def _piece(self, motion: Sequence[Numbers], with_sums: bool) -> PackedVariances:
+        known, (q, qd, qdd) = None, motion
+        if not self._spread.shared.shape[-1]:
+            known = self._backend.share_variances(q, qd, qdd, self._triangles)
+        variances = self._by_rows(motion, with_sums) if known is None else self._summed(known, with_sums)
+        for changes in self._changes(q, qd, qdd, with_sums):
+            variances = [a + b**2 for a, b in zip(variances, changes, strict=True)]
+        nothing = self._backend.zeros(q, 0)
+        return PackedVariances(*variances, *([] if with_sums else [nothing] * 3))
+
+    def _summed(self, shares: Sequence[Numbers], with_sums: bool) -> list[Numbers]:
+        """Return variances of shares, then of their sums over links, whose errors are independent."""
+        c2, c1, g, tau = shares
+        tables = self._tables
+        sums = [tables.sum_over_links(tau)]
+        if with_sums:
+            sums += [tables.matrices(c2, "acceleration"), tables.matrices(c1, "velocity")]
+            sums.append(tables.sum_over_links(g))
+        return [*shares, *sums]
+
+    def _by_rows(self, motion: Sequence[Numbers], with_sums: bool) -> list[Numbers]:
+        """Return the same from regressors, whatever the errors of links have in common."""
         xp, (q, qd, qdd) = self._backend.xp, motion
         flat = self._backend.coefficient_regressors(q, qd, 0.0 * q)
         counts = (len(getattr(self._layout, field)) for field in ("acceleration", "velocity", "gravity"))
@@ -103,20 +127,18 @@ class ShareDeviations:
             tau[j] = tau[j] + own.reshape(*own.shape[:-2], size, size, own.shape[-1]).sum(-2)
         torque = xp.concat(tau, -2)
         variances = [self._share_variance(rows, field) for rows, field in self._fields(c2, c1, g, torque)]
+        if not self._spread.shared.shape[-1]:
+            return self._summed(variances, with_sums)
         sums, matrices = self._tables.sum_over_links, self._tables.matrices
-        summed = [(torque, "torque", sums, variances[3])]
+        summed = [(torque, "torque", sums)]
         if with_sums:
             summed += [
-                (c2, "acceleration", partial(matrices, field="acceleration"), variances[0]),
-                (c1, "velocity", partial(matrices, field="velocity"), variances[1]),
-                (g, "gravity", sums, variances[2]),
+                (c2, "acceleration", partial(matrices, field="acceleration")),
+                (c1, "velocity", partial(matrices, field="velocity")),
+                (g, "gravity", sums),
             ]
         variances += [self._sum_variance(*one) for one in summed]
-        for changes in self._changes(q, qd, qdd, with_sums):
-            variances = [a + b**2 for a, b in zip(variances, changes, strict=True)]
-        nothing = self._backend.zeros(q, 0)
-        roots = [root(xp, variance) for variance in variances]
-        return PackedDeviations(*roots, *([] if with_sums else [nothing] * 3))
+        return variances
 
     def _changes(self, q: Numbers, qd: Numbers, qdd: Numbers, with_sums: bool) -> Iterator[list[Numbers]]:
         """Yield for each direction of joints' places what shares change by, in the order of answers."""
@@ -147,15 +169,8 @@ class ShareDeviations:
         """Return the variance of shares through one link, (S, count)."""
         return (self._mapped(rows, field, self._by_link) ** 2).sum(-1)
 
-    def _sum_variance(
-        self, rows: Numbers, field: str, sums: Callable[[Numbers], Numbers], shares: Numbers
-    ) -> Numbers:
-        """Return the variance of `sums` over the links, (S, ...), which takes values (..., count).
-
-        shares: the variance of shares through one link
-        """
-        if not self._spread.shared.shape[-1]:
-            return sums(shares)
+    def _sum_variance(self, rows: Numbers, field: str, sums: Callable[[Numbers], Numbers]) -> Numbers:
+        """Return the variance of `sums` over the links, (S, ...), which takes values (..., count)."""
         own = sums((self._mapped(rows, field, self._spread.own) ** 2).sum(-1))
         common = self._backend.xp.swapaxes(self._mapped(rows, field, self._spread.shared), -1, -2)
         return own + (sums(common) ** 2).sum(1)
@@ -165,8 +180,8 @@ class ShareDeviations:
         return self._tables.spread(values, field)
 
 
-def share_deviations(backend: ArrayBackend, bodies: object) -> ShareDeviations:
-    """Return the deviations of a robot on a back end that has regressors.
+def share_variances(backend: ArrayBackend, bodies: object) -> ShareVariances:
+    """Return the variances of a robot on a back end that has regressors.
 
     Raises TypeError for what is not `UncertainBodies`, ValueError as `body_spread` does.
     """
@@ -175,7 +190,7 @@ def share_deviations(backend: ArrayBackend, bodies: object) -> ShareDeviations:
     given = cast(UncertainBodies, bodies)
     try:
         shifts = length_shifts(cast(JointTree, backend.tree), given.lengths)
-        return ShareDeviations(backend, spread_of(backend, given), shifts)
+        return ShareVariances(backend, spread_of(backend, given), shifts)
     except ValueError as error:
         raise ValueError(f"bodies: {error}") from None
 
