@@ -11,9 +11,12 @@ from linkwise_runtime.structure import PassiveJoint
 from linkwise.arrays import Array
 from linkwise.check.compare import Entries, Result, compare, skipped
 from linkwise.check.sum_checks import is_tied, passive_reference, regular
+from linkwise.oracle.loop_reference import LoopReference
 from linkwise.oracle.reference import Reference
 from linkwise.oracle.states import States
 
+REGULAR = 1e-6
+"""Least eigenvalue of an inertia that is asked for, by its largest entry, where one is."""
 WIDTH = 0.5
 """Width `friction_width` of the friction that is compensated."""
 
@@ -44,6 +47,51 @@ def impedance_calls(
         kept = np.linspace(0.5, 1.5, links) if _are_masses(tree) else np.full(links, 0.7)
         entries += _shaped(model, joints, reference, positive, kept, natural)
     yield compare(f"{name}: controllers make the impedance that is asked for", entries, reference.tolerance)
+
+
+def tied_impedance_calls(
+    name: str, model: Dynamics, reference: LoopReference, natural: Callable[..., Any]
+) -> Iterator[Result]:
+    """Yield a check of a scaled impedance of tied joints, at states where it is positive.
+
+    natural: the package's `Natural`
+    """
+    kept = np.linspace(0.5, 1.5, len(model.link_names))
+    wanted = (kept[:, None] * reference.values["c2^"]).sum(2)
+    rows = np.flatnonzero(np.linalg.eigvalsh(wanted).min(-1) > REGULAR * np.abs(wanted).max((1, 2)))
+    told = f"{name}: controllers make the impedance that is asked for in closed loops"
+    if rows.size:
+        yield compare(told, _tied(model, reference, rows, kept, natural))
+    else:
+        yield skipped(told, "what is asked for is not positive at any state")
+
+
+def _tied(
+    model: Dynamics, reference: LoopReference, rows: Any, kept: Array, natural: Callable[..., Any]
+) -> Iterator[Entries]:
+    """Yield the sum of w_j (c2^ ydd + c1^ yd) = f^ of the acceleration, and the torque it needs.
+
+    kept: share w_j of each link, (N,)
+    """
+    own = list(reference.independent)
+    shares = natural(np.broadcast_to(kept, (len(model.joint_names), len(kept))))
+    controller = model.partial_impedance(inertia=shares, damping=shares, passive=False)
+    q, qd, force = (a[rows] for a in (reference.states.q, reference.states.qd, reference.tau))
+    qdd, tau = (
+        np.asarray(call(q, qd, None, force))[:, own] for call in (controller.acceleration, controller)
+    )
+    sources = reference.values, reference.scales
+    (mass, scale), (coriolis, size), (gravity, gravity_size), (push, push_size) = (
+        [source[what][rows] for source in sources] for what in ("c2^", "c1^", "g^", "projected")
+    )
+    yd, weight = qd[:, own], kept[:, None]
+    inertia, pull = (weight * mass).sum(2), push - _along((weight * coriolis).sum(2), yd)
+    wanted_size = _along((weight * scale).sum(2) + _eliminated(inertia), np.abs(qdd))
+    pull_size = push_size + _along((weight * size).sum(2), np.abs(yd))
+    yield Entries("M* ydd", _along(inertia, qdd), pull, wanted_size + pull_size)
+    taken = _along(mass.sum(2), qdd) + _along(coriolis.sum(2), yd) + gravity.sum(-1)
+    taken_size = _along(scale.sum(2), np.abs(qdd)) + _along(size.sum(2), np.abs(yd)) + gravity_size.sum(-1)
+    yield Entries("torque", tau + push, taken, taken_size + push_size)
 
 
 def _are_masses(tree: JointTree | None) -> bool:

@@ -10,7 +10,7 @@ from linkwise.check.compare import Result, skipped
 from linkwise.check.constraint_checks import loop_calls
 from linkwise.check.formula_texts import check_formulas
 from linkwise.check.frame_checks import frame_calls
-from linkwise.check.impedance_checks import impedance_calls
+from linkwise.check.impedance_checks import impedance_calls, tied_impedance_calls
 from linkwise.check.induced_checks import induced_calls
 from linkwise.check.model_calls import Named, against_reference, recorded_parts
 from linkwise.check.parametric_tree import check_bodies, check_numbers
@@ -171,6 +171,11 @@ def _controllers(name: str, a: BackendAnswers) -> Iterable[Result]:
     return impedance_calls(name, a.model, s.tree, s.passive, s.reference, s.package.module.Natural)
 
 
+def _tied_controllers(name: str, a: BackendAnswers) -> Iterable[Result]:
+    s = a.subject
+    return tied_impedance_calls(name, a.model, there(s.loops), s.package.module.Natural)
+
+
 CHECKS: tuple[Check[Any], ...] = (
     Check("hashes", GeneratedFiles, _always, check_files, needed=True),
     Check("texts", GeneratedFiles, _always, check_texts, needed=True),
@@ -199,6 +204,7 @@ CHECKS: tuple[Check[Any], ...] = (
     _called("frames", _of_frames, lambda name, a: frame_calls(name, a.model, there(a.subject.frames))),
     _called("reactions", _of_wrenches, _reactions),
     _called("constraints", _in_loops, lambda name, a: loop_calls(name, a.model, there(a.subject.loops))),
+    _called("controllers in loops", _in_loops, _tied_controllers),
     _called("contacts", _moving_on, _contacts),
     _called(
         "a simulated motion",
