@@ -293,9 +293,9 @@ def crowd(place, count=14):
     values = np.vstack([analysis.values[0], torques, torques])
     totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1))
     given = np.arange(1.0, count * count + 1).reshape(count, count)
-    work = Work(given, given.T)
+    works = {**analysis.works, "power_link": Work(given, given.T)}
     rows = ResultRows.of(robot, places)
-    made = replace(analysis, robot=robot, rows=rows, values=values, totals=totals, work=work)
+    made = replace(analysis, robot=robot, rows=rows, values=values, totals=totals, works=works)
     (place / "report.html").write_text(report(made), encoding="utf-8")
     return names, (place / "report.html").as_uri()
 

@@ -121,7 +121,7 @@ def crowd_of(joints: tuple[str, ...], analysis: Analysis) -> Analysis:
     robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * len(joints), tree=None)
     none = np.zeros((len(joints), len(joints)))
     totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1))
-    about: Any = {"robot": robot, "totals": totals, "work": Work(none, none), "total": 400}
+    about: Any = {"robot": robot, "totals": totals, "works": {"power_link": Work(none, none)}, "total": 400}
     return replace(analysis, rows=ResultRows.of(robot, places), values=np.array(values), **about)
 
 

@@ -81,7 +81,8 @@ def prepared(
         check_lengths(uncertain.bodies, "leave --induced, --reaction and --induced-power out")
     certain = [*(["payloads"] if robot.payloads else []), *(["traced velocities"] if traced else [])]
     inputs = uncertain_inputs(asked.uncertain, uncertain, raw, samples, processing, robot, borne, certain)
-    told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, inputs)
+    columns = () if outputs.tells_of_all or unfiltered is not None else outputs.columns
+    told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, inputs, columns)
     decomposer = Decomposer.of(robot, processing.convention, borne, times, told)
     if unfiltered is None:
         return Job(log.name, asked, samples, decomposer, closed, phases, inputs)

@@ -1,6 +1,6 @@
 """The result of an analysis: named arrays, and the record of how they were made."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -19,12 +19,17 @@ from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result_rows import Column, ResultRows
 from linkwise.analysis.settings import Processing, Reading
 from linkwise.analysis.verify import Closure
-from linkwise.arrays import Array
+from linkwise.arrays import Array, Index
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, printable
 
 PART_BYTES, LEAST = 4 << 20, 256
 """Approximate size in bytes of a part of a result, and its fewest samples."""
+
+
+def not_asked_for(quantities: Sequence[str]) -> LinkwiseError:
+    """Return an error that says which quantities were not computed."""
+    return LinkwiseError(f"not all columns of {listed(quantities)} were asked for; add them to columns")
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +59,8 @@ class WholeMovement:
     """Totals, work and errors over all samples of a movement; n joints, N links."""
 
     totals: Totals
-    work: Work
-    """Work that each joint gave to each link and took back, (n, N) in J."""
-    joint_work: Work
-    """Work that each joint gave in all and took back, (n,) in J: ∫ τ_i q̇_i dt where positive, negative."""
-    load_work: Work
-    """Work that each joint gave against each load and took back, (n, loads) in J."""
-    contact_work: Work
-    """Work that each contact fed into each link as its frame slipped, and took back, (N, contacts) in J."""
+    works: Mapping[str, Work]
+    """Work in J of joints, and of contacts, by the quantity that is its power, along its axes."""
     work_by_source: Mapping[str, Work]
     """Work that holders of energy gained by source and lost, and that flowed through joints and back, in J,
     by the quantity that is its power, along its axes; none unless power by source was asked for."""
@@ -74,6 +73,32 @@ class WholeMovement:
     """Torques at their largest magnitude, with their deviations there; none where nothing is uncertain."""
     cutoff_sweep: CutoffSweep | None
     """Sizes of torques at other cutoffs; None where they were not asked for."""
+
+    @property
+    def work(self) -> Work:
+        """Work that each joint gave to each link and took back, (n, N) in J."""
+        return self.work_of("power_link")
+
+    @property
+    def joint_work(self) -> Work:
+        """Work that each joint gave in all, ∫ τ_i q̇_i dt where positive, and took back, (n,) in J."""
+        return self.work_of("power")
+
+    @property
+    def load_work(self) -> Work:
+        """Work that each joint gave against each load and took back, (n, loads) in J."""
+        return self.work_of("power_load")
+
+    @property
+    def contact_work(self) -> Work:
+        """Work that each contact fed into each link as it slipped, and took back, (N, contacts) in J."""
+        return self.work_of("power_contact")
+
+    def work_of(self, power: str) -> Work:
+        """Return the work of a power; raise LinkwiseError where its columns were not asked for."""
+        if power not in self.works:
+            raise not_asked_for([power])
+        return self.works[power]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +117,10 @@ class AnalysisResult(WholeMovement):
     rate: float
     """Sampling rate in Hz."""
     rows: ResultRows
+    asked_columns: tuple[str, ...]
+    """Columns that were asked for, as they were written."""
+    told: Index
+    """Numbers of the rows of a table of the result."""
     values: Array
     loads: tuple[PlacedLoad, ...]
     induced: tuple[str, ...]
@@ -266,6 +295,12 @@ class AnalysisResult(WholeMovement):
             parts += map(printable, filter(None, [self.uncertain.get("note", ""), *self.signs.lines]))
         return " · ".join(parts)
 
+    def require(self, *quantities: str) -> None:
+        """Raise LinkwiseError where columns of these quantities were not asked for; of any unless given."""
+        missing = sorted(self.rows.left_out.intersection(quantities or self.rows.left_out))
+        if missing:
+            raise not_asked_for(missing)
+
     @property
     def constraint_force(self) -> Array:
         """Force in each row of the constraints, (S, C), in N or N·m; no column without constraints."""
@@ -291,7 +326,11 @@ class AnalysisResult(WholeMovement):
         return np.stack([ground.wrench(c, model, q, forces, press[:, c]) for c in each], axis=1)
 
     def dense(self, quantity: str) -> Array:
-        """Return a quantity (S, …) over its axes, zero where it has no row."""
+        """Return a quantity (S, …) over its axes, zero where it has no row.
+
+        Raises LinkwiseError where columns of it were not asked for.
+        """
+        self.require(quantity)
         return self.rows.dense(quantity, self.values)
 
     def is_ever_on(self, contact: int) -> bool:
