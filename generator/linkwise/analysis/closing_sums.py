@@ -41,7 +41,7 @@ class ClosingSums:
         self.of_unit = {
             unit: np.array([other == unit for other in own], np.bool_) for unit in dict.fromkeys(units)
         }
-        """Which sums are of joints of each unit."""
+        """True for the sums that are of joints of a unit, by unit."""
         self._wholes: Index = np.array([one.whole for one in self.sums], np.intp)
         most = len(self.sums[0].parts) if self.sums else 0
         self._parts = [self._numbered(number) for number in range(most)]

@@ -62,7 +62,7 @@ class PerturbedArrays(NamedTuple):
     places: Mapping[str, Some]
     """Rows of each, by quantity or factor."""
     borne: tuple[str, ...]
-    """Those that bodies perturb."""
+    """Arrays that bodies perturb."""
     products: Mapping[str, Product]
     """Torques by cause and powers, by quantity."""
 

@@ -1,9 +1,9 @@
 """A whole log, block by block: each is differentiated, decomposed, checked, summed up and handed on."""
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import repeat
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -38,8 +38,8 @@ CACHED = 2 << 20
 MOST_THREADS = 8
 """Most threads that compute: more of them would wait for Python's lock."""
 
-BLOCK_BYTES = 48 << 20
-"""Approximate size in bytes of a block handed on: some three of them are in memory at any time."""
+BLOCK_BYTES = 36 << 20
+"""Approximate size in bytes of a block handed on: some four of them are in memory at any time."""
 
 LEAST_SAMPLES = 2
 """Fewest samples of a range of time: one has no duration."""
@@ -73,6 +73,10 @@ def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
     return start, stop
 
 
+Filled = tuple[PartSums, Closure]
+"""Sums over a part of a block, and how well it closes."""
+
+
 @dataclass
 class Parts:
     """Fills parts of blocks, some samples each, whose values stay in the cache, on several threads.
@@ -94,9 +98,26 @@ class Parts:
         """Number of threads that fill parts: one where most of the work is Python's own, or a trace."""
         return min(worker_threads(), MOST_THREADS) if self.decomposer.is_quick else 1
 
-    def fill(self, block: Array, first: int, at: int, end: int) -> tuple[PartSums, Closure]:
-        """Fill samples at..end of a block (rows, samples) that begins at the sample `first`."""
-        own = block[:, at - first : end - first]
+    def blocks(self, pool: Executor, inner: int) -> Iterator[tuple[int, Array, Iterator[Filled]]]:
+        """Yield the first sample of each block, the block (rows, samples) and what its parts come to.
+
+        The next block is begun before, so that threads have work meanwhile.
+        inner: samples of a part
+        """
+        begun: list[tuple[int, Array, Iterator[Filled]]] = []
+        count = len(self.decomposer.rows)
+        for first, last in _blocks(*self.span, count, inner):
+            block = cast(Array, memory((count, last - first), np.dtype(np.float64)))
+            found = pool.map(partial(self.fill, block, first, inner), range(first, last, inner))
+            begun.append((first, block, found))
+            if len(begun) > 1:
+                yield begun.pop(0)
+        yield from begun
+
+    def fill(self, block: Array, first: int, inner: int, at: int) -> Filled:
+        """Fill a part of a block (rows, samples) that begins at `first`, from the sample `at` on."""
+        own = block[:, at - first : at - first + inner]
+        end = at + own.shape[1]
         with np.errstate(over="ignore", invalid="ignore"):
             closure = self._traced(own, at, end) if self.decomposer.traced else self._filled(own, at, end)
             return self.sums.of_part(own), closure
@@ -138,12 +159,10 @@ def stream(
     parts = Parts(samples, decomposer, processing, sums, (start, stop))
     with ThreadPoolExecutor(parts.threads) as pool, ThreadPoolExecutor(1) as writer:
         pending: Future[None] | None = None
-        for first, last in _blocks(start, stop, len(rows), inner):
-            block = cast(Array, memory((len(rows), last - first), np.dtype(np.float64)))
-            spans = [(at, min(at + inner, last)) for at in range(first, last, inner)]
-            found = pool.map(lambda span, *of: parts.fill(*of, *span), spans, repeat(block), repeat(first))
-            for (at, end), (own, closure) in zip(spans, found, strict=True):
-                part = block[:, at - first : end - first]
+        for first, block, found in parts.blocks(pool, inner):
+            last = first + block.shape[1]
+            for at, (own, closure) in zip(range(first, last, inner), found, strict=True):
+                part = block[:, at - first : at - first + inner]
                 if not sums.add(part, own, closure):
                     raise _overflow(samples, decomposer, part, at)
             looked = np.unique(np.linspace(0, last - first - 1, SAMPLES).astype(int))
@@ -153,6 +172,7 @@ def stream(
                 pending.result()
             pending = writer.submit(sink, block)
             let_go(samples.q)
+            let_go(samples.time)
             progress("analysing", last - start, stop - start)
         if pending is not None:
             pending.result()
