@@ -7,11 +7,13 @@ import numpy as np
 
 from linkwise.analysis.result_quantities import QUANTITIES
 from linkwise.analysis.result_rows import ResultRows
-from linkwise.analysis.turned_rows import TURNED, scratch
+from linkwise.analysis.turned_rows import scratch
 from linkwise.arrays import Array, Index
 
-SIZED = 16
-"""Samples of which the size of one is taken, against which errors are held."""
+SIZED = 32
+"""Samples of which the size is taken, against which errors are held."""
+NEXT_TO_NOTHING = 1e-12
+"""Errors that are a greater part of these sizes are held against those of all samples."""
 
 
 class Sum(NamedTuple):
@@ -53,21 +55,21 @@ class ClosingSums:
     def residuals(self, out: Array) -> tuple[Array, Array]:
         """Return the largest |Σ parts - whole| over samples, and the largest Σ |parts|, (sums,) each.
 
-        The latter is of every `SIZED`th sample, which makes a relative error no smaller.
+        The latter is over the first `SIZED` samples alone where all errors are next to nothing beside it.
 
         out: rows of a result, (rows, S)
         """
-        errors, sizes = np.zeros((2, len(self.sums)))
-        for at in range(0, out.shape[1], TURNED):
-            some = out[:, at : at + TURNED]
-            total = self._summed(some)
-            np.subtract(total, some[self._wholes], out=total)
-            np.maximum(errors, np.abs(total, out=total).max(axis=1), out=errors)
-        np.maximum(sizes, self._summed(np.abs(out[:, ::SIZED])).max(axis=1, initial=0.0), out=sizes)
+        total = self._summed(out)
+        np.subtract(total, out[self._wholes], out=total)
+        errors: Array = np.abs(total, out=total).max(axis=1, initial=0.0)
+        for count in (SIZED, out.shape[1]):
+            sizes: Array = self._summed(np.abs(out[:, :count])).max(axis=1, initial=0.0)
+            if (errors <= NEXT_TO_NOTHING * sizes).all():
+                break
         return errors, sizes
 
     def _summed(self, some: Array) -> Array:
-        """Return the sums of the parts (sums, S) of some samples."""
+        """Return the sums of the parts (sums, S) of some samples, in scratch memory."""
         total = scratch("total", len(self.sums), some.shape[1])
         total[:] = 0.0
         for rows in self._parts:
