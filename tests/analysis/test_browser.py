@@ -19,11 +19,11 @@ from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.request import Outputs, Request
-from linkwise.analysis.result import Totals, Work
 from linkwise.analysis.result_rows import Column, ResultRows, torque_places
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import report, stick_figure
 from linkwise.analysis.term_rows import term_rows
+from linkwise.analysis.whole_movement import Totals, Work
 from linkwise.progress import silent
 from selenium.webdriver.support.wait import WebDriverWait
 

@@ -19,11 +19,11 @@ from helpers.motion_logs import JOINTS, PLANAR3, write_csv
 from linkwise.analysis import Analysis, analyze
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.request import Outputs, Request
-from linkwise.analysis.result import Totals, Work
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show import figure_png
 from linkwise.analysis.show.page import report
+from linkwise.analysis.whole_movement import Totals, Work
 from linkwise.progress import silent
 from numpy.typing import NDArray
 from selenium.webdriver.support.wait import WebDriverWait

@@ -8,6 +8,7 @@ import numpy as np
 from linkwise.analysis.result_quantities import QUANTITIES
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.turned_rows import scratch
+from linkwise.analysis.verify import NO_ERRORS, Closure
 from linkwise.arrays import Array, Index
 
 SIZED = 32
@@ -75,3 +76,27 @@ class ClosingSums:
         for rows in self._parts:
             total[: len(rows)] += some[rows]
         return total
+
+
+def closing(
+    parts: ClosingSums, wholes: ClosingSums, out: Array, partial: Array, units: Sequence[str]
+) -> Closure:
+    """Return the largest errors of the closing sums of τ_ij and of τ_i, by unit.
+
+    A joint that carries only rounding is measured by its peers.
+
+    out: rows of a result, (rows, S); units: those of all joints
+    partial: tau_ij (S, n, N) before contacts carry any; what they leave may be only its rounding
+    """
+    worst = NO_ERRORS
+    before = np.abs(partial).sum(axis=-1).max(axis=0, initial=0.0)
+    found = [(sums, *sums.residuals(out)) for sums in (parts, wholes)]
+    for unit in wholes.of_unit:
+        least = max(size for size, other in zip(before, units, strict=True) if other == unit)
+        pairs = []
+        for sums, errors, sizes in found:
+            alike = sums.of_unit[unit]
+            error, size = errors[alike].max(initial=0.0), sizes[alike].max(initial=least)
+            pairs += [float(error), float(error / size if size else error)]
+        worst |= Closure(*pairs)
+    return worst

@@ -14,7 +14,7 @@ from linkwise.analysis.outputs import named_result, record, result_table
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.poles import pole_warnings
 from linkwise.analysis.request import Request
-from linkwise.analysis.result import AnalysisResult, WholeMovement
+from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_rows import Column
 from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import choices
@@ -23,6 +23,7 @@ from linkwise.analysis.stream import Sink, span_of, stream
 from linkwise.analysis.swept_log import SweptLog
 from linkwise.analysis.torques import Decomposer
 from linkwise.analysis.uncertain_inputs import UncertainInputs
+from linkwise.analysis.whole_movement import WholeMovement
 from linkwise.arrays import Array, Index
 from linkwise.errors import within
 from linkwise.escape import listed

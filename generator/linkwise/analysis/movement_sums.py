@@ -8,11 +8,11 @@ import numpy as np
 from linkwise.analysis.certain_signs import LargestTorques
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.phases import PlacedPhase
-from linkwise.analysis.result import Totals, WholeMovement, Work
 from linkwise.analysis.result_quantities import POWER_OF, WORK_BY_SOURCE
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.turned_rows import scratch
 from linkwise.analysis.verify import Closure
+from linkwise.analysis.whole_movement import Totals, WholeMovement, Work
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 

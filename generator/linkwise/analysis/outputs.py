@@ -14,11 +14,12 @@ from linkwise_runtime.version import VERSION
 
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.joint_causes import are_motions_whole, causes_of, sizes
-from linkwise.analysis.result import AnalysisResult, Work
+from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import POWER_OF, QUANTITIES, WORKS, ResultQuantity
 from linkwise.analysis.result_rows import Column
 from linkwise.analysis.settings import choices
 from linkwise.analysis.verify import SAMPLES
+from linkwise.analysis.whole_movement import Work
 from linkwise.arrays import Array
 from linkwise.extras import extra
 

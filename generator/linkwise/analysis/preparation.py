@@ -24,7 +24,8 @@ from linkwise.analysis.settings import Reading
 from linkwise.analysis.stated_bodies import check_lengths
 from linkwise.analysis.stream import span_of
 from linkwise.analysis.swept_log import SweptLog, before_filter
-from linkwise.analysis.torques import Decomposer, ToldBeside
+from linkwise.analysis.told_beside import ToldBeside
+from linkwise.analysis.torques import Decomposer
 from linkwise.analysis.traced_rows import TracedRows
 from linkwise.analysis.uncertain_file import read_uncertain
 from linkwise.analysis.uncertain_inputs import UncertainInputs, uncertain_inputs

@@ -15,12 +15,12 @@ from linkwise.analysis.even_time import TOLERANCE
 from linkwise.analysis.filtering import derivatives
 from linkwise.analysis.movement_sums import MovementSums, PartSums
 from linkwise.analysis.phases import PlacedPhase
-from linkwise.analysis.result import WholeMovement
 from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import Processing
 from linkwise.analysis.torques import Decomposer
 from linkwise.analysis.traced_rows import ExtendedBlock
 from linkwise.analysis.verify import SAMPLES, Closure
+from linkwise.analysis.whole_movement import WholeMovement
 from linkwise.analysis.worker_threads import worker_threads
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError

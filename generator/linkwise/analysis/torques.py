@@ -8,53 +8,31 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from linkwise_runtime.motion.tracer import TraceState
 
-from linkwise.analysis.borne_joints import BorneJoint, ReactionShares
+from linkwise.analysis.borne_joints import ReactionShares
 from linkwise.analysis.chosen_columns import chosen_rows
 from linkwise.analysis.closed_motion import reason_of
-from linkwise.analysis.closing_sums import ClosingSums
+from linkwise.analysis.closing_sums import ClosingSums, closing
 from linkwise.analysis.contacts.ground import Standing
 from linkwise.analysis.contacts.terms import ContactTerms
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.deviation_rows import DeviationRows
-from linkwise.analysis.induced_points import InducedPlan
 from linkwise.analysis.induced_power import PowerShares
 from linkwise.analysis.induced_shares import InducedShares
 from linkwise.analysis.loads.placed import LoadShift, PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.reaction_forces import ReactionForces
 from linkwise.analysis.result_quantities import PASSIVE, TERMS, TORQUE_OF
-from linkwise.analysis.result_rows import ResultRows, torque_places
+from linkwise.analysis.result_rows import Place, ResultRows, torque_places
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.term_rows import TermArrays, term_rows
+from linkwise.analysis.told_beside import NOTHING_BESIDE, ToldBeside
 from linkwise.analysis.traced_rows import ExtendedBlock, TracedRows
 from linkwise.analysis.turned_rows import spread
-from linkwise.analysis.uncertain_inputs import UncertainInputs
-from linkwise.analysis.verify import NO_ERRORS, Closure, against_recursion
+from linkwise.analysis.verify import Closure, against_recursion
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 
-
-class ToldBeside(NamedTuple):
-    """Choice of all that a result tells beside torques."""
-
-    power_terms: bool = False
-    """True to tell power by cause and order too."""
-    induced: InducedPlan = InducedPlan()
-    """Points whose acceleration is told by source."""
-    borne: Sequence[BorneJoint] = ()
-    """Joints whose whole wrench is told by cause."""
-    induced_power: bool = False
-    """True to tell by source the power of links, and that which flows through joints."""
-    traced: TracedRows | None = None
-    """Velocities that are traced to their sources."""
-    uncertain: UncertainInputs = UncertainInputs()
-    """Uncertainty of bodies, motion and loads."""
-    columns: Sequence[str] = ()
-    """Presets and patterns of the columns of torques that are computed; all where there are none."""
-
-
-NOTHING_BESIDE = ToldBeside()
 QUANTITY_OF = TermArrays("tau_qdd", "tau_qd", "tau_gravity", "tau_link")
 """Quantities of the kinds of terms."""
 
@@ -122,8 +100,8 @@ class Decomposer:
         every_place = torque_places(robot, of_robot, loads, told.power_terms, measured)
         chosen = chosen_rows(ResultRows.of(robot, every_place, loads), told.columns, told.power_terms)
         places, points = [every_place[row] for row in chosen.tolist()], told.induced.points
-        kept = frozenset(places)
-        left_out = frozenset(name for name, at in every_place if (name, at) not in kept)
+        left_out = frozenset(name for name, _ in {*every_place} - {*places})
+        sources = _sources(of_robot, places)
         induced = InducedShares.of(robot, told.induced, ResultRows.of(robot, places, loads))
         reactions = ReactionShares(robot, tuple(told.borne), tuple(loads), convention)
         traced = told.traced
@@ -133,12 +111,6 @@ class Decomposer:
         velocities = [at for at in places if at[0] == "tau_qd"]
         every = [*places, *power.places, *reactions.places]
         every += [] if traced is None else traced.places(velocities)
-        sources = TermArrays(
-            *(
-                np.array([row[-1] for row in some if (name, row[:-1]) in kept], np.intp)
-                for name, some in zip(QUANTITY_OF, of_robot, strict=True)
-            )
-        )
         deviations = DeviationRows(robot, told.uncertain, convention, sources)
         every += deviations.places(every)
         bearings, origins = [joint.name for joint in told.borne], () if traced is None else traced.origins
@@ -215,7 +187,7 @@ class Decomposer:
             values = getattr(packed, kind, None)
             spread(out, rows[name].rows, values, places, (moved, rows[name].at[:, 2]))
         if self.whole is None:
-            closure |= self._closure(out, partial)
+            closure |= closing(self.parts, self.wholes, out, partial, self.robot.units)
         if self.convention == "gradient" and "tau_qd" in rows:
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
             rows.put(out, "tau_qd", _left(standing, velocity))
@@ -363,25 +335,15 @@ class Decomposer:
         for e in range(torque.shape[2]):
             out[rows] += torque[:, at[:, 0], e].T
 
-    def _closure(self, out: Array, partial: Array) -> Closure:
-        """Return the largest errors of the closing sums, by unit.
 
-        A joint that carries only rounding is measured by its peers.
-
-        partial: tau_ij (S, n, N) before contacts carry any; what they leave may be only its rounding
-        """
-        worst, units = NO_ERRORS, self.robot.units
-        before = np.abs(partial).sum(axis=-1).max(axis=0, initial=0.0)
-        found = [(sums, *sums.residuals(out)) for sums in (self.parts, self.wholes)]
-        for unit in self.wholes.of_unit:
-            least = max(size for size, other in zip(before, units, strict=True) if other == unit)
-            pairs = []
-            for sums, errors, sizes in found:
-                alike = sums.of_unit[unit]
-                error, size = errors[alike].max(initial=0.0), sizes[alike].max(initial=least)
-                pairs += [float(error), float(error / size if size else error)]
-            worst |= Closure(*pairs)
-        return worst
+def _sources(terms: TermArrays, places: Sequence[Place]) -> TermArrays:
+    """Return the places among packed values of the terms that have rows, in the order of rows, by kind."""
+    kept = frozenset(places)
+    found = (
+        np.array([row[-1] for row in some if (name, row[:-1]) in kept], np.intp)
+        for name, some in zip(QUANTITY_OF, terms, strict=True)
+    )
+    return TermArrays(*found)
 
 
 def _left(standing: Standing | None, torque: Array) -> Array:
