@@ -157,7 +157,8 @@ def stream(
     (start, stop), rows = span_of(samples, processing), decomposer.rows
     sums, inner = MovementSums(rows, decomposer.robot, phases), _at_once(decomposer)
     parts = Parts(samples, decomposer, processing, sums, (start, stop))
-    with ThreadPoolExecutor(parts.threads) as pool, ThreadPoolExecutor(1) as writer:
+    quiet = np.errstate(over="ignore", invalid="ignore")
+    with ThreadPoolExecutor(parts.threads) as pool, ThreadPoolExecutor(1) as writer, quiet:
         pending: Future[None] | None = None
         for first, block, found in parts.blocks(pool, inner):
             last = first + block.shape[1]
