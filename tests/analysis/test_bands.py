@@ -11,12 +11,12 @@ import pytest
 from helpers.motion_logs import PLANAR3, smooth, write_csv
 from linkwise.analysis import Analysis, analyze
 from linkwise.analysis.load_robot import load_robot
-from linkwise.analysis.result import Totals
 from linkwise.analysis.result_quantities import QUANTITIES
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.show.bands import FAINT
 from linkwise.analysis.show.page import page_data
 from linkwise.analysis.show.page_certainty import assumptions
+from linkwise.analysis.whole_movement import Totals
 from linkwise_runtime.certainty.uncertain_bodies import UncertainBodies
 
 FILE = 'schema = 1\n[all]\nmass = "10 %"\ncentre = "30 mm"\nradii = "20 %"\n'

@@ -19,11 +19,11 @@ from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.request import Outputs, Request
-from linkwise.analysis.result import Totals, Work
 from linkwise.analysis.result_rows import Column, ResultRows, torque_places
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show.page import report, stick_figure
 from linkwise.analysis.term_rows import term_rows
+from linkwise.analysis.whole_movement import Totals, Work
 from linkwise.progress import silent
 from selenium.webdriver.support.wait import WebDriverWait
 
@@ -293,9 +293,9 @@ def crowd(place, count=14):
     values = np.vstack([analysis.values[0], torques, torques])
     totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1))
     given = np.arange(1.0, count * count + 1).reshape(count, count)
-    work = Work(given, given.T)
+    works = {**analysis.works, "power_link": Work(given, given.T)}
     rows = ResultRows.of(robot, places)
-    made = replace(analysis, robot=robot, rows=rows, values=values, totals=totals, work=work)
+    made = replace(analysis, robot=robot, rows=rows, values=values, totals=totals, works=works)
     (place / "report.html").write_text(report(made), encoding="utf-8")
     return names, (place / "report.html").as_uri()
 

@@ -19,11 +19,11 @@ from helpers.motion_logs import JOINTS, PLANAR3, write_csv
 from linkwise.analysis import Analysis, analyze
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.request import Outputs, Request
-from linkwise.analysis.result import Totals, Work
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show import figure_png
 from linkwise.analysis.show.page import report
+from linkwise.analysis.whole_movement import Totals, Work
 from linkwise.progress import silent
 from numpy.typing import NDArray
 from selenium.webdriver.support.wait import WebDriverWait
@@ -121,7 +121,7 @@ def crowd_of(joints: tuple[str, ...], analysis: Analysis) -> Analysis:
     robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * len(joints), tree=None)
     none = np.zeros((len(joints), len(joints)))
     totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1))
-    about: Any = {"robot": robot, "totals": totals, "work": Work(none, none), "total": 400}
+    about: Any = {"robot": robot, "totals": totals, "works": {"power_link": Work(none, none)}, "total": 400}
     return replace(analysis, rows=ResultRows.of(robot, places), values=np.array(values), **about)
 
 

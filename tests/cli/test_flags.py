@@ -40,6 +40,7 @@ ANALYSIS: dict[str, Any] = {
     "from_time": 0.5,
     "to_time": 1.5,
     "phase": ("stance=push",),
+    "columns": ("sums", "tau/*/*"),
     "power_terms": True,
     "payload": ("hand=2",),
     "load": ("hand=1,2,3",),
@@ -91,6 +92,7 @@ WRITTEN = AnalysisChoices(
     Processing("savitzky-golay", 9, 3, SMOOTHED, "trim", "gradient", 0.5, 1.5),
     Outputs(
         phases=(Phase("stance", "", "push", None),),
+        columns=("sums", "tau/*/*"),
         power_terms=True,
         induced=("joints",),
         induced_whole=True,

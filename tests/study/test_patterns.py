@@ -2,8 +2,9 @@
 
 import pytest
 from linkwise import LinkwiseError
+from linkwise.analysis.column_patterns import fitting
 from linkwise.own_process import ProcessLimits, in_own_process
-from linkwise.study.patterns import FieldedPath, fitting
+from linkwise.study.patterns import FieldedPath
 
 NAMES = ["tau/knee", "tau/knee/foot", "q/knee", "a" * 60, "a/" * 30]
 

@@ -123,10 +123,11 @@ class DeviationRows:
         motion: q, qd and qdd (S, n) in which ties close
         """
         rows = plain.rows
-        if not any(name in rows for name in DEVIATION_OF):
+        if self.uncertain.stated is None or not any(name in rows for name in DEVIATION_OF):
             return
         exact = {} if self._exact is None else self._of_bodies(self._exact, plain, motion)
         arrays = self._perturbed(rows, frozenset(exact))
+        exact = {name: deviations for name, deviations in exact.items() if name in arrays.places}
         for at in range(0, len(time), AT_ONCE):
             some = slice(at, at + AT_ONCE)
             q, qd, qdd = motion

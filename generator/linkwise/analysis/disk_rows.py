@@ -100,10 +100,6 @@ def let_go(rows: Array) -> None:
         behind.madvise(mmap.MADV_DONTNEED)  # of a shared file, so that what was written stays
 
 
-def first_column(rows: Array) -> Array:
-    """Return a copy of the first column of rows that may be in a file."""
-    column = np.empty(len(rows))
-    for at in range(0, len(rows), AT_ONCE):
-        column[at : at + AT_ONCE] = rows[at : at + AT_ONCE, 0]
-        let_go(rows)
-    return column
+def first_column(rows: Array, directory: Path | None) -> Array:
+    """Return a copy (any,) of the first column of rows that may be in a file, in memory or in a file."""
+    return copied(rows[:, :1], directory)[:, 0]

@@ -1,10 +1,12 @@
 """Even sampling: a check of a log's times, up to the digits they are written in, and resampling."""
 
+from bisect import bisect_left
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.disk_rows import let_go
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
@@ -23,25 +25,33 @@ next, so what is cut away is below 2⁻⁶⁴ of the signal."""
 EXTREME = 1e100
 """Limit of times in s and of rates in Hz: no clock shows it, and what is computed from it overflows."""
 
+AT_ONCE = 1 << 18
+"""Samples that are looked at at once."""
+MOST_STEPS = 1 << 20
+"""About so many steps, evenly spread, make the usual one."""
+
 MOST = 100
 """Largest ratio of a wanted rate to the log's own that is plausible, and not a slip of the finger."""
 
 
 def usual_step(time: Array, first_row: int, gap: float = GAP) -> float:
-    """Return the median step in s of `time` (S,), two samples or more.
+    """Return the median step in s of `time` (S,), two samples or more, or that of some million steps.
 
     first_row: number in the log of the first sample's row
 
     Raises LinkwiseError that names the rows for time that does not increase, and for steps longer than `gap`
     usual ones; also for times beyond EXTREME.
     """
-    if (largest := max(-time.min(), time.max())) > EXTREME:
+    largest = max(float(np.abs(some).max()) for _, some in _parts(time))
+    if largest > EXTREME:
         raise LinkwiseError(f"time column: it comes to {largest:.3g} s; give seconds")
-    steps = np.diff(time)
-    _refuse_backwards(time, steps, first_row)
-    worst = int(np.argmax(steps))
-    longest = steps[worst]
-    usual = float(np.median(steps, overwrite_input=True))  # a log may be long, and a copy too much
+    every, worst, longest, some_steps = -(-len(time) // MOST_STEPS), 0, 0.0, []
+    for at, steps in _steps(time):
+        _refuse_backwards(time, at, steps, first_row)
+        if (most := float(steps.max())) > longest:
+            worst, longest = at + int(np.argmax(steps)), most
+        some_steps.append(steps[::every])
+    usual = float(np.median(np.concatenate(some_steps)))
     if longest > gap * usual:
         raise LinkwiseError(
             f"rows {first_row + worst} to {first_row + worst + 1}, time column: a gap of"
@@ -67,14 +77,15 @@ def even_rate(
     mean = (time[-1] - time[0]) / (len(time) - 1)
     if mean < 1 / EXTREME:
         raise LinkwiseError(f"time column: steps of {mean:.3g} s; give seconds")
-    off = np.diff(time)
-    off -= mean
-    np.abs(off, out=off)
-    if strict and off.max() > TOLERANCE * mean:
+    at, off = 0, 0.0
+    for start, steps in _steps(time):
+        away = np.abs(steps - mean)
+        if (most := float(away.max())) > off:
+            at, off = start + int(np.argmax(away)), most
+    if strict and off > TOLERANCE * mean:
         step = _rounded_step(time)
         if step is not None:
             return 1 / step
-        at = int(np.argmax(off))
         worst = time[at + 1] - time[at]
         if worst > GAP * usual:
             raise LinkwiseError(
@@ -106,11 +117,25 @@ def _splined(spline: Any, window: Array, at: Array) -> Array:
     return values
 
 
-def _refuse_backwards(time: Array, steps: Array, first_row: int) -> None:
+def _parts(time: Array) -> Iterator[tuple[int, Array]]:
+    """Yield the number of the first sample of each part of `time` (S,), and a copy of the part."""
+    for at in range(0, len(time), AT_ONCE):
+        yield at, np.array(time[at : at + AT_ONCE])
+        let_go(time)
+
+
+def _steps(time: Array) -> Iterator[tuple[int, Array]]:
+    """Yield the number of the first sample of each part of `time` (S,), and the steps from its samples on."""
+    for at in range(0, len(time) - 1, AT_ONCE):
+        yield at, np.diff(time[at : at + AT_ONCE + 1])
+        let_go(time)
+
+
+def _refuse_backwards(time: Array, start: int, steps: Array, first_row: int) -> None:
     if steps.min() > 0:
         return
-    at = int(np.argmax(steps <= 0))
-    what = "repeats" if steps[at] == 0 else "runs back to"
+    at = start + int(np.argmax(steps <= 0))
+    what = "repeats" if steps[at - start] == 0 else "runs back to"
     raise LinkwiseError(
         f"row {first_row + at + 1}, time column: time {what} {time[at + 1]:.12g} s; sort the rows"
         " and keep one for each time"
@@ -123,13 +148,22 @@ def _rounded_step(time: Array) -> float | None:
     60 Hz in milliseconds has steps of 16 and 17 ms, and that is even time. Digits coarser than a third
     of a step would explain too much to count.
     """
-    at = np.arange(len(time))
-    step, start = np.polyfit(at, time - time[0], 1)
-    off = np.ptp(time - time[0] - start - step * at)
+    middle, first = (len(time) - 1) / 2, float(time[0])
+    numbers = np.arange(min(len(time), AT_ONCE)) - middle
+    slopes = sum(float((numbers[: len(some)] + at) @ (some - first)) for at, some in _parts(time))
+    step = slopes / (len(time) * (len(time) ** 2 - 1) / 12)  # by least squares
+    ends = np.array([_ends(some - first - step * (numbers[: len(some)] + at)) for at, some in _parts(time)])
+    off = float(ends[:, 1].max() - ends[:, 0].min())
     for digit in 10.0 ** -np.arange(10):
-        if digit < step / 3 and np.abs(time - np.round(time / digit) * digit).max() < 1e-3 * digit:
-            return float(step) if off < 1.1 * digit else None
+        if digit < step / 3 and all(
+            np.abs(some - np.round(some / digit) * digit).max() < 1e-3 * digit for _, some in _parts(time)
+        ):
+            return step if off < 1.1 * digit else None
     return None
+
+
+def _ends(values: Array) -> tuple[float, float]:
+    return float(values.min()), float(values.max())
 
 
 def resampled(samples: Array, rate: float, rows: int = 65536, progress: Progress = silent) -> Iterator[Array]:
@@ -151,9 +185,11 @@ def resampled(samples: Array, rate: float, rows: int = 65536, progress: Progress
         raise LinkwiseError(f"{len(samples)} samples give {count} at {rate:g} Hz; 5 or more are needed")
     for start in range(0, count, rows):
         at = time[0] + np.arange(start, min(start + rows, count)) / rate
-        low = max(0, int(np.searchsorted(time, at[0])) - OVERLAP)
-        high = min(len(time), int(np.searchsorted(time, at[-1])) + OVERLAP)
+        # Not by NumPy's search, which copies times that do not follow each other in memory.
+        low = max(0, bisect_left(time, at[0]) - OVERLAP)
+        high = min(len(time), bisect_left(time, at[-1]) + OVERLAP)
         window = np.asarray(samples[low:high])
         values = _splined(spline, window, np.minimum(at, time[-1]))
+        let_go(samples)
         yield np.column_stack([at, values])
         progress("resampling", start + len(at), count)

@@ -28,7 +28,7 @@ from linkwise.analysis.loads.placed import PlacedLoad, moving_joints
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.term_rows import NAMES, TermArrays, mirrored
-from linkwise.analysis.verify import Closure, worst_of
+from linkwise.analysis.verify import NO_ERRORS, Closure, worst_of
 from linkwise.arrays import Array, Mask
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
@@ -135,7 +135,7 @@ class PowerShares:
 
         The torques of `out` must be filled already. packed: values of the robot's model
         """
-        worst = Closure()
+        worst = NO_ERRORS
         step = max(1, AT_ONCE // max(1, len(self.every) * (len(self.robot.holders) + len(self.robot.joints))))
         for at in range(0, len(time), step) if self.is_asked else ():
             some = slice(at, at + step)

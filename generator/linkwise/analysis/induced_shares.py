@@ -15,7 +15,7 @@ from linkwise.analysis.induced_sources import AT_ONCE, InducedSources, timed
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.term_rows import NAMES, TermArrays
-from linkwise.analysis.verify import Closure, worst_of
+from linkwise.analysis.verify import NO_ERRORS, Closure, worst_of
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 
@@ -58,7 +58,7 @@ class InducedShares:
 
         The torques of `out` must be filled already. packed: values of the robot's model
         """
-        worst = Closure()
+        worst = NO_ERRORS
         numbers = max(1, len(self.sources.places) * q.shape[1])
         step = max(1, AT_ONCE // numbers)
         for at in range(0, len(q), step) if self.points else ():

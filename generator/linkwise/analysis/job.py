@@ -2,17 +2,19 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from linkwise_runtime.motion.induced_power import fed_by_couplings
 
+from linkwise.analysis.chosen_columns import chosen_rows
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.cutoff_sweep import RowSizes
 from linkwise.analysis.outputs import named_result, record, result_table
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.poles import pole_warnings
 from linkwise.analysis.request import Request
-from linkwise.analysis.result import AnalysisResult, WholeMovement
+from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_rows import Column
 from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import choices
@@ -21,7 +23,8 @@ from linkwise.analysis.stream import Sink, span_of, stream
 from linkwise.analysis.swept_log import SweptLog
 from linkwise.analysis.torques import Decomposer
 from linkwise.analysis.uncertain_inputs import UncertainInputs
-from linkwise.arrays import Array
+from linkwise.analysis.whole_movement import WholeMovement
+from linkwise.arrays import Array, Index
 from linkwise.errors import within
 from linkwise.escape import listed
 from linkwise.extras import extra
@@ -116,12 +119,24 @@ class Job:
             "trace": None if self.decomposer.traced is None else self.decomposer.traced.record(),
             "reactions": [joint.name for joint in self.decomposer.reactions.borne],
             "uncertain": self.uncertain.record(),
+            "asked_columns": self.asked.outputs.columns or ["all"],
         }
+
+    @cached_property
+    def told(self) -> Index:
+        """Numbers of the rows of a block that a table has: of those that were computed, those asked for."""
+        outputs = self.asked.outputs
+        return chosen_rows(self.decomposer.rows, outputs.columns, outputs.power_terms)
+
+    def table_rows(self, block: Array) -> Array:
+        """Return the rows of a block (rows, samples) that a table has."""
+        return block if len(self.told) == len(block) else block[self.told]
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """Columns of the result, with names and units."""
-        return self.decomposer.rows.columns
+        """Columns of a table of the result, with names and units."""
+        every = self.decomposer.rows.columns
+        return tuple(every[row] for row in self.told.tolist())
 
     @property
     def analysed(self) -> Samples:
@@ -157,6 +172,8 @@ class Job:
             source=self.source,
             rate=self.samples.rate,
             rows=self.decomposer.rows,
+            asked_columns=self.asked.outputs.columns or ("all",),
+            told=self.told,
             values=values,
             loads=self.decomposer.loads,
             induced=tuple(point.name for point in self.decomposer.rows.points),

@@ -14,10 +14,12 @@ from linkwise_runtime.version import VERSION
 
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.joint_causes import are_motions_whole, causes_of, sizes
-from linkwise.analysis.result import AnalysisResult, Work
+from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import POWER_OF, QUANTITIES, WORKS, ResultQuantity
 from linkwise.analysis.result_rows import Column
 from linkwise.analysis.settings import choices
+from linkwise.analysis.verify import SAMPLES
+from linkwise.analysis.whole_movement import Work
 from linkwise.arrays import Array
 from linkwise.extras import extra
 
@@ -67,6 +69,8 @@ def _metadata(column: Column) -> dict[str, str]:
 
 SCHEMA = 2
 """Version of the record's fields."""
+CLOSED_AT_FEW = f"{SAMPLES} samples of each block, all terms computed there"
+"""Samples at which sums close, where columns that were not asked for are computed of these alone."""
 
 
 def record(result: AnalysisResult) -> dict[str, Any]:
@@ -93,22 +97,26 @@ def record(result: AnalysisResult) -> dict[str, Any]:
         **({} if result.traced is None else {"trace": dict(result.traced)}),
         **({} if result.uncertain is None else {"uncertain": {**result.uncertain, **result.signs.record()}}),
         **({} if result.cutoff_sweep is None else {"cutoff_sweep": result.cutoff_sweep.record()}),
+        "asked_columns": list(result.asked_columns),
         "closure": asdict(result.closure),
+        "closure_is_of": CLOSED_AT_FEW if result.rows.left_out else "every sample",
         **({} if result.closed is None else {"constraints": _constraints(result, result.closed)}),
         **({} if robot.contacts is None else {"contacts": _contacts(result)}),
         "work": _work(result),
         "ignored_columns": list(result.ignored),
         "warnings": [*result.warnings, *result.load_warnings],
-        "columns": [
-            {
-                "name": column.name,
-                "unit": column.unit,
-                "meaning": QUANTITIES[column.quantity].meaning,
-                "mean_magnitude": float(mean),
-                "peak_magnitude": float(peak),
-            }
-            for column, mean, peak in zip(result.columns, result.totals.mean, result.totals.peak, strict=True)
-        ],
+        "columns": [_told_column(result, row) for row in result.told.tolist()],
+    }
+
+
+def _told_column(result: AnalysisResult, row: int) -> dict[str, Any]:
+    column = result.columns[row]
+    return {
+        "name": column.name,
+        "unit": column.unit,
+        "meaning": QUANTITIES[column.quantity].meaning,
+        "mean_magnitude": float(result.totals.mean[row]),
+        "peak_magnitude": float(result.totals.peak[row]),
     }
 
 
@@ -140,8 +148,7 @@ def _work(result: AnalysisResult) -> dict[str, Any]:
     Work of contacts is added where there are any, and that by source where it was asked for. Phases that were
     asked for have the same each.
     """
-    whole = {POWER_OF[name]: getattr(result, name) for name in WORK_KEYS} | dict(result.work_by_source)
-    found = {"unit": "J", **_work_of(result, whole)}
+    found = {"unit": "J", **_work_of(result, {**result.works, **result.work_by_source})}
     if result.phases:
         in_phases = zip(result.phases, result.work_in_phases, strict=True)
         found["in_phases"] = [{"phase": phase.told, **_work_of(result, works)} for phase, works in in_phases]
@@ -195,7 +202,7 @@ def named_result(result: AnalysisResult) -> Any:
 def _works(result: AnalysisResult) -> Iterator[Part]:
     """Yield the work that was given and the work that was taken back, over the whole movement."""
     for name, quantity in WORKS.items():
-        if all(result.rows.axes[axis].names for axis in quantity.axes):
+        if POWER_OF[name] in result.works and all(result.rows.axes[axis].names for axis in quantity.axes):
             for way in ("given", "taken"):
                 yield quantity._replace(beside=("way", way)), getattr(getattr(result, name), way)
 
@@ -216,28 +223,32 @@ HEAD = ("joint", "peak |τ|", "mean |τ|", "largest cause", "its share", "gave",
 def result_table(result: AnalysisResult) -> str:
     """Return the HTML of a result; peaks, means, shares and work are over all samples of the movement.
 
-    Causes and shares are those of `--figure shares`.
+    Causes and shares are those of `--figure shares`. What was not asked for is left out.
     """
     joints, torques = result.robot.joints, result.rows["tau"].rows
     mean, peak = result.totals.mean[torques], result.totals.peak[torques]
-    causes = causes_of(result, joints, together=are_motions_whole(result))
+    told = [0, *([] if "tau" in result.rows.left_out else [1, 2])]
+    told += [3, 4] if not result.rows.left_out else []
+    told += [5, 6] if "power" in result.works else []
+    causes = causes_of(result, joints, together=are_motions_whole(result)) if 3 in told else ()
     rows = []
-    for at, (i, loading) in enumerate(zip(result.robot.driven, sizes(result, causes).T, strict=True)):
+    loads = sizes(result, causes).T if causes else np.zeros((len(result.robot.driven), 0))
+    for at, (i, loading) in enumerate(zip(result.robot.driven, loads, strict=True)):
         unit = result.robot.torque_units[i]
-        most, whole = int(loading.argmax()), float(loading.sum())
-        rows.append(
-            (
-                joints[i],
-                f"{peak[at]:.4g} {unit}",
-                f"{mean[at]:.4g} {unit}",
-                causes[most].label if whole else "",
-                f"{100 * loading[most] / whole:.0f} %" if whole else "",
-                *_told(result.joint_work, i),
-            )
-        )
+        cells = {0: joints[i]}
+        if 1 in told:
+            cells |= {1: f"{peak[at]:.4g} {unit}", 2: f"{mean[at]:.4g} {unit}"}
+        if 3 in told:
+            most, whole = int(loading.argmax()), float(loading.sum())
+            cells[3] = causes[most].label if whole else ""
+            cells[4] = f"{100 * loading[most] / whole:.0f} %" if whole else ""
+        if 5 in told:
+            cells[5], cells[6] = _told(result.joint_work, i)
+        rows.append(tuple(cells.values()))
     title = f"{result.robot.name}: who loads whom in {result.source}"
     warnings = (*result.warnings, *result.load_warnings)
-    return page_part(title, table(HEAD, rows)) + remark(result.provenance, *warnings)
+    head = tuple(HEAD[at] for at in told)
+    return page_part(title, table(head, rows)) + remark(result.provenance, *warnings)
 
 
 def _told(work: Work, joint: int) -> tuple[str, str]:

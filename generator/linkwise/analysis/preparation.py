@@ -24,7 +24,8 @@ from linkwise.analysis.settings import Reading
 from linkwise.analysis.stated_bodies import check_lengths
 from linkwise.analysis.stream import span_of
 from linkwise.analysis.swept_log import SweptLog, before_filter
-from linkwise.analysis.torques import Decomposer, ToldBeside
+from linkwise.analysis.told_beside import ToldBeside
+from linkwise.analysis.torques import Decomposer
 from linkwise.analysis.traced_rows import TracedRows
 from linkwise.analysis.uncertain_file import read_uncertain
 from linkwise.analysis.uncertain_inputs import UncertainInputs, uncertain_inputs
@@ -81,7 +82,8 @@ def prepared(
         check_lengths(uncertain.bodies, "leave --induced, --reaction and --induced-power out")
     certain = [*(["payloads"] if robot.payloads else []), *(["traced velocities"] if traced else [])]
     inputs = uncertain_inputs(asked.uncertain, uncertain, raw, samples, processing, robot, borne, certain)
-    told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, inputs)
+    columns = () if outputs.tells_of_all or unfiltered is not None else outputs.columns
+    told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, inputs, columns)
     decomposer = Decomposer.of(robot, processing.convention, borne, times, told)
     if unfiltered is None:
         return Job(log.name, asked, samples, decomposer, closed, phases, inputs)

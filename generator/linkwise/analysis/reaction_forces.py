@@ -13,7 +13,7 @@ from linkwise.analysis.contacts.ground import Standing
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
-from linkwise.analysis.result_quantities import FORCE_OF, PASSIVE
+from linkwise.analysis.result_quantities import FORCE_OF, FORCES, GROUND, PASSIVE
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.arrays import Array
 
@@ -42,7 +42,7 @@ class ReactionForces:
 
         partial: tau_ij (S, n, N), of which contacts carry a part
         """
-        if not self.robot.constraint_rows:
+        if not rows.named.intersection((*FORCES, *GROUND)):
             return
         by_link = self._by_link(standing, motion, partial)
         beside = self._beside(standing, time, motion)

@@ -35,6 +35,12 @@ class Outputs:
         metavar="NAME/REST=WHAT",
         read=lambda texts: tuple(map(Phase.of, texts)),
     )
+    columns: tuple[str, ...] = option(
+        (),
+        "Columns that are computed and written: all; sums, those of joints; causes, with torques by cause; or"
+        " names, * standing for anything in a part of one, ** for any parts; may be repeated",
+        metavar="WHICH",
+    )
     power_terms: bool = option(False, "Write power by cause and order too")
     """True to add power by cause and order: as many columns again as torques have."""
     induced: tuple[str, ...] = option(
@@ -67,6 +73,12 @@ class Outputs:
         metavar="JOINT[,AXES]",
     )
     trace: TraceChoices = field(default_factory=TraceChoices)
+
+    @property
+    def tells_of_all(self) -> bool:
+        """True if something else is told that is made of all torques: figures, the page, other sources."""
+        figures = self.page, self.figures, self.induced, self.induced_power, self.trace.joints
+        return any(figures)
 
     def __post_init__(self) -> None:
         for flag, given, needed, there in (

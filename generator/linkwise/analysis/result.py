@@ -8,72 +8,22 @@ import numpy as np
 from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.analysis.borne_joints import BorneJoint
-from linkwise.analysis.certain_signs import CertainSigns, LargestTorque
+from linkwise.analysis.certain_signs import CertainSigns
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.contacts.times import ContactTimes
-from linkwise.analysis.cutoff_sweep import CutoffSweep
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result_rows import Column, ResultRows
 from linkwise.analysis.settings import Processing, Reading
-from linkwise.analysis.verify import Closure
-from linkwise.arrays import Array
+from linkwise.analysis.whole_movement import WholeMovement, not_asked_for
+from linkwise.arrays import Array, Index
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, printable
 
 PART_BYTES, LEAST = 4 << 20, 256
 """Approximate size in bytes of a part of a result, and its fewest samples."""
-
-
-@dataclass(frozen=True, eq=False)
-class Work:
-    """Energy in J that joints gave, ∫ max(P, 0) dt, and took back, ∫ max(-P, 0) dt: arrays of one shape."""
-
-    given: Array
-    taken: Array
-
-    @property
-    def net(self) -> Array:
-        """∫ P dt in J: what was given less what was taken back."""
-        net: Array = self.given - self.taken
-        return net
-
-
-@dataclass(frozen=True, eq=False)
-class Totals:
-    """Mean and largest magnitude of each row, (rows,), over every sample of the movement."""
-
-    mean: Array
-    peak: Array
-
-
-@dataclass(frozen=True, eq=False)
-class WholeMovement:
-    """Totals, work and errors over all samples of a movement; n joints, N links."""
-
-    totals: Totals
-    work: Work
-    """Work that each joint gave to each link and took back, (n, N) in J."""
-    joint_work: Work
-    """Work that each joint gave in all and took back, (n,) in J: ∫ τ_i q̇_i dt where positive, negative."""
-    load_work: Work
-    """Work that each joint gave against each load and took back, (n, loads) in J."""
-    contact_work: Work
-    """Work that each contact fed into each link as its frame slipped, and took back, (N, contacts) in J."""
-    work_by_source: Mapping[str, Work]
-    """Work that holders of energy gained by source and lost, and that flowed through joints and back, in J,
-    by the quantity that is its power, along its axes; none unless power by source was asked for."""
-    work_in_phases: tuple[Mapping[str, Work], ...]
-    """Work in each of the `phases`, in J, by the quantity that is its power, `work_by_source` among it."""
-    closure: Closure
-    total: int
-    """Number of samples."""
-    peaks: tuple[LargestTorque, ...]
-    """Torques at their largest magnitude, with their deviations there; none where nothing is uncertain."""
-    cutoff_sweep: CutoffSweep | None
-    """Sizes of torques at other cutoffs; None where they were not asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +42,10 @@ class AnalysisResult(WholeMovement):
     rate: float
     """Sampling rate in Hz."""
     rows: ResultRows
+    asked_columns: tuple[str, ...]
+    """Columns that were asked for, as they were written."""
+    told: Index
+    """Numbers of the rows of a table of the result."""
     values: Array
     loads: tuple[PlacedLoad, ...]
     induced: tuple[str, ...]
@@ -266,6 +220,12 @@ class AnalysisResult(WholeMovement):
             parts += map(printable, filter(None, [self.uncertain.get("note", ""), *self.signs.lines]))
         return " · ".join(parts)
 
+    def require(self, *quantities: str) -> None:
+        """Raise LinkwiseError where columns of these quantities were not asked for; of any unless given."""
+        missing = sorted(self.rows.left_out.intersection(quantities or self.rows.left_out))
+        if missing:
+            raise not_asked_for(missing)
+
     @property
     def constraint_force(self) -> Array:
         """Force in each row of the constraints, (S, C), in N or N·m; no column without constraints."""
@@ -291,7 +251,11 @@ class AnalysisResult(WholeMovement):
         return np.stack([ground.wrench(c, model, q, forces, press[:, c]) for c in each], axis=1)
 
     def dense(self, quantity: str) -> Array:
-        """Return a quantity (S, …) over its axes, zero where it has no row."""
+        """Return a quantity (S, …) over its axes, zero where it has no row.
+
+        Raises LinkwiseError where columns of it were not asked for.
+        """
+        self.require(quantity)
         return self.rows.dense(quantity, self.values)
 
     def is_ever_on(self, contact: int) -> bool:

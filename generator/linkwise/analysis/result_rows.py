@@ -85,6 +85,8 @@ class ResultRows:
     axes: Mapping[str, NamedAxis]
     points: tuple[InducedPoint, ...]
     places: tuple[Place, ...]
+    left_out: frozenset[str] = frozenset()
+    """Quantities of which rows are left out, as nobody asked for them."""
 
     @classmethod
     def of(
@@ -95,10 +97,12 @@ class ResultRows:
         points: Sequence[InducedPoint] = (),
         bearings: Sequence[str] = (),
         origins: Sequence[str] = (),
+        left_out: frozenset[str] = frozenset(),
     ) -> "ResultRows":
         """Return rows at these places of the quantities of a robot with loads, points and bearing joints.
 
         origins: names of the sources of a trace, window of time by window
+        left_out: quantities of which rows are left out
         """
         rows = robot.constraint_rows
         bases = tuple("rad" if " moment" in row else "m" if " force" in row else "" for row in rows)
@@ -117,17 +121,25 @@ class ResultRows:
             "bearing": NamedAxis("bearing", tuple(bearings)),
             "wrench": NamedAxis("wrench", WRENCH, ("rad",) * 3 + ("m",) * 3),
         }
-        return cls(axes, tuple(points), tuple(places))
+        return cls(axes, tuple(points), tuple(places), left_out)
 
     def __len__(self) -> int:
         return len(self.places)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._entries
+        return name in self.named
 
     def __getitem__(self, name: str) -> QuantityRows:
         """Return the entries of a quantity; none where nothing of it is in the result."""
-        return self._entries.get(name) or self._entries_at(name, [])
+        found = self._entries.get(name)
+        if found is None:
+            found = self._entries[name] = self._entries_at(name, [])
+        return found
+
+    @cached_property
+    def named(self) -> frozenset[str]:
+        """Quantities that have rows."""
+        return frozenset(name for name, _ in self.places)
 
     @cached_property
     def _entries(self) -> dict[str, QuantityRows]:

@@ -62,6 +62,7 @@ def analyze(
     trace_torque_factor: float = 1.0,
     uncertain: str | PathLike[str] | None = None,
     cutoff_sweep: Sequence[float] | None = None,
+    columns: Sequence[str] = (),
 ) -> Analysis:
     """Analyse a motion log with a generated robot, all samples in memory.
 
@@ -84,6 +85,8 @@ def analyze(
     uncertain: file of how uncertain bodies are, which gives torques a standard deviation beside them
     cutoff_sweep: lowest and highest cutoff in Hz, and their number if not 7, at which sizes of all torques
     are told by `Analysis.cutoff_sweep`; `processing` needs a low-pass
+    columns: columns that are computed, written as for --columns: "sums", "tau_gravity/*/hand"; all where
+    there are none, and where points, powers, a trace or a sweep, made of all torques, are asked for
 
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
@@ -91,6 +94,8 @@ def analyze(
     loaded = with_payloads(robot if isinstance(robot, OpenedRobot) else load_robot(Path(robot)), payloads)
     loaded, borne = with_contacts(loaded, held), Loads.of(loads, loads_cutoff)
     outputs = Outputs(
+        page=False,
+        columns=(columns,) if isinstance(columns, str) else tuple(columns),
         induced=tuple(induced),
         induced_whole=induced_whole,
         induced_power=induced_power,
@@ -109,7 +114,7 @@ def analyze(
     swept = None if cutoff_sweep is None else CutoffRange.of(cutoff_sweep)
     asked = Request(reading or Reading(), processing or Processing(), outputs, borne, held, told, swept)
     job = prepared(Path(log), loaded, asked, progress)
-    with EverySample(len(job.columns), job.count) as kept:
+    with EverySample(len(job.decomposer.rows), job.count) as kept:
         return job.analysis(job.run(kept, progress), kept.values)
 
 
@@ -142,11 +147,11 @@ def analyze_to(
         store = begin_storages(draft, job.decomposer.rows, job.count, *naming)
         with (
             open_table(draft / f"analysis.{outputs.table}", job.columns, note) as table,
-            EverySample(len(job.columns), *keep) as kept,
+            EverySample(len(job.decomposer.rows), *keep) as kept,
         ):
 
             def sink(block: Array) -> None:
-                table(block)
+                table(job.table_rows(block))
                 store(block)
                 if keep[0]:
                     kept(block)

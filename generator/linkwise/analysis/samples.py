@@ -215,7 +215,7 @@ def read_samples(
             yield block
 
     samples = collected(in_si(), width, buffer)
-    time = first_column(samples)
+    time = first_column(samples, buffer)
     with within(str(log.path)):
         rate = even_rate(time, log.first_row, strict=reading.resample is None)
         warnings = (
@@ -228,7 +228,7 @@ def read_samples(
         if reading.resample is not None:
             rate = reading.resample
             samples = collected(resampled(samples, rate, progress=progress), width, buffer)
-            time = first_column(samples)
+            time = first_column(samples, buffer)
     columns = [log.columns[at] for at in selection.joints]
     largest = map(Peak, columns, peaks[1:].tolist(), reach or [np.inf] * len(joints))
     with within(str(log.path)):

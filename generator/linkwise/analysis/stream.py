@@ -1,26 +1,27 @@
 """A whole log, block by block: each is differentiated, decomposed, checked, summed up and handed on."""
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from typing import cast
 
 import numpy as np
 from linkwise_runtime.motion.tracer import TraceState
+from linkwise_runtime.native.memory import memory
 
-from linkwise.analysis.certain_signs import LargestTorques
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.even_time import TOLERANCE
 from linkwise.analysis.filtering import derivatives
-from linkwise.analysis.integrals import parted_integrals
-from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.movement_sums import MovementSums, PartSums
 from linkwise.analysis.phases import PlacedPhase
-from linkwise.analysis.result import Totals, WholeMovement, Work
-from linkwise.analysis.result_quantities import POWER_OF, WORK_BY_SOURCE
-from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import Processing
 from linkwise.analysis.torques import Decomposer
 from linkwise.analysis.traced_rows import ExtendedBlock
-from linkwise.analysis.verify import Closure, against_recursion
+from linkwise.analysis.verify import SAMPLES, Closure
+from linkwise.analysis.whole_movement import WholeMovement
+from linkwise.analysis.worker_threads import worker_threads
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.progress import Progress
@@ -28,11 +29,17 @@ from linkwise.progress import Progress
 Sink = Callable[[Array], None]
 """A sink is given one block (rows, samples) after the other; the block is the sink's own."""
 
-INNER, LEAST = 4096, 1024
-"""Most and fewest samples computed at once: intermediate values stay in the cache; fewer for wide results."""
+INNER, LEAST, LEAST_SLOW = 4096, 512, 1024
+"""Most and fewest samples computed at once: intermediate values stay in the cache; fewer for wide results.
+The last is the fewest where each call costs much, as of ties."""
+CACHED = 2 << 20
+"""Approximate size in bytes of what is computed at once."""
 
-BLOCK_BYTES = 48 << 20
-"""Approximate size in bytes of a block handed on: some three of them are in memory at any time."""
+MOST_THREADS = 8
+"""Most threads that compute: more of them would wait for Python's lock."""
+
+BLOCK_BYTES = 36 << 20
+"""Approximate size in bytes of a block handed on: some four of them are in memory at any time."""
 
 LEAST_SAMPLES = 2
 """Fewest samples of a range of time: one has no duration."""
@@ -66,79 +73,73 @@ def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
     return start, stop
 
 
-class MovementSums:
-    """Totals, work and errors of a movement, added up block by block.
+Filled = tuple[PartSums, Closure]
+"""Sums over a part of a block, and how well it closes."""
 
-    Samples are evenly spaced, and work is summed by the trapezoidal rule: with Δt between them
-    ∫ P dt = Δt Σ_s (P_s + P_(s+1))/2. A phase has the steps both of whose samples are in it.
+
+@dataclass
+class Parts:
+    """Fills parts of blocks, some samples each, whose values stay in the cache, on several threads.
+
+    The parts of a trace, each of which goes on from the one before, are filled one after the other.
     """
 
-    def __init__(self, rows: ResultRows, robot: OpenedRobot, phases: Sequence[PlacedPhase] = ()) -> None:
-        self.closure, self._rows, self._samples = Closure(), rows, 0
-        self._robot, self._phases = robot, phases
-        self._total, self._peak = np.zeros((2, len(rows)))
-        self._power = rows.numbers(*POWER_OF.values(), *WORK_BY_SOURCE)
-        self._energy = np.zeros((1 + len(phases), 2, len(self._power)))
-        self._last: tuple[Array, Array] | None = None
-        self._steps = np.zeros(1 + len(phases))
-        self._search = LargestTorques(rows)
+    samples: Samples
+    decomposer: Decomposer
+    processing: Processing
+    sums: MovementSums
+    span: tuple[int, int]
+    """First sample analysed, and the one after the last."""
+    state: TraceState | None = None
+    """State of the trace behind the last part."""
 
-    def add(self, block: Array, closure: Closure) -> bool:
-        """Add a block (rows, samples) and its errors; return whether all of its values are finite."""
-        self.closure |= closure
-        magnitude = np.abs(block)
-        added = magnitude.sum(axis=1)
-        if not np.isfinite(added).all():
-            return False
-        self._samples += block.shape[1]
-        self._total += added
-        np.maximum(self._peak, magnitude.max(axis=1), out=self._peak)
-        self._search.add(block)
-        power = block[self._power]
-        on = np.stack([np.ones(block.shape[1]), *self._on(block)])
-        if self._last is not None:  # the step from the last block to this one
-            power, on = (np.concatenate(two, axis=1) for two in zip(self._last, (power, on), strict=True))
-        steps = on[:, 1:] * on[:, :-1]
-        self._steps += steps.sum(axis=1)
-        self._energy += parted_integrals(power, steps)
-        self._last = power[:, -1:].copy(), on[:, -1:].copy()
-        return True
+    @property
+    def threads(self) -> int:
+        """Number of threads that fill parts: one where most of the work is Python's own, or a trace."""
+        return min(worker_threads(), MOST_THREADS) if self.decomposer.is_quick else 1
 
-    def _on(self, block: Array) -> Iterator[Array]:
-        """Yield for each phase 1 at samples in it, else 0, (S,)."""
-        q = self._rows.dense("q", block) if self._phases else block
-        contacts = block[self._rows["contact"].rows]
-        for phase in self._phases:
-            yield phase.on(self._robot, block[0], q, contacts).astype(float)
+    def blocks(self, pool: Executor, inner: int) -> Iterator[tuple[int, Array, Iterator[Filled]]]:
+        """Yield the first sample of each block, the block (rows, samples) and what its parts come to.
 
-    def movement(self, step: float) -> WholeMovement:
-        """Return what the whole movement comes to; samples are `step` s apart.
-
-        Raises LinkwiseError for a phase that is over before any work is, where its work is told.
+        The next block is begun before, so that threads have work meanwhile.
+        inner: samples of a part
         """
-        told = any(name in self._rows for name in WORK_BY_SOURCE)
-        for phase, steps in zip(self._phases, self._steps[1:].tolist(), strict=True):
-            if told and not steps:
-                raise LinkwiseError(
-                    f"--phase {phase.name}: no two samples follow each other in it, so that it has no work"
-                )
-        energy = np.zeros((1 + len(self._phases), 2, len(self._rows), 1))
-        energy[:, :, self._power, 0] = step * self._energy
-        kept = [*POWER_OF.values(), *(name for name in WORK_BY_SOURCE if name in self._rows)]
-        whole, *phases = (
-            {power: Work(*(self._rows.dense(power, way)[0] for way in part)) for power in kept}
-            for part in energy
-        )
-        return WholeMovement(
-            totals=Totals(self._total / self._samples, self._peak),
-            closure=self.closure,
-            total=self._samples,
-            peaks=self._search.peaks(),
-            cutoff_sweep=None,
-            work_by_source={power: work for power, work in whole.items() if power in WORK_BY_SOURCE},
-            work_in_phases=tuple(phases),
-            **{name: whole[power] for name, power in POWER_OF.items()},
-        )
+        begun: list[tuple[int, Array, Iterator[Filled]]] = []
+        count = len(self.decomposer.rows)
+        for first, last in _blocks(*self.span, count, inner):
+            block = cast(Array, memory((count, last - first), np.dtype(np.float64)))
+            found = pool.map(partial(self.fill, block, first, inner), range(first, last, inner))
+            begun.append((first, block, found))
+            if len(begun) > 1:
+                yield begun.pop(0)
+        yield from begun
+
+    def fill(self, block: Array, first: int, inner: int, at: int) -> Filled:
+        """Fill a part of a block (rows, samples) that begins at `first`, from the sample `at` on."""
+        own = block[:, at - first : at - first + inner]
+        end = at + own.shape[1]
+        with np.errstate(over="ignore", invalid="ignore"):
+            closure = self._traced(own, at, end) if self.decomposer.traced else self._filled(own, at, end)
+            return self.sums.of_part(own), closure
+
+    def _filled(self, out: Array, low: int, high: int) -> Closure:
+        """Fill `out` (rows, high - low) but for a trace."""
+        samples = self.samples
+        motion = derivatives(samples.q, samples.rate, low, high, self.processing)
+        time = samples.time[low:high]
+        return self.decomposer.at(time, samples.inputs[low:high]).fill(out, time, *motion)
+
+    def _traced(self, own: Array, at: int, end: int) -> Closure:
+        """Fill the part and its trace, which looks at the samples beside."""
+        start, stop = self.span
+        low, high = max(start, at - 1), min(stop, end + 2)
+        out = np.empty((len(own), high - low))
+        closure = self._filled(out, low, high)
+        extended = ExtendedBlock(low - start, at - start, end - start, stop - 1 - start)
+        here = self.decomposer.at(self.samples.time[low:high], self.samples.inputs[low:high])
+        error, self.state = here.trace(out, extended, self.state)
+        own[:] = out[:, extended.own]
+        return closure | error
 
 
 def stream(
@@ -154,36 +155,25 @@ def stream(
     Raises LinkwiseError for too few samples, results that overflow, and a robot whose torques do not add up.
     """
     (start, stop), rows = span_of(samples, processing), decomposer.rows
-    sums, inner = MovementSums(rows, decomposer.robot, phases), _at_once(len(rows))
-    traced = decomposer.traced
-    with ThreadPoolExecutor(1) as writer, np.errstate(over="ignore", invalid="ignore"):
+    sums, inner = MovementSums(rows, decomposer.robot, phases), _at_once(decomposer)
+    parts = Parts(samples, decomposer, processing, sums, (start, stop))
+    quiet = np.errstate(over="ignore", invalid="ignore")
+    with ThreadPoolExecutor(parts.threads) as pool, ThreadPoolExecutor(1) as writer, quiet:
         pending: Future[None] | None = None
-        state: TraceState | None = None
-        for first, last in _blocks(start, stop, len(rows)):
-            block = np.empty((len(rows), last - first))
-            for at in range(first, last, inner):
-                end = min(at + inner, last)
-                low, high = (at, end) if traced is None else (max(start, at - 1), min(stop, end + 2))
-                q, qd, qdd = derivatives(samples.q, samples.rate, low, high, processing)
-                own = block[:, at - first : end - first]
-                out = own if traced is None else np.empty((len(rows), high - low))
-                time = samples.time[low:high]
-                here = decomposer.at(time, samples.inputs[low:high])
-                closure = here.fill(out, time, q, qd, qdd)
-                if traced is not None:
-                    extended = ExtendedBlock(low - start, at - start, end - start, stop - 1 - start)
-                    error, state = here.trace(out, extended, state)
-                    closure |= error
-                    own[:] = out[:, extended.own]
-                if not sums.add(own, closure):
-                    raise _overflow(samples, decomposer, own, at)
-            loads, times = decomposer.loads, decomposer.times
-            sums.closure |= against_recursion(decomposer.robot, loads, times, rows, block)
+        for first, block, found in parts.blocks(pool, inner):
+            last = first + block.shape[1]
+            for at, (own, closure) in zip(range(first, last, inner), found, strict=True):
+                part = block[:, at - first : at - first + inner]
+                if not sums.add(part, own, closure):
+                    raise _overflow(samples, decomposer, part, at)
+            looked = np.unique(np.linspace(0, last - first - 1, SAMPLES).astype(int))
+            sums.closure |= decomposer.checked(block[:, looked], samples.inputs[first:last][looked])
             sums.closure.check()
             if pending is not None:
                 pending.result()
             pending = writer.submit(sink, block)
             let_go(samples.q)
+            let_go(samples.time)
             progress("analysing", last - start, stop - start)
         if pending is not None:
             pending.result()
@@ -218,12 +208,18 @@ def _largest(samples: Samples, decomposer: Decomposer, at: int) -> str:
     return f": {decomposer.robot.joints[joint]!r} comes to {near[row, joint]:.3g} in {where}"
 
 
-def _at_once(columns: int) -> int:
-    return min(INNER, max(LEAST, BLOCK_BYTES // (8 * columns)))
+def _at_once(decomposer: Decomposer) -> int:
+    """Return the number of samples computed at once."""
+    if decomposer.is_quick:
+        return min(INNER, max(LEAST, CACHED // (8 * len(decomposer.rows)) // LEAST * LEAST))
+    return min(INNER, max(LEAST_SLOW, BLOCK_BYTES // (8 * len(decomposer.rows))))
 
 
-def _blocks(start: int, stop: int, columns: int) -> Iterator[tuple[int, int]]:
-    inner = _at_once(columns)
-    rows = max(inner, BLOCK_BYTES // (8 * columns) // inner * inner)
+def _blocks(start: int, stop: int, columns: int, inner: int) -> Iterator[tuple[int, int]]:
+    """Yield the first sample of each block and the one after its last.
+
+    An odd number of parts of a power of two: rows then lie apart in the sets of a cache.
+    """
+    rows = (max(1, BLOCK_BYTES // (8 * columns) // inner) - 1 | 1) * inner
     for at in range(start, stop, rows):
         yield at, min(at + rows, stop)

@@ -2,58 +2,39 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from linkwise_runtime.motion.tracer import TraceState
 
-from linkwise.analysis.borne_joints import BorneJoint, ReactionShares
+from linkwise.analysis.borne_joints import ReactionShares
+from linkwise.analysis.chosen_columns import chosen_rows
 from linkwise.analysis.closed_motion import reason_of
+from linkwise.analysis.closing_sums import ClosingSums, closing
 from linkwise.analysis.contacts.ground import Standing
 from linkwise.analysis.contacts.terms import ContactTerms
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.deviation_rows import DeviationRows
-from linkwise.analysis.induced_points import InducedPlan
 from linkwise.analysis.induced_power import PowerShares
 from linkwise.analysis.induced_shares import InducedShares
 from linkwise.analysis.loads.placed import LoadShift, PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.reaction_forces import ReactionForces
-from linkwise.analysis.result_quantities import PASSIVE, QUANTITIES, TERMS, TORQUE_OF
-from linkwise.analysis.result_rows import ResultRows, torque_places
+from linkwise.analysis.result_quantities import PASSIVE, TERMS, TORQUE_OF
+from linkwise.analysis.result_rows import Place, ResultRows, torque_places
 from linkwise.analysis.settings import Convention
 from linkwise.analysis.term_rows import TermArrays, term_rows
+from linkwise.analysis.told_beside import NOTHING_BESIDE, ToldBeside
 from linkwise.analysis.traced_rows import ExtendedBlock, TracedRows
-from linkwise.analysis.uncertain_inputs import UncertainInputs
-from linkwise.analysis.verify import Closure, residual, worst_of
-from linkwise.arrays import Array, Index
+from linkwise.analysis.turned_rows import spread
+from linkwise.analysis.verify import Closure, against_recursion
+from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 
-TURNED = 128
-"""Samples that are turned at once."""
-Sum = tuple[int, int, list[int]]
-"""Joint and row of a torque, and the rows of what it is the sum of."""
-
-
-class ToldBeside(NamedTuple):
-    """Choice of all that a result tells beside torques."""
-
-    power_terms: bool = False
-    """True to tell power by cause and order too."""
-    induced: InducedPlan = InducedPlan()
-    """Points whose acceleration is told by source."""
-    borne: Sequence[BorneJoint] = ()
-    """Joints whose whole wrench is told by cause."""
-    induced_power: bool = False
-    """True to tell by source the power of links, and that which flows through joints."""
-    traced: TracedRows | None = None
-    """Velocities that are traced to their sources."""
-    uncertain: UncertainInputs = UncertainInputs()
-    """Uncertainty of bodies, motion and loads."""
-
-
-NOTHING_BESIDE = ToldBeside()
+QUANTITY_OF = TermArrays("tau_qdd", "tau_qd", "tau_gravity", "tau_link")
+"""Quantities of the kinds of terms."""
 
 
 class Filled(NamedTuple):
@@ -84,9 +65,9 @@ class Decomposer:
     rows: ResultRows
     sources: TermArrays
     """Places of the rows of τ_ij and its terms among packed values, for each kind in the order of rows."""
-    parts: tuple[Sum, ...]
+    parts: ClosingSums
     """Terms of each τ_ij."""
-    wholes: tuple[Sum, ...]
+    wholes: ClosingSums
     """Parts of each τ_i: τ_ij, passive torques of the joint, τ_ie."""
     induced: InducedShares
     power: PowerShares
@@ -98,6 +79,8 @@ class Decomposer:
     """Terms of the robot on its contacts; None without contacts."""
     traced: TracedRows | None = None
     """Rows of a trace; None where none is asked for."""
+    whole: "Decomposer | None" = None
+    """Decomposer with all rows of torques, by which samples are checked where columns were chosen."""
 
     @classmethod
     def of(
@@ -114,10 +97,11 @@ class Decomposer:
             terms = ContactTerms.of(of_robot, robot.contacts)
             of_robot = terms.rows
         measured = [] if times is None else [at for at, loads in enumerate(times.measured) if loads]
-        places, points = (
-            torque_places(robot, of_robot, loads, told.power_terms, measured),
-            told.induced.points,
-        )
+        every_place = torque_places(robot, of_robot, loads, told.power_terms, measured)
+        chosen = chosen_rows(ResultRows.of(robot, every_place, loads), told.columns, told.power_terms)
+        places, points = [every_place[row] for row in chosen.tolist()], told.induced.points
+        left_out = frozenset(name for name, _ in {*every_place} - {*places})
+        sources = _sources(of_robot, places)
         induced = InducedShares.of(robot, told.induced, ResultRows.of(robot, places, loads))
         reactions = ReactionShares(robot, tuple(told.borne), tuple(loads), convention)
         traced = told.traced
@@ -127,18 +111,18 @@ class Decomposer:
         velocities = [at for at in places if at[0] == "tau_qd"]
         every = [*places, *power.places, *reactions.places]
         every += [] if traced is None else traced.places(velocities)
-        sources = TermArrays(*(np.array([row[-1] for row in some], np.intp) for some in of_robot))
         deviations = DeviationRows(robot, told.uncertain, convention, sources)
         every += deviations.places(every)
         bearings, origins = [joint.name for joint in told.borne], () if traced is None else traced.origins
-        rows = ResultRows.of(robot, every, loads, points, bearings, origins)
-        parts = _sums(rows, "tau_link", *TERMS)
-        wholes = _sums(rows, "tau", "tau_link", *PASSIVE, "tau_load")
+        rows = ResultRows.of(robot, every, loads, points, bearings, origins, left_out)
+        parts = ClosingSums(robot.units, rows, "tau_link", *TERMS)
+        wholes = ClosingSums(robot.units, rows, "tau", "tau_link", *PASSIVE, "tau_load")
         forces = ReactionForces(robot, tuple(loads), times)
         return cls(
             *(robot, tuple(loads), convention, rows, sources, parts, wholes),
             *(induced, power, forces, reactions),
             *(deviations, times, terms, traced),
+            cls.of(robot, convention, loads, times) if left_out else None,
         )
 
     def at(self, time: Array, inputs: Array) -> "Decomposer":
@@ -181,8 +165,8 @@ class Decomposer:
         ends = plain + len(acceleration), plain + len(acceleration) + len(velocity)
         out = np.empty((ends[1], len(time)))
         packed, *_ = self._fill(out[:plain], time, self._consistent(time, q, qd, qdd))
-        _spread(out, slice(plain, ends[0]), packed.acceleration, acceleration)
-        _spread(out, slice(*ends), packed.velocity, velocity)
+        spread(out, slice(plain, ends[0]), getattr(packed, "acceleration", None), acceleration)
+        spread(out, slice(*ends), getattr(packed, "velocity", None), velocity)
         if self.convention == "gradient":
             out[slice(*ends)] *= 2.0
         return out
@@ -196,13 +180,15 @@ class Decomposer:
         motion = q, qd, qdd = self._consistent(time, q, qd, qdd)
         packed, partial, standing, closure = self._fill(out, time, motion)
         rows, sources = self.rows, self.sources
-        for name, values, places, moved in (
-            ("tau_qdd", packed.acceleration, sources.acceleration, qdd),
-            ("tau_qd", packed.velocity, sources.velocity, qd),
+        for name, kind, places, moved in (
+            ("tau_qdd", "acceleration", sources.acceleration, qdd),
+            ("tau_qd", "velocity", sources.velocity, qd),
         ):
-            _spread(out, rows[name].rows, values, places, (moved, rows[name].at[:, 2]))
-        closure |= self._closure(out, partial)
-        if self.convention == "gradient":
+            values = getattr(packed, kind, None)
+            spread(out, rows[name].rows, values, places, (moved, rows[name].at[:, 2]))
+        if self.whole is None:
+            closure |= closing(self.parts, self.wholes, out, partial, self.robot.units)
+        if self.convention == "gradient" and "tau_qd" in rows:
             velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
             rows.put(out, "tau_qd", _left(standing, velocity))
         self._fill_power(out, qd)
@@ -212,29 +198,49 @@ class Decomposer:
     def _fill(self, out: Array, time: Array, motion: tuple[Array, Array, Array]) -> Filled:
         """Fill `out` but for deviations, torques by cause and powers."""
         q, qd, qdd = motion
-        packed: Any = self.robot.model.packed(q, qd, qdd)
+        rows, sources = self.rows, self.sources
+        packed: Any = self.robot.model.packed(q, qd, qdd) if self._needs_terms else None
         standing = self._standing(time, q)
-        unborne, free = packed, self.robot.model.inverse_dynamics(q, qd, qdd)
-        partial = self._dense(packed.torque, q.shape[1])
+        unborne = packed
+        partial = self._dense(packed, q.shape[1])
         if standing is not None and self.terms is not None:
             packed = self.terms.left(packed, standing, q.shape[1])
         out[0] = time
-        rows, sources = self.rows, self.sources
         for name, moved in zip(("q", "qd", "qdd"), motion, strict=True):
             rows.put(out, name, moved)
-        rows.put(out, "tau", _left(standing, free))
+        if "tau" in rows:
+            rows.put(out, "tau", _left(standing, self.robot.model.inverse_dynamics(q, qd, qdd)))
         self._add_passive(out, standing, q, qd, qdd)
         self._add_loads(out, standing, time, q)
-        _spread(out, rows["tau_link"].rows, packed.torque, sources.torque)
-        if self.robot.is_written:
+        spread(out, rows["tau_link"].rows, getattr(packed, "torque", None), sources.torque)
+        if "tau_share" in rows:
             rows.put(out, "tau_share", self.robot.model.named_shares(q, qd))
-        else:
-            _spread(out, rows["tau_gravity"].rows, packed.gravity, sources.gravity)
+        if "tau_gravity" in rows:
+            spread(out, rows["tau_gravity"].rows, packed.gravity, sources.gravity)
         self.forces.fill(out, rows, standing, time, motion, partial)
         closure = self.induced.fill(out, unborne, standing, q, qd, qdd)
         self.reactions.fill(out, rows, standing, time, motion)
         closure |= self.power.fill(out, unborne, standing, time, motion)
         return Filled(packed, partial, standing, closure)
+
+    @property
+    def is_quick(self) -> bool:
+        """True if compiled code computes nearly all, so that a call for few samples costs no more of each."""
+        robot, asked = self.robot, (self.induced.points, self.power.is_asked, self.reactions.borne)
+        slow = robot.constrained, robot.contacts, self.traced, self.loads, robot.is_written, *asked
+        return robot.backend == "native" and not any(slow) and self.deviations.uncertain.stated is None
+
+    def checked(self, some: Array, inputs: Array) -> Closure:
+        """Return the errors of some samples (rows, S) against an independent recursion.
+
+        Where columns were chosen, all rows are computed of these samples, and how they close is told too.
+        """
+        if self.whole is None:
+            return against_recursion(self.robot, self.loads, self.times, self.rows, some)
+        every = np.empty((len(self.whole.rows), some.shape[1]))
+        motion = (self.rows.dense(name, some) for name in ("q", "qd", "qdd"))
+        closure = self.whole.at(some[0], inputs).fill(every, some[0], *motion)
+        return closure | self.whole.checked(every, inputs)
 
     def trace(
         self, out: Array, block: ExtendedBlock, state: TraceState | None
@@ -264,10 +270,17 @@ class Decomposer:
                 powers = self.rows[name]
                 out[powers.rows] = out[self.rows[torque].rows] * qd.T[powers.at[:, 0]]
 
-    def _dense(self, torque: Array, n: int) -> Array:
+    @cached_property
+    def _needs_terms(self) -> bool:
+        """True if rows are made of packed values: of torques by link and cause, or of what contacts bear."""
+        beside = self.terms is not None, self.induced.points, self.power.is_asked
+        return any(beside) or any(len(places) for places in self.sources)
+
+    def _dense(self, packed: Any, n: int) -> Array:
         """Return tau_ij (S, n, N) from packed values, before contacts carry any; empty without contacts."""
         if self.terms is None:
             return np.zeros((0, n, 0))
+        torque = packed.torque
         out = np.zeros((len(torque), n, len(self.robot.links)))
         i, j = self.robot.model.layout.torque.T
         out[:, i, j] = torque
@@ -295,71 +308,42 @@ class Decomposer:
 
     def _add_passive(self, out: Array, standing: Standing | None, q: Array, qd: Array, qdd: Array) -> None:
         """Fill the passive torques of the joints, and add them to the joint torques."""
-        if not self.robot.passive:
+        if not self._passive:
             return
         every = self.robot.model.passive_torque(q, qd, qdd)
         for name, torque in zip(PASSIVE, every, strict=True):
-            self._add(out, name, _left(standing, torque))
+            if name in self._passive:
+                self._add(out, name, _left(standing, torque)[..., None])
+
+    @cached_property
+    def _passive(self) -> tuple[str, ...]:
+        """Passive torques that some joint has, where they or joint torques are told."""
+        if not {"tau", *PASSIVE}.intersection(self.rows.named):
+            return ()
+        return tuple(name for name, field in PASSIVE.items() if self.robot.with_own(field))
 
     def _add_loads(self, out: Array, standing: Standing | None, time: Array, q: Array) -> None:
         """Fill the torques by which joints carry loads, and add them to the joint torques."""
-        if self.loads:
+        if self.loads and {"tau", "tau_load"}.intersection(self.rows.named):
             asked = [_left(standing, borne.torque(self.robot.model, time, q)) for borne in self.loads]
             self._add(out, "tau_load", np.stack(asked, axis=-1))
 
     def _add(self, out: Array, name: str, torque: Array) -> None:
-        """Fill the rows of a quantity from torques (S, n, ...), and add them to the joint torques."""
-        self.rows.put(out, name, torque)
-        wholes = {i: row for i, row, _ in self.wholes}
-        rows, _, at = self.rows[name]
-        for own, (i, *_) in zip(out[rows], at.tolist(), strict=True):
-            out[wholes[i]] += own
-
-    def _closure(self, out: Array, partial: Array) -> Closure:
-        """Return the largest errors of the closing sums, by unit.
-
-        A joint that carries only rounding is measured by its peers.
-
-        partial: tau_ij (S, n, N) before contacts carry any; what they leave may be only its rounding
-        """
-        worst, units = Closure(), self.robot.units
-        before = np.abs(partial).sum(axis=-1).max(axis=0, initial=0.0)
-        for unit in dict.fromkeys(units[i] for i, *_ in self.wholes):
-            size = max(size for size, other in zip(before, units, strict=True) if other == unit)
-            terms, sums = (
-                [residual([out[r] for r in rows], out[whole]) for i, whole, rows in of if units[i] == unit]
-                for of in (self.parts, self.wholes)
-            )
-            least = (0.0, float(size))
-            worst |= Closure(*worst_of([*terms, least]), *worst_of([*sums, least]))
-        return worst
+        """Fill the rows of a quantity from torques (S, n, X), and add them to the joint torques."""
+        self.rows.put(out, name, torque if name == "tau_load" else torque[..., 0])
+        rows, _, at = self.rows["tau"]
+        for e in range(torque.shape[2]):
+            out[rows] += torque[:, at[:, 0], e].T
 
 
-def _sums(rows: ResultRows, whole: str, *parts: str) -> tuple[Sum, ...]:
-    """Return the sums of all entries of a quantity, of parts with the same indices along its axes."""
-    axes = QUANTITIES[whole].axes
-    return tuple(
-        (index[0], row, rows.numbers(*parts, **dict(zip(axes, index, strict=True))).tolist())
-        for row, index in rows[whole].listed()
+def _sources(terms: TermArrays, places: Sequence[Place]) -> TermArrays:
+    """Return the places among packed values of the terms that have rows, in the order of rows, by kind."""
+    kept = frozenset(places)
+    found = (
+        np.array([row[-1] for row in some if (name, row[:-1]) in kept], np.intp)
+        for name, some in zip(QUANTITY_OF, terms, strict=True)
     )
-
-
-def _spread(
-    out: Array, rows: slice | Index, values: Array, places: Index, causes: tuple[Array, Index] | None = None
-) -> None:
-    """Fill rows with the packed values (S, values) at these places, times the motion of causes if given.
-
-    It goes by a few samples, which stay in the nearest cache while they are turned.
-
-    causes: motion (S, n), and the coordinate of each row
-    """
-    for at in range(0, len(values), TURNED):
-        some = slice(at, at + TURNED)
-        found = values[some].T[places]
-        if causes is not None:
-            motion, of = causes
-            found *= motion[some].T[of]
-        out[rows, some] = found
+    return TermArrays(*found)
 
 
 def _left(standing: Standing | None, torque: Array) -> Array:

@@ -9,6 +9,7 @@ from linkwise_runtime.motion.trace_equations import BETWEEN, RESIDUAL
 
 from linkwise.analysis import Analysis
 from linkwise.analysis.choices import AnalysisChoices
+from linkwise.analysis.outputs import CLOSED_AT_FEW
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.run import analyze_to
 from linkwise.cli import Json, tell
@@ -85,10 +86,11 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
         shares += f"; power by source sums to what links gain within {closure.power_relative:.1e}"
     traced = closure.trace_relative
     shares += "" if traced is None else f"; traced velocities sum to those of the log within {traced:.1e}"
+    where = f", of {CLOSED_AT_FEW}" if analysis.rows.left_out else ""
     return [
         f"{analysis.total:,} samples at {analysis.rate:.6g} Hz, back end {analysis.robot.backend};"
         f" {recursion}; closure: terms sum to partial torques within {closure.terms_relative:.1e},"
-        f" these to joint torques within {closure.links_relative:.1e} (relative){shares}",
+        f" these to joint torques within {closure.links_relative:.1e} (relative){where}{shares}",
         *_of_contacts(analysis),
         *_of_residual(analysis),
         *_of_bodies(analysis),

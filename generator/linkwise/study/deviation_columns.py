@@ -6,9 +6,9 @@ nor averaged as a curve.
 
 from collections.abc import Iterable, Sequence
 
+from linkwise.analysis.column_patterns import LONGEST, fitting
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
-from linkwise.study.patterns import LONGEST, fitting
 
 WHOLE, RANDOM = "sd/", "sd-motion/"
 """Beginnings of the names of a deviation, and of its part that is new in each cycle."""

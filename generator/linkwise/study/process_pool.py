@@ -21,6 +21,7 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from types import ModuleType
 
+from linkwise.analysis.worker_threads import cores
 from linkwise.output.workplace import ENDING, signals_held
 from linkwise.study.trial import TrialOutcome, TrialTask, run_trial
 
@@ -35,7 +36,7 @@ class ProcessPool:
     """An engine of `workers` processes, one for each core unless given."""
 
     def __init__(self, workers: int | None = None) -> None:
-        self.workers = workers or _cores()
+        self.workers = workers or cores()
 
     def outcomes(self, tasks: Sequence[TrialTask]) -> Generator[TrialOutcome]:
         """Yield the outcomes of all tasks as they come; end running trials once the caller stops asking."""
@@ -138,9 +139,3 @@ def _child_environment() -> Iterator[None]:
         for name in unset:
             del os.environ[name]
         sys.modules["__main__"] = main
-
-
-def _cores() -> int:
-    """Return the number of cores that this process may use."""
-    affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity else os.cpu_count() or 1

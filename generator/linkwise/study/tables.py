@@ -9,12 +9,12 @@ from typing import Any, Self
 
 import numpy as np
 
+from linkwise.analysis.column_patterns import fitting
 from linkwise.analysis.result_rows import Column
 from linkwise.arrays import Array, Index
 from linkwise.extras import extra
 from linkwise.study.deviation_columns import is_deviation
 from linkwise.study.deviations import SD_COLUMNS, deviations, have_deviations, trial_deviations
-from linkwise.study.patterns import fitting
 from linkwise.study.spread import Spread, columns_of_trials, groups_of, spread
 from linkwise.study.summary import STATISTICS, TrialSummary
 

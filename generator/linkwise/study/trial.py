@@ -84,10 +84,10 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         trial = files.enter_context(trial_here(task.trial))
         key = trial_key(plan, task.trial, {}, trial)
         job = prepared_trial(plan, trial, draft)
-        columns = job.columns
+        columns, rows = job.columns, len(job.decomposer.rows)
         kept = kept_columns(columns, plan.columns)
         labels = {"trial": trial.name, **dict(trial.labels)}
-        every = EverySample(len(columns), *((job.count, draft) if plan.pages else (0, None)))
+        every = EverySample(rows, *((job.count, draft) if plan.pages else (0, None)))
         files.enter_context(every)
         moments = RunningMoments(len(columns))
         places = () if plan.cycles is None else (CYCLE, PERCENT)
@@ -98,10 +98,11 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         if plan.cycles is not None and plan.cycles.what:  # it may be on at single samples: no time, no work
             job = replace(job, phases=job.phases[:-1])
 
-        def sink(block: Array) -> None:
+        def sink(whole: Array) -> None:
+            block = job.table_rows(whole)
             moments(block)
             if plan.pages:
-                every(block)
+                every(whole)
             if plan.cycles is None:
                 table(block[kept])
             else:

@@ -47,6 +47,7 @@ def draw(result: AnalysisResult, name: str) -> "Figure":
 
     Raises LinkwiseError for another name.
     """
+    result.require()
     told = names_of(result)
     check_figure(name, result.robot, told)
     kind, _, chosen = name.partition(":")

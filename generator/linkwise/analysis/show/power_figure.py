@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from linkwise.analysis.result import AnalysisResult, Work
+from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.bands import Bands, draw_band
 from linkwise.analysis.show.drawn_curves import (
     drawn_curves,
@@ -16,6 +16,7 @@ from linkwise.analysis.show.drawn_curves import (
     write_title,
     zero_line,
 )
+from linkwise.analysis.whole_movement import Work
 from linkwise.arrays import Array
 from linkwise.plotstyle import INK, colour, dash, drawn, tone
 

@@ -1,0 +1,49 @@
+"""Columns of a result that were asked for: by presets, and by patterns of their names."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from linkwise.analysis.column_patterns import fitting
+from linkwise.analysis.result_quantities import FORCES, PASSIVE, POWER_TERMS, TERMS, TORQUE_OF
+from linkwise.analysis.result_rows import DEVIATION, OF_MOTION, ResultRows
+from linkwise.arrays import Index
+
+FLAG = "--columns"
+ALWAYS = ("time", "q", "qd", "qdd", "contact", "slip")
+"""Quantities that every result has: its motion, and what contacts do."""
+SUMS = (*ALWAYS, "tau", "power", "force", "force_measured", "tau_as_loads")
+"""Quantities of joints, and of rows of constraints, without what these are the sum of."""
+CAUSES = (*SUMS, *TERMS, *PASSIVE, "tau_load", *FORCES)
+"""These, and torques and forces by cause: without sums by link, and without powers by link."""
+CHOOSABLE = (*CAUSES, "tau_link", *TORQUE_OF, "power_contact")
+"""Quantities among which is chosen; what another option asks for is told whatever is chosen."""
+PRESETS = {"all": CHOOSABLE, "sums": SUMS, "causes": CAUSES}
+
+
+def chosen_rows(rows: ResultRows, asked: Sequence[str], power_terms: bool) -> Index:
+    """Return the numbers of the rows that presets and patterns choose, ascending; all where none are given.
+
+    A power comes with the torque that it is made of, and a deviation with what it is of.
+    power_terms: whether powers by cause and order are asked for otherwise
+
+    Raises LinkwiseError for a pattern that fits no column.
+    """
+    if not asked:
+        return np.arange(len(rows))
+    quantities = {name for preset in asked for name in PRESETS.get(preset, ())}
+    quantities |= {*ALWAYS, *(POWER_TERMS if power_terms else ())}
+    names = [column.name for column in rows.columns if column.quantity in CHOOSABLE]
+    fits = set(fitting(FLAG, names, [one for one in asked if one not in PRESETS]))
+    kept = {
+        place
+        for column, place in zip(rows.columns, rows.places, strict=True)
+        if place[0] in quantities or (place[0] in CHOOSABLE and column.name in fits)
+    }
+    kept |= {(TORQUE_OF[name], at) for name, at in kept if name in TORQUE_OF}
+    numbers = []
+    for number, (name, at) in enumerate(rows.places):
+        quantity = name.removeprefix(DEVIATION).removeprefix(OF_MOTION)
+        if quantity not in CHOOSABLE or (quantity, at) in kept:
+            numbers.append(number)
+    return np.array(numbers, np.intp)
