@@ -168,9 +168,12 @@ def test_a_dataset_has_what_was_asked_for(puma: Path) -> None:
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
-        ("sum", "--columns has 'sum', which no column is called; nearest are"),
-        ("tau/joint9", "--columns has 'tau/joint9', which no column is called"),
-        ("power_qdd/**", "--columns has 'power_qdd/\\*\\*', which no column is called"),
+        (
+            "sum",
+            "--columns, which takes all, sums, causes, or columns, has 'sum', which no column is called",
+        ),
+        ("tau/joint9", "columns, has 'tau/joint9', which no column is called"),
+        ("power_qdd/**", "columns, has 'power_qdd/\\*\\*', which no column is called"),
     ],
 )
 def test_what_no_column_is_called_is_refused(asked: str, message: str, puma: Path) -> None:

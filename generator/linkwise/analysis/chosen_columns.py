@@ -9,7 +9,6 @@ from linkwise.analysis.result_quantities import FORCES, PASSIVE, POWER_TERMS, TE
 from linkwise.analysis.result_rows import DEVIATION, OF_MOTION, ResultRows
 from linkwise.arrays import Index
 
-FLAG = "--columns"
 ALWAYS = ("time", "q", "qd", "qdd", "contact", "slip")
 """Quantities that every result has: its motion, and what contacts do."""
 SUMS = (*ALWAYS, "tau", "power", "force", "force_measured", "tau_as_loads")
@@ -19,6 +18,7 @@ CAUSES = (*SUMS, *TERMS, *PASSIVE, "tau_load", *FORCES)
 CHOOSABLE = (*CAUSES, "tau_link", *TORQUE_OF, "power_contact")
 """Quantities among which is chosen; what another option asks for is told whatever is chosen."""
 PRESETS = {"all": CHOOSABLE, "sums": SUMS, "causes": CAUSES}
+FLAG = f"--columns, which takes {', '.join(PRESETS)}, or columns,"
 
 
 def chosen_rows(rows: ResultRows, asked: Sequence[str], power_terms: bool) -> Index:
