@@ -1,5 +1,6 @@
 """`linkwise check` holds what constraints answer against motion that it works out in another way."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from linkwise import Options, check_package, generate, read_system, write_package
 from linkwise.check import simulation_checks
 from linkwise.check.constraint_checks import HeldContacts, loop_calls
+from linkwise.check.impedance_checks import tied_impedance_calls
 from linkwise.check.parametric_tree import tree_with
 from linkwise.check.simulation_checks import simulated_motion, simulation_calls
 from linkwise.oracle.loop_reference import LoopReference, loop_reference
@@ -88,6 +90,24 @@ def test_loops_of_rounded_angles_are_checked_where_they_are_open_least(
     assert np.abs(found.equations.violation(found.states.q)).max(-1).min() > 1e-7
     model = package.load("numpy", {"L": 0.7, "m": mass})
     assert [result.held for result in loop_calls("numpy", model, found)] == passes
+
+
+@pytest.mark.parametrize(("mass", "passes"), [(2.0, True), (2.001, False)])
+def test_another_mass_is_found_in_controllers(
+    package: Package, reference: LoopReference, mass: float, passes: bool
+) -> None:
+    model = package.load("numpy", {"L": 0.7, "m": mass})
+    (result,) = tied_impedance_calls("numpy", model, reference, package.module.Natural)
+    assert result.held == passes
+
+
+def test_an_impedance_that_is_nowhere_positive_is_left_out(
+    package: Package, reference: LoopReference
+) -> None:
+    values = {**reference.values, "c2^": -reference.values["c2^"]}
+    other = replace(reference, values=values)
+    (result,) = tied_impedance_calls("numpy", package.load("numpy"), other, package.module.Natural)
+    assert result.held is None
 
 
 def test_another_length_is_open_where_loops_close(package: Package, reference: LoopReference) -> None:

@@ -245,7 +245,7 @@ def test_check_proves_constraints_on_every_back_end(make: Any, tmp_path: Path) -
     results = check_package(tmp_path / "made")
     assert not [result for result in results if result.failed]
     told = [result.name for result in results if "closed loops" in result.name]
-    assert len(told) == 5 * 4 * (2 if make is not rolling_disc else 1)
+    assert len(told) == 6 * 4 * (2 if make is not rolling_disc else 1)
 
 
 def test_constraints_move_with_parameters_and_gradients_flow_through_them(tmp_path: Path) -> None:
