@@ -59,6 +59,9 @@ BESIDE_IN_C = {
     "position_gradient": "`position_gradient` without its zeros",
     "passive_torque": "the sum of `passive_torque`, of one sample, where joints have any",
     "reactions": "the wrenches of links, of which `reactions` are made; not of joints that are tied",
+    "constrained_response": "of which induced accelerations and reactions of tied joints are made",
+    "constrained_response_of_links": "the same with `passive=False`",
+    "constrained_dynamics_of_links": "`constraints.forward_dynamics(passive=False)`",
     "partial_impedance": "a [controller](control.md)",
     "frame_partial_impedance": "a [controller](control.md) of a frame",
 }

@@ -32,11 +32,11 @@ PACKED_GRADIENT = "packed_position_gradient"
 """Packed derivatives by position; no row of the call table, as no call of Python answers with them."""
 LINK_WRENCHES = "link_wrenches"
 """Wrenches of links by cause, of which `reactions` are made; they too are no row."""
-FUNCTIONS = {key: row.c for key, row in CALLS.items() if row.c and not row.one} | {
+FUNCTIONS = {key: row.c for key, row in CALLS.items() if row.c and not row.one and row.ties != "kept"} | {
     PACKED_GRADIENT: "position_gradient",
     LINK_WRENCHES: "reactions",
 }
-"""Names in C of the calls for many samples."""
+"""Names in C of the calls for many samples; constraints.py has those of tied joints."""
 
 AT_REST = ("coefficients", "coefficient_regressors", LINK_WRENCHES)
 """Calls that take no qdd."""
