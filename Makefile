@@ -126,6 +126,7 @@ bench: $(READY)
 	$(BIN)/python tests/benchmarks/bench_motion.py ten-hours generated/torso
 	$(BIN)/python tests/benchmarks/bench_study.py
 	$(BIN)/python tests/benchmarks/bench_energies.py
+	$(BIN)/python tests/benchmarks/bench_tied.py
 
 # The table of docs/embedded.md: stack and instructions on a Cortex-M that QEMU plays.
 embedded: $(READY)

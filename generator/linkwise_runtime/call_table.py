@@ -476,11 +476,42 @@ KINEMATICS = (
 """Calls of `Kinematics`; the axis of frames is as long as the robot has frames."""
 
 
+TIED_IN_C = {
+    "violation": "constraint_rows",
+    "jacobian": "constraint_rows",
+    "jacobian_rate": "constraint_rows",
+    "closed": "closed",
+    "velocity_map": "following",
+    "velocity_accelerations": "following",
+    "partial_torque": "constrained_torque",
+    "coefficients": "constrained_coefficients",
+    "propagation": "constrained_propagation",
+    "forces": "constrained_torque",
+    "force_coefficients": "constrained_coefficients",
+    "force_propagation": "constrained_propagation",
+    "forward_dynamics": "constrained_dynamics",
+}
+"""Functions of C for calls of `Constraints`, of rigid links; some answer several."""
+
+
 def _driven(quantity: Quantity) -> Quantity:
     """Return a quantity of all joints as one of the joints that constraints leave independent."""
     named = {"joint": "independent", "cause": "independent_cause"}
     unit = quantity.unit.replace("joint", "independent").replace("cause", "independent_cause")
     return quantity._replace(axes=tuple(named.get(axis, axis) for axis in quantity.axes), unit=unit)
+
+
+def _borne(quantity: Quantity) -> Quantity:
+    """Return a quantity of joints' torques as one of what the rows of constraints bear."""
+    named = {"joint": "constraint", "cause": "independent_cause"}
+    unit = quantity.unit.replace("joint", "constraint").replace("cause", "independent_cause").lstrip("~")
+    by = "by the motion of the cause" if "cause" in quantity.axes else "at rest"
+    return quantity._replace(
+        name=f"force_{quantity.name}",
+        axes=tuple(named.get(axis, axis) for axis in quantity.axes),
+        unit=unit,
+        meaning=f"what the row bears of the link, {by}",
+    )
 
 
 def _tied(
@@ -518,6 +549,7 @@ def _kept(
         own,
         ties="kept",
         out=False,
+        c=TIED_IN_C.get(name, ""),
     )
 
 
@@ -584,6 +616,11 @@ CONSTRAINTS = (
         if row.key in ("inverse_dynamics", "partial_torque", "coefficients", "propagation")
     ),
     _tied("forces", QDD, "constraint link", FORCE, "what the row bears of the link"),
+    *(
+        _kept(f"force_{row.key}", row.motion, tuple(map(_borne, row.answers)), row.record)
+        for row in DYNAMICS
+        if row.key in ("coefficients", "propagation")
+    ),
     _tied("forces_of", Q, "constraint", FORCE, "what the row bears", TORQUES, chosen=SUMMED),
     _tied(
         "forces_of_by_link", Q, "constraint part", FORCE, "what the row bears", TORQUES, "forces_of", BY_LINK

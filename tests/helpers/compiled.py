@@ -16,7 +16,7 @@ from helpers.kept import run_kept
 
 WARNED = ("-Wall", "-Wextra", "-Werror", "-pedantic", "-fPIC")
 STRICT = (*WARNED, "-O1")
-PARTS = ("SINES", "ONE_SAMPLE", "BLOCKS", "POSITION_GRADIENT", "CONTROL")
+PARTS = ("SINES", "ONE_SAMPLE", "BLOCKS", "POSITION_GRADIENT", "CONTROL", "CONSTRAINTS")
 """Parts of the C that may be compiled apart."""
 FIELDS = {"c2": "acceleration", "c1": "velocity", "g": "gravity", "tau": "torque", "h1": "linear"}
 """Names in the Python API of the arrays of the header."""

@@ -428,7 +428,7 @@ def test_the_header_of_c_has_the_rows_and_nothing_else(which: str, package_at: L
         row.c: row
         for row in CALLS.values()
         if row.c
-        and (rigid or not (row.rigid or row.one))
+        and (rigid or not (row.rigid or row.one or row.key.startswith("constraints.")))
         and not (which == "tied" and row.ties == "refused")
         and (own or row.chosen.get("passive", True))
     }
@@ -438,6 +438,9 @@ def test_the_header_of_c_has_the_rows_and_nothing_else(which: str, package_at: L
         "partial_impedance": which != "tied",
         "cancel": which != "tied",
         "frame_partial_impedance": rigid and which != "tied",
+        "constrained_response": rigid,
+        "constrained_response_of_links": rigid and own,
+        "constrained_dynamics_of_links": rigid and own,
     }
     links = {f"link_{j + 1}" for j in range(load(which).N)}
     assert set(declared) - links == {name for name in {*rows, *BESIDE_IN_C} if beside.get(name, True)} - links
@@ -446,7 +449,7 @@ def test_the_header_of_c_has_the_rows_and_nothing_else(which: str, package_at: L
         arguments = declared[name]
         assert arguments.startswith("size_t count, ") != row.one
         read = re.findall(r"const (?:double|float) \*(\w+)", arguments)
-        assert [a for a in read if a not in ("point", "p")] == list(row.motion)
+        assert [a for a in read if a not in ("point", "p", "held_at")] == list(row.motion)
 
 
 def test_the_page_of_calls_is_made_of_the_table() -> None:

@@ -61,6 +61,9 @@ BESIDE_IN_C = {
     "reactions": "the wrenches of links, of which `reactions` are made; not of joints that are tied",
     "share_variances": "what bodies do to shares through one link, squared, of which "
     "[`uncertainty`](package.md#how-certain-a-share-is) is made",
+    "constrained_response": "of which induced accelerations and reactions of tied joints are made",
+    "constrained_response_of_links": "the same with `passive=False`",
+    "constrained_dynamics_of_links": "`constraints.forward_dynamics(passive=False)`",
     "partial_impedance": "a [controller](control.md)",
     "cancel": "what a [controller](control.md) cancels at a given acceleration",
     "frame_partial_impedance": "a [controller](control.md) of a frame",

@@ -440,23 +440,28 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 
 #include "linkwise/calls.h"
 
-/* ---- In loops over links and joints: regressors and reactions of rows; of one sample, frames and the mass matrix ---- */
+/* ---- In loops over links and joints: regressors and reactions of rows; of one sample, frames and the mass matrix; joints that are tied ---- */
 #undef W
 #undef SIZED
 #undef LINK_FUNCTION
 #define AT_POSITION const real *q
 #define UNDER_TORQUE const real *q, const real *qd, const real *tau
-#if PART(REGRESSORS) || PART(CONTROL)
+#if PART(REGRESSORS) || PART(CONTROL) || CONSTRAINED
 #include "planar3_tree.h"
 #endif
 #if PART(REGRESSORS)
 #include "linkwise/regressors.h"
 #include "linkwise/reactions.h"
 #endif
-#if PART(CONTROL)
+#if PART(CONTROL) || CONSTRAINED
 #include "linkwise/frames.h"
 #include "linkwise/moving_links.h"
 #include "linkwise/passive.h"
+#endif
+#if PART(CONTROL)
 #include "linkwise/forward_dynamics.h"
 #include "linkwise/frame_impedance.h"
+#endif
+#if CONSTRAINED
+#include "linkwise/constraints.h"
 #endif

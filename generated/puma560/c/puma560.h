@@ -51,7 +51,8 @@
    take apart.
 
    For microcontrollers, -DLINKWISE_SMALL has samples computed one by one: less stack and code, and no function on blocks.
-   Then functions take at most 14,428 bytes of stack in double and 7,964 in float, and those of torques,
+   Functions of tied joints are then there with -DLINKWISE_CONSTRAINTS alone, and take stack as without both; all others take at
+   most 14,428 bytes of stack in double and 7,964 in float, and those of torques,
    coefficients, gradients, regressors and reactions 6,796 and 4,148. */
 #ifndef LINKWISE_PUMA560_H
 #define LINKWISE_PUMA560_H
@@ -103,6 +104,22 @@ enum {
     PUMA560_FRAME_link5 = 5, /* 'link5', behind 'joint5' */
     PUMA560_FRAME_link6 = 6, /* 'link6', behind 'joint6' */
     PUMA560_FRAMES = 7
+};
+
+/* Kinds of contacts, how many there may be, steps that close ties, and why functions of tied joints have no answer. */
+enum {
+    PUMA560_CONTACT_POINT = 0,
+    PUMA560_CONTACT_HINGED = 1,
+    PUMA560_CONTACT_HELD = 2,
+    PUMA560_CONTACT_ROLLING = 4,
+    PUMA560_MOST_CONTACTS = 8,
+    PUMA560_STEPS = 50,
+    PUMA560_TIES_OPEN = 1,
+    PUMA560_TIES_SINGULAR = 2,
+    PUMA560_TIES_CONTRADICT = 3,
+    PUMA560_TIES_UNCLOSED = 4,
+    PUMA560_NO_INERTIA = 5,
+    PUMA560_UNKNOWN = 6
 };
 
 /* No two arrays that are given to a function may overlap. Shapes leave PUMA560_ out of the names above; the last index
@@ -314,6 +331,86 @@ int puma560_frame_partial_impedance(const double *q, const double *qd, const pum
     const double *pose_d, const double *velocity_d, const double *acceleration_d, const double *external, double *tau,
     double *qdd);
 
+/* ---- Joints that loops, couplings and contacts tie, in double ---- */
+
+/* A frame that the ground holds where it is: all of it, all but turns about an axis of it, a point, or a ball or wheel about a
+   point, which rolls. */
+typedef struct {
+    int kind; /* PUMA560_CONTACT_HELD, _HINGED, _POINT or _ROLLING */
+    int frame; /* one of the constants above */
+    double point[3]; /* the point that is held, in the frame's axes */
+    double axis[3]; /* of HINGED, in the frame's axes, of any length */
+    double arm[3]; /* of ROLLING: from where it touches the ground to the point, in the world's axes */
+} puma560_contact;
+
+/* What ties the joints, beside the robot's own loops and couplings, and which joints move the others. Contacts may differ from
+   call to call. */
+typedef struct {
+    int contacts; /* how many, up to PUMA560_MOST_CONTACTS */
+    const puma560_contact *contact; /* (contacts) */
+    int freedoms; /* how many joints are independent: JOINTS less the rank of A */
+    const int *independent; /* (freedoms) their numbers, from 0, ascending */
+    double tolerance; /* most that rows may be open, in m and rad; 0: 1e-4, and what joints could close 1e-6 */
+} puma560_constraints;
+
+/* Rows stand in the order of the robot's ties, the contacts, and the robot's couplings: of a point or of what rolls 3, of a hinge 2
+   turns and 3, of a frame 3 turns and 3, of a distance 1, of a coupling 1; ROWS is how many there are. A qd = 0 holds the joints; FREE
+   are independent. Functions return 0, or why there is no answer, and samples from there on are then as they were:
+   PUMA560_TIES_OPEN where ties are open at q, PUMA560_TIES_SINGULAR where joints do not follow the independent ones,
+   PUMA560_TIES_CONTRADICT where what holds a loop twice does not agree, PUMA560_TIES_UNCLOSED where PUMA560_STEPS steps do not
+   close them, PUMA560_NO_INERTIA where independent joints can move without mass, or fewer than half of the digits of
+   accelerations are known, and PUMA560_UNKNOWN for too many contacts, or a kind, frame or joint that is not there.
+   Of qd and qdd the independent joints count, and the others follow; outputs may be NULL.
+
+   Rows phi, A and dA/dt, at any q and qd, which are used as they are given: contacts are open from where they took hold,
+   held_at, or not at all where it is NULL.
+   Reads q, qd (count, JOINTS), held_at (count, JOINTS); writes violation (count, ROWS), jacobian, rate (count, ROWS, JOINTS). */
+int puma560_constraint_rows(size_t count, const double *q, const double *qd, const puma560_constraints *constraints,
+    const double *held_at, double *violation, double *jacobian, double *rate);
+
+/* q with its dependent joints moved by Newton's method until ties close; held_at may be NULL for q itself.
+   Reads q, held_at (count, JOINTS); writes closed (count, JOINTS). */
+int puma560_closed(size_t count, const double *q, const puma560_constraints *constraints,
+    const double *held_at, double *closed);
+
+/* How joints follow: qd = G yd of the independent joints' velocities yd, and the accelerations -A_d+ dA/dt qd of all joints, by the joint
+   whose velocity causes them. Reads q, qd (count, JOINTS);
+   writes map (count, JOINTS, FREE), velocity (count, JOINTS), accelerations (count, JOINTS, JOINTS). */
+int puma560_following(size_t count, const double *q, const double *qd, const puma560_constraints *constraints,
+    double *map, double *velocity, double *accelerations);
+
+/* Coefficients of the independent joints, c2^ = G' c2 G, c1^ = G' (c2 dG/dt + c1 G) and g^ = G' g, link by link, while all other joints
+   move freely; and what rows bear, A_d+' c2_d G and so on. The first three outputs may be NULL together, and the last three.
+   Reads q, qd (count, JOINTS); writes acceleration, velocity (count, FREE, LINKS, FREE), gravity (count, FREE, LINKS),
+   force_acceleration, force_velocity (count, ROWS, LINKS, FREE), force_gravity (count, ROWS, LINKS). */
+int puma560_constrained_coefficients(size_t count, const double *q, const double *qd,
+    const puma560_constraints *constraints, double *acceleration, double *velocity, double *gravity,
+    double *force_acceleration, double *force_velocity, double *force_gravity);
+
+/* The same, times the accelerations and velocities of the independent joints that cause them. Reads q, qd, qdd (count, JOINTS). */
+int puma560_constrained_propagation(size_t count, const double *q, const double *qd, const double *qdd,
+    const puma560_constraints *constraints, double *acceleration, double *velocity, double *gravity,
+    double *force_acceleration, double *force_velocity, double *force_gravity);
+
+/* Torques of the independent joints and forces of the rows, link by link: sums of these.
+   Reads q, qd, qdd (count, JOINTS); writes torque (count, FREE, LINKS), forces (count, ROWS, LINKS). */
+int puma560_constrained_torque(size_t count, const double *q, const double *qd, const double *qdd,
+    const puma560_constraints *constraints, double *torque, double *forces);
+
+/* Accelerations of all joints under torques tau on all of them, and the forces of the rows, of which redundant ones share
+   by the least sum of squares: forward dynamics.
+   Reads q, qd, tau (count, JOINTS); writes qdd (count, JOINTS), forces (count, ROWS). */
+int puma560_constrained_dynamics(size_t count, const double *q, const double *qd, const double *tau,
+    const puma560_constraints *constraints, double *qdd, double *forces);
+
+/* What any forces F on the joints do: they accelerate the joints by response F, and rows bear reactions F of them; so each source by
+   itself, an actuator, gravity, the velocity of a joint through a link, has its own induced accelerations and forces. Those of the ties'
+   own source, by the joint whose velocity turns them, are accelerations and forces. `velocity` is that of all joints.
+   Reads q, qd (count, JOINTS); writes velocity (count, JOINTS), response (count, JOINTS, JOINTS), reactions (count, ROWS, JOINTS),
+   accelerations (count, JOINTS, JOINTS), forces (count, ROWS, JOINTS), none of which may be NULL. */
+int puma560_constrained_response(size_t count, const double *q, const double *qd, const puma560_constraints *constraints,
+    double *velocity, double *response, double *reactions, double *accelerations, double *forces);
+
 /* ---- All links, many samples, in float ---- */
 
 /* All quantities but c0: 1516 operations.
@@ -519,6 +616,86 @@ int puma560_frame_partial_impedancef(const float *q, const float *qd, const puma
     const float *q_d, const float *qd_d, const float *qdd_d, const puma560_frame_impedancef *wanted,
     const float *pose_d, const float *velocity_d, const float *acceleration_d, const float *external, float *tau,
     float *qdd);
+
+/* ---- Joints that loops, couplings and contacts tie, in float ---- */
+
+/* A frame that the ground holds where it is: all of it, all but turns about an axis of it, a point, or a ball or wheel about a
+   point, which rolls. */
+typedef struct {
+    int kind; /* PUMA560_CONTACT_HELD, _HINGED, _POINT or _ROLLING */
+    int frame; /* one of the constants above */
+    float point[3]; /* the point that is held, in the frame's axes */
+    float axis[3]; /* of HINGED, in the frame's axes, of any length */
+    float arm[3]; /* of ROLLING: from where it touches the ground to the point, in the world's axes */
+} puma560_contactf;
+
+/* What ties the joints, beside the robot's own loops and couplings, and which joints move the others. Contacts may differ from
+   call to call. */
+typedef struct {
+    int contacts; /* how many, up to PUMA560_MOST_CONTACTS */
+    const puma560_contactf *contact; /* (contacts) */
+    int freedoms; /* how many joints are independent: JOINTS less the rank of A */
+    const int *independent; /* (freedoms) their numbers, from 0, ascending */
+    float tolerance; /* most that rows may be open, in m and rad; 0: 1e-4 */
+} puma560_constraintsf;
+
+/* Rows stand in the order of the robot's ties, the contacts, and the robot's couplings: of a point or of what rolls 3, of a hinge 2
+   turns and 3, of a frame 3 turns and 3, of a distance 1, of a coupling 1; ROWS is how many there are. A qd = 0 holds the joints; FREE
+   are independent. Functions return 0, or why there is no answer, and samples from there on are then as they were:
+   PUMA560_TIES_OPEN where ties are open at q, PUMA560_TIES_SINGULAR where joints do not follow the independent ones,
+   PUMA560_TIES_CONTRADICT where what holds a loop twice does not agree, PUMA560_TIES_UNCLOSED where PUMA560_STEPS steps do not
+   close them, PUMA560_NO_INERTIA where independent joints can move without mass, or fewer than half of the digits of
+   accelerations are known, and PUMA560_UNKNOWN for too many contacts, or a kind, frame or joint that is not there.
+   Of qd and qdd the independent joints count, and the others follow; outputs may be NULL.
+
+   Rows phi, A and dA/dt, at any q and qd, which are used as they are given: contacts are open from where they took hold,
+   held_at, or not at all where it is NULL.
+   Reads q, qd (count, JOINTS), held_at (count, JOINTS); writes violation (count, ROWS), jacobian, rate (count, ROWS, JOINTS). */
+int puma560_constraint_rowsf(size_t count, const float *q, const float *qd, const puma560_constraintsf *constraints,
+    const float *held_at, float *violation, float *jacobian, float *rate);
+
+/* q with its dependent joints moved by Newton's method until ties close; held_at may be NULL for q itself.
+   Reads q, held_at (count, JOINTS); writes closed (count, JOINTS). */
+int puma560_closedf(size_t count, const float *q, const puma560_constraintsf *constraints,
+    const float *held_at, float *closed);
+
+/* How joints follow: qd = G yd of the independent joints' velocities yd, and the accelerations -A_d+ dA/dt qd of all joints, by the joint
+   whose velocity causes them. Reads q, qd (count, JOINTS);
+   writes map (count, JOINTS, FREE), velocity (count, JOINTS), accelerations (count, JOINTS, JOINTS). */
+int puma560_followingf(size_t count, const float *q, const float *qd, const puma560_constraintsf *constraints,
+    float *map, float *velocity, float *accelerations);
+
+/* Coefficients of the independent joints, c2^ = G' c2 G, c1^ = G' (c2 dG/dt + c1 G) and g^ = G' g, link by link, while all other joints
+   move freely; and what rows bear, A_d+' c2_d G and so on. The first three outputs may be NULL together, and the last three.
+   Reads q, qd (count, JOINTS); writes acceleration, velocity (count, FREE, LINKS, FREE), gravity (count, FREE, LINKS),
+   force_acceleration, force_velocity (count, ROWS, LINKS, FREE), force_gravity (count, ROWS, LINKS). */
+int puma560_constrained_coefficientsf(size_t count, const float *q, const float *qd,
+    const puma560_constraintsf *constraints, float *acceleration, float *velocity, float *gravity,
+    float *force_acceleration, float *force_velocity, float *force_gravity);
+
+/* The same, times the accelerations and velocities of the independent joints that cause them. Reads q, qd, qdd (count, JOINTS). */
+int puma560_constrained_propagationf(size_t count, const float *q, const float *qd, const float *qdd,
+    const puma560_constraintsf *constraints, float *acceleration, float *velocity, float *gravity,
+    float *force_acceleration, float *force_velocity, float *force_gravity);
+
+/* Torques of the independent joints and forces of the rows, link by link: sums of these.
+   Reads q, qd, qdd (count, JOINTS); writes torque (count, FREE, LINKS), forces (count, ROWS, LINKS). */
+int puma560_constrained_torquef(size_t count, const float *q, const float *qd, const float *qdd,
+    const puma560_constraintsf *constraints, float *torque, float *forces);
+
+/* Accelerations of all joints under torques tau on all of them, and the forces of the rows, of which redundant ones share
+   by the least sum of squares: forward dynamics.
+   Reads q, qd, tau (count, JOINTS); writes qdd (count, JOINTS), forces (count, ROWS). */
+int puma560_constrained_dynamicsf(size_t count, const float *q, const float *qd, const float *tau,
+    const puma560_constraintsf *constraints, float *qdd, float *forces);
+
+/* What any forces F on the joints do: they accelerate the joints by response F, and rows bear reactions F of them; so each source by
+   itself, an actuator, gravity, the velocity of a joint through a link, has its own induced accelerations and forces. Those of the ties'
+   own source, by the joint whose velocity turns them, are accelerations and forces. `velocity` is that of all joints.
+   Reads q, qd (count, JOINTS); writes velocity (count, JOINTS), response (count, JOINTS, JOINTS), reactions (count, ROWS, JOINTS),
+   accelerations (count, JOINTS, JOINTS), forces (count, ROWS, JOINTS), none of which may be NULL. */
+int puma560_constrained_responsef(size_t count, const float *q, const float *qd, const puma560_constraintsf *constraints,
+    float *velocity, float *response, float *reactions, float *accelerations, float *forces);
 
 #ifdef __cplusplus
 }

@@ -267,7 +267,7 @@ static void gradient_rows(size_t count, INPUTS, int dense, real *c0)
 #endif
 #endif
 
-#if PART(CONTROL)
+#if PART(CONTROL) || CONSTRAINED
 #include "frames.h"
 #include "moving_links.h"
 #include "passive.h"

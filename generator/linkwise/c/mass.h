@@ -98,6 +98,7 @@ static inline void masses(const motion *m, const composite *bodies, real *mass)
     }
 }
 
+#if PART(CONTROL)
 void API(mass_matrix)(AT_POSITION, real *mass)
 {
     NUMBERS(x);
@@ -108,3 +109,4 @@ void API(mass_matrix)(AT_POSITION, real *mass)
     composites(x, &m, NULL, bodies);
     masses(&m, bodies, mass);
 }
+#endif

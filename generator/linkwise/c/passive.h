@@ -33,12 +33,14 @@ static inline void add_smooth_friction(const real *qd, real width, real *torque)
         torque[i] += passive[i].friction * F(tanh)(qd[i] / width);
 }
 
+#if PART(CONTROL)
 void API(passive_torque)(const real *q, const real *qd, const real *qdd, real *torque)
 {
     clear(N, torque);
     add_passive(q, qd, qdd, torque);
     add_friction(qd, torque);
 }
+#endif
 #else
 #define add_armature(mass) ((void)(mass))
 #define add_passive(q, qd, qdd, torque) ((void)(q), (void)(torque))

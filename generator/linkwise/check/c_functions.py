@@ -22,6 +22,7 @@ from linkwise.check.control_functions import (
 )
 from linkwise.check.frame_checks import FrameReference
 from linkwise.check.model_calls import FLOAT32
+from linkwise.check.tied_functions import CONSTANTS, TIED, tied_prototypes
 from linkwise.errors import LinkwiseError
 from linkwise.oracle.reference import Reference, dense_quantities
 from linkwise.oracle.states import NUMBERS
@@ -108,7 +109,7 @@ class CFunctions:
             if not hasattr(self.compiled.library, symbol):
                 yield Result(name, False, None, "there is no such function")
                 continue
-            if function.short == NOT_CALLED:
+            if function.short == NOT_CALLED or function.short in TIED:
                 continue
             single = FLOAT32 if function.real == "float" else {"tolerance": reference.tolerance}
             try:
@@ -262,6 +263,7 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
         every_kind += [f for real, suffix in kinds for f in control_prototypes(manifest, real, suffix)]
     for real, suffix in kinds:
         every_kind += impedance_prototypes(manifest, real, suffix)
+        every_kind += tied_prototypes(manifest, real, suffix)
     return every_kind
 
 
@@ -285,7 +287,8 @@ def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[Com
         if isinstance(error, RuntimeError) or is_short_of_memory(error):
             return None, skipped("c: not checked", told)
         return None, Result("c: compiles", False, None, told)
-    wrong = wrong_header(manifest, compiled, directory, rows, prototypes(manifest, rows))
+    constants = CONSTANTS if manifest.tree is not None else {}
+    wrong = wrong_header(manifest, compiled, directory, rows, prototypes(manifest, rows), constants)
     detail = wrong or "as the manifest's paths say"
     return compiled, Result("c: numbers, indices and functions of the headers", not wrong, None, detail)
 

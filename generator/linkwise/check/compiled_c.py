@@ -178,21 +178,28 @@ def wrong_header(
     directory: Path,
     rows: IndexRows,
     functions: Iterable[Prototype],
+    constants: Mapping[str, int],
 ) -> str:
-    """Return the first number, index, name, limit or function unlike the manifest's; empty if none."""
+    """Return the first number, index, name, limit or function unlike the manifest's; empty if none.
+
+    constants: those of every robot of its kind, beside its own
+    """
     return (
-        _wrong_number(manifest, compiled, rows)
+        _wrong_number(manifest, compiled, rows, constants)
         or _wrong_table(manifest, directory, rows)
         or _wrong_joint(manifest, compiled.header)
         or _wrong_function(manifest.name, compiled.header, functions)
     )
 
 
-def _wrong_number(manifest: Manifest, compiled: CompiledPackage, rows: IndexRows) -> str:
+def _wrong_number(
+    manifest: Manifest, compiled: CompiledPackage, rows: IndexRows, constants: Mapping[str, int]
+) -> str:
     sizes = {what.upper(): len(rows.of(what)) for what in ("c2", "c1", "g", "h1")}
     expected = {"JOINTS": len(manifest.joints), "LINKS": len(manifest.links), "BLOCK": 8, "BLOCKF": 16}
     expected |= {key: size for key, size in sizes.items() if size or key != "H1"}
     expected |= {"PARAMETERS": len(manifest.parameters)} if manifest.parameters else {}
+    expected |= constants
     if manifest.tree is not None:
         names = [frame.name for frame in manifest.tree.frames]
         numbers = {key: f for f, key in enumerate(identifiers(names, "FRAME_"))}

@@ -26,6 +26,21 @@ class OneSample(Protocol):
         """
 
 
+class TiedFunctions(Protocol):
+    """Functions of a back end for joints that are tied, with constraints and independent joints as chosen."""
+
+    def at_once(self, call: str, motion: Sequence[object]) -> Sequence[Numbers] | None:
+        """Return the answer for one plain sample of a call made before; None for anything else."""
+
+    def answer(
+        self, call: str, motion: Sequence[Numbers], held_at: Numbers | None = None
+    ) -> Sequence[Numbers] | None:
+        """Return the answer for motion (..., n), with contacts as they took hold; None where there is none.
+
+        There is none where ties are open or singular, say: the operations on arrays then say what is wrong.
+        """
+
+
 class TorqueOfOne(Protocol):
     """A controller's torque for one sample, which a back end has beside that for many."""
 
@@ -57,6 +72,13 @@ class PackedBackend(Library):
     """True if the back end has regressors, which come from the rule of rigid links."""
     one_sample: OneSample | None = None
     """Functions for one sample; None without any."""
+
+    def tied_functions(self, chosen: object, tolerance: float | None) -> TiedFunctions | None:
+        """Return functions for constraints that have been chosen; None without any.
+
+        tolerance: how far ties may be open, as `Dynamics.constrained` says
+        """
+        return None
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:
         """Return c2, c1, g, tau and h1, (..., count) each."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..answers.answers import Answers
+from ..answers.packed import TiedFunctions
 from ..arguments import ANY, NOTHING, Beside, shape_of
 from ..arrays.backend import ArrayBackend
 from ..door import Door
@@ -23,10 +24,15 @@ from .closed_places import (
     independent_torque,
     tie_forces,
 )
+from .function_answers import by_functions
 from .newton_closing import led, with_independent
 from .tie_rows import TieRows
 from .tied_joints import TiedJoints, without_gradient
 from .written_rows import WrittenChoice, WrittenRows
+
+MOTION = ("q", "qd", "qdd")
+UNDER_TORQUE = ("q", "qd", "tau")
+"""Names of the arrays of motion, and of those of forward dynamics."""
 
 
 class TiedRobot(Protocol):
@@ -143,11 +149,13 @@ class Constraints(Generic[Array]):
         backend, (at, held) = self._read(q=q, held_at=q if held_at is None else held_at)
         return cast("Array", self.ties.rows(backend).violation(at, held))
 
+    @by_functions()
     def jacobian(self, q: Array) -> Array:
         """Return the constraint Jacobian A (..., C, n), at any q."""
         backend, (at,) = self._read(q=q)
         return cast("Array", side_by_side(self.ties.rows(backend).at(at).positions()[..., 1:]))
 
+    @by_functions()
     def jacobian_rate(self, q: Array, qd: Array) -> Array:
         """Return dA/dt (..., C, n), at any q and qd, which are used as they are given."""
         backend, (at, moved) = self._read(q=q, qd=qd)
@@ -185,9 +193,13 @@ class Constraints(Generic[Array]):
                 f"start is where joints are led from that q does not have, and q has shape {shape_of(q)}; "
                 f"leave it out, or give q the {m} independent joints alone"
             )
+        made = self.answered("closed", (q,)) if held_at is None else None
+        if made is not None:
+            return cast("Array", made[0])
         backend, (at, held) = self._read(q=q, held_at=q if held_at is None else held_at)
         return cast("Array", self.ties.closed(backend, at, held).q)
 
+    @by_functions()
     def velocity_map(self, q: Array) -> Array:
         """Return the velocity map G (..., n, m) of qd = G yd."""
         backend, (at,) = self._read(q=q)
@@ -204,6 +216,7 @@ class Constraints(Generic[Array]):
         place = self.ties.place(backend, at)
         return cast("Array", place.velocity(own) + place.bias(place.velocity(place.own(moved))))
 
+    @by_functions()
     def velocity_accelerations(self, q: Array, qd: Array) -> Array:
         """Return the bias of qdd = G ydd + bias by cause, (..., n, n): the acceleration of joint k by qd_s.
 
@@ -225,21 +238,27 @@ class Constraints(Generic[Array]):
 
         They are those of the links, as in `Dynamics`.
         """
+        made = self.answered("partial_torque", (q, qd, qdd))
+        if made is not None:
+            return cast("Array", made[0].sum(-1))
         found, answers, motion = self._accelerated(q, qd, qdd)
         return cast(
             "Array", independent_torque(found, answers.inverse_dynamics(*motion)[0][..., None])[..., 0]
         )
 
+    @by_functions()
     def partial_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Return the partial torques tau^_aj, (..., m, N)."""
         found, answers, motion = self._accelerated(q, qd, qdd)
         return cast("Array", independent_torque(found, answers.partial_torque(*motion)[0]))
 
+    @by_functions(Coefficients)
     def coefficients(self, q: Array, qd: Array) -> Coefficients[Array]:
         """Return c2^ and c1^ (..., m, N, m) and g^ (..., m, N) of the closing convention."""
         place, backend, (_, moved) = self._moving(q, qd)
         return cast("Coefficients[Array]", Coefficients(*self.ties.coefficients(backend, place, moved)))
 
+    @by_functions(Propagation)
     def propagation(self, q: Array, qd: Array, qdd: Array) -> Propagation[Array]:
         """Return c2^_ajb ydd_b, c1^_ajb yd_b (..., m, N, m) and g^_aj (..., m, N): they sum to tau^_aj."""
         place, backend, (_, moved, asked) = self._moving(q, qd, qdd=qdd)
@@ -247,6 +266,7 @@ class Constraints(Generic[Array]):
         yd, ydd = (place.own(a)[..., None, None, :] for a in (moved, asked))
         return cast("Propagation[Array]", Propagation(c2 * ydd, c1 * yd, g))
 
+    @by_functions()
     def forces(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Return lambda^(j) (..., C, N), the forces by which constraints carry link j.
 
@@ -254,6 +274,20 @@ class Constraints(Generic[Array]):
         """
         found, answers, motion = self._accelerated(q, qd, qdd)
         return cast("Array", tie_forces(found, answers.partial_torque(*motion)[0]))
+
+    @by_functions(Coefficients)
+    def force_coefficients(self, q: Array, qd: Array) -> Coefficients[Array]:
+        """Return the split of `forces`: by ydd and by yd (..., C, N, m), and at rest (..., C, N)."""
+        place, backend, (_, moved) = self._moving(q, qd)
+        return cast("Coefficients[Array]", Coefficients(*self.ties.force_coefficients(backend, place, moved)))
+
+    @by_functions(Propagation)
+    def force_propagation(self, q: Array, qd: Array, qdd: Array) -> Propagation[Array]:
+        """Return `force_coefficients` times ydd_b and yd_b: by link, they sum to `forces`."""
+        place, backend, (_, moved, asked) = self._moving(q, qd, qdd=qdd)
+        c2, c1, g = self.ties.force_coefficients(backend, place, moved)
+        yd, ydd = (place.own(a)[..., None, None, :] for a in (moved, asked))
+        return cast("Propagation[Array]", Propagation(c2 * ydd, c1 * yd, g))
 
     def forces_of(self, q: Array, torque: Array, by_link: bool = False) -> Array:
         """Return lambda (..., C) for torques (..., n) that joints need and the dependent ones do not give.
@@ -273,9 +307,17 @@ class Constraints(Generic[Array]):
         tau: torques on all joints, (..., n)
         passive: whether joints have p, as in `Dynamics.forward_dynamics`
         """
+        name = "forward_dynamics" if passive else "forward_dynamics_of_links"
+        made = self.answered(name, (q, qd, tau), UNDER_TORQUE)
+        if made is not None:
+            return cast("ConstrainedMotion[Array]", ConstrainedMotion(*made))
         place, backend, (_, moved, asked) = self._moving(q, qd, tau=tau)
         qdd, forces = self.ties.motion(backend, place, moved, asked, passive)
         return cast("ConstrainedMotion[Array]", ConstrainedMotion(qdd, forces))
+
+    @cached_property
+    def _functions(self) -> TiedFunctions | None:
+        return self.ties.rows(self._robot.backend).functions
 
     @cached_property
     def _closed_position(self) -> NDArray[np.float64]:
@@ -318,6 +360,19 @@ class Constraints(Generic[Array]):
                 self._robot.joint_names,
             )
         return self.ties.closed(backend, with_independent(found, own, columns), held).q
+
+    def answered(
+        self, call: str, motion: Sequence[object], names: Sequence[str] = MOTION
+    ) -> Sequence[Numbers] | None:
+        """Return the answer of the back end's own functions; None without any, or where they have none."""
+        functions = self._functions
+        if functions is None or not motion:
+            return None
+        found = functions.at_once(call, motion)
+        if found is None and len(motion) <= len(names):
+            backend, arrays = self._read(NOTHING, **dict(zip(names, motion, strict=False)))
+            found = functions.answer(call, arrays) if backend is self._robot.backend else None
+        return found
 
     def _read(
         self, beside: Mapping[str, Beside] = NOTHING, **named: object
@@ -371,7 +426,12 @@ def constraints_of(
     structure, tree = robot.structure, robot.backend.tree
     if tree is not None:
         chosen = TreeConstraints(structure, tree, independent, contacts, at)
-        ties = TiedJoints(structure, chosen, allowed, lambda backend: TieRows(backend.frames, chosen))
+        ties = TiedJoints(
+            structure,
+            chosen,
+            allowed,
+            lambda backend: TieRows(backend.frames, chosen, backend.tied_functions(chosen, allowed)),
+        )
         return Constraints(robot, ties, made)
     written = structure.written
     if written is None or not isinstance(contacts, list | tuple) or len(contacts):

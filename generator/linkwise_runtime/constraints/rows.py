@@ -2,6 +2,7 @@
 
 from typing import Protocol
 
+from ..answers.packed import TiedFunctions
 from ..interface import Numbers
 
 
@@ -25,6 +26,10 @@ class ConstraintRows(Protocol):
     @property
     def couplings(self) -> int:
         """Number of the last rows whose unit is their author's choice: they are divided by their slopes."""
+
+    @property
+    def functions(self) -> TiedFunctions | None:
+        """Functions of the back end for all that follows from these rows; None without any."""
 
     def at(self, q: Numbers, held_at: Numbers | None = None) -> RowsThere:
         """Return the rows at positions (..., n); contacts are held as they are there, or as at `held_at`."""

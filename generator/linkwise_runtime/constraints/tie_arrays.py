@@ -76,11 +76,7 @@ def pairs(xp: Namespace, tables: TieTables, numbers: TreeArrays, q: Numbers) -> 
     screws = joint_screws(xp, tables.frames.joints, at.poses.joints)[:, :, None]
     one, z = tables.moved_apart, screws[:, 0]
     linear = one * screws[:3, 1] + cross(z, _arms(xp, tables, at.places))
-    return paired(xp, tables, at, by_coordinate(tables.frames, xp.concat([one * z[:3], linear], 0)))
-
-
-def paired(xp: Namespace, tables: TieTables, at: Ends, moves: Numbers) -> Pairs:
-    """Return the pairs of frames whose J is `moves`, (6, P, n, samples)."""
+    moves = by_coordinate(tables.frames, xp.concat([one * z[:3], linear], 0))
     shift = at.places[:, : tables.pairs] - second_ends(xp, tables, at.places)
     return Pairs(at, shift, moves, _weights(xp, tables, at, shift))
 

@@ -1,27 +1,24 @@
 """Rows of ties, couplings and contacts for positions that have been read."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..answers.packed import OneSample
-from ..interface import Numbers, side_by_side
+from ..answers.packed import TiedFunctions
+from ..interface import Numbers, namespace, side_by_side
 from ..kinematics.frame_answers import NONE, FrameAnswers, FrameRequest, in_pieces
-from ..kinematics.frame_arrays import FramePoses
 from ..kinematics.joint_wrenches import JointsAsked, JointTables, joint_tables, on_frames, placed_joints
 from ..kinematics.wrench_answers import POINT, carried_frames
-from ..rule.kinematics import Poses, gather
+from ..rule.kinematics import gather
 from .chosen_constraints import TreeConstraints
 from .held_frames import TieTables
+from .rows import RowsThere
 from .tie_arrays import (
     Changes,
-    Ends,
     Pairs,
     ends,
     pair_changes,
-    paired,
     pairs,
     second_ends,
     tie_jacobian,
@@ -30,16 +27,6 @@ from .tie_arrays import (
 )
 
 OnTies = FrameRequest[TieTables]
-
-
-class TieEnd(NamedTuple):
-    """Frame of the tree, a point of it, and axes in it."""
-
-    frame: int
-    point: NDArray[np.float64]
-    """(3,)"""
-    axes: NDArray[np.float64]
-    """(3, 3)"""
 
 
 class BorneTies(NamedTuple):
@@ -63,27 +50,32 @@ class TieRows:
 
     unit_rows = False
 
-    def __init__(self, frames: FrameAnswers, chosen: TreeConstraints) -> None:
+    def __init__(
+        self, frames: FrameAnswers, chosen: TreeConstraints, functions: TiedFunctions | None = None
+    ) -> None:
         self._frames, self._constants, self.count = frames, chosen.tables, len(chosen.rows)
         self.couplings = chosen.couplings
         self._tables: dict[object, TieTables] = {}
         self._borne = BorneRows(frames, chosen)
         self._has_contacts = chosen.tables.ties < chosen.tables.pairs
-        first = [TieEnd(one.first, np.array(one.point), one.axes) for one in chosen.held]
-        seconds = [one.second for one in chosen.held if one.second is not None]
-        self._ends = [*first, *(TieEnd(frame, np.zeros(3), np.eye(3)) for frame in seconds)]
+        self.functions = functions
 
-    def at(self, q: Numbers, held_at: Numbers | None = None) -> "RowsAt":
+    def at(self, q: Numbers, held_at: Numbers | None = None) -> RowsThere:
         """Return the rows at positions (..., n); contacts are held as they are there, or as at `held_at`."""
-        is_held = self._has_contacts and held_at is not None
-        asked = self._asked([q, held_at] if is_held and held_at is not None else [q])
-        one = self._frames.backend.one_sample
-        if one is not None and isinstance(q, np.ndarray) and q.size == q.shape[-1] and self._ends:
-            return RowsAtOne(self._frames, asked, q, self.count, self._ends, one)
-        return RowsAt(self._frames, asked, q, self.count)
+        held = held_at if self._has_contacts else None
+
+        def of_arrays() -> RowsAt:
+            asked = self._asked([q] if held is None else [q, held])
+            return RowsAt(self._frames, asked, q, self.count)
+
+        functions = self.functions if isinstance(q, np.ndarray) else None
+        return of_arrays() if functions is None else FunctionRowsAt(functions, q, held, of_arrays)
 
     def violation(self, q: Numbers, held_at: Numbers) -> Numbers:
         """Return phi (..., C), from where contacts took hold."""
+        found = None if self.functions is None else self.functions.answer("violation", [q], held_at)
+        if found is not None:
+            return found[0]
 
         def answer(at: OnTies) -> Numbers:
             held = ends(at.xp, at.tables, at.numbers, at.motion[1]) if self._has_contacts else None
@@ -198,59 +190,25 @@ class RowsAt:
         return side_by_side(flat.reshape(*self._shape[:-1], self._count, width))
 
 
-class RowsAtOne(RowsAt):
-    """Rows at one sample, on a back end that has functions for its frames."""
+class FunctionRowsAt:
+    """Rows at some positions, by a back end's functions; `else_at` makes those of arrays where these fail."""
 
     def __init__(
-        self,
-        frames: FrameAnswers,
-        asked: OnTies,
-        q: NDArray[np.floating],
-        count: int,
-        ends: Sequence[TieEnd],
-        one: OneSample,
+        self, functions: TiedFunctions, q: Numbers, held_at: Numbers | None, else_at: Callable[[], RowsAt]
     ) -> None:
-        super().__init__(frames, asked, q, count)
-        self._q, self._ends, self._one = q, ends, one
-        self._jacobians: NDArray[np.floating] | None = None
+        self._functions, self._q, self._held_at, self._else_at = functions, q, held_at, else_at
 
-    def _pairs(self, at: OnTies) -> Pairs | None:
-        poses, jacobians = self._of_ends("pose", [self._q]), self._of_ends("jacobian", [self._q])
-        if poses is None or jacobians is None:
-            return super()._pairs(at)
-        self._jacobians = jacobians
-        turns, kind = poses[:, :3, :3], poses.dtype
-        points = np.array([end.point for end in self._ends], kind)[..., None]
-        places = poses[:, :3, 3] + (turns @ points)[..., 0]
-        axes = (turns @ np.array([end.axes for end in self._ends], kind)).transpose(1, 2, 0)[..., None]
-        # Where the frames are known, their joints are not needed.
-        found = Ends(FramePoses(cast(Poses, None), axes, cast(Numbers, None)), places.T[..., None])
-        return paired(at.xp, at.tables, found, self._apart(at, jacobians))
+    def positions(self) -> Numbers:
+        """Return phi and A beside it, (..., C, 1 + n)."""
+        found = self._functions.answer("positions", [self._q], self._held_at)
+        if found is None:
+            return self._else_at().positions()
+        return namespace(self._q).concat([found[0][..., None], found[1]], -1)
 
-    def _changes(self, at: OnTies, placed: Pairs | None) -> Changes | None:
-        qd = cast("NDArray[np.floating]", at.motion[1])[:, 0]
-        rates = None if self._jacobians is None else self._of_ends("jacobian_rate", [self._q, qd])
-        if rates is None or self._jacobians is None:
-            return super()._changes(at, placed)
-        speeds = (self._jacobians @ qd).T[..., None]
-        return Changes(self._apart(at, rates), speeds[:3, : at.tables.pairs], speeds[3:])
-
-    def _of_ends(self, call: str, motion: Sequence[NDArray[np.floating]]) -> NDArray[np.floating] | None:
-        """Return the answers for all frames; None where the back end has none."""
-        kind, found = self._q.dtype, []
-        for end in self._ends:
-            point = end.point.astype(kind) if call != "pose" and end.point.any() else None
-            answer = self._one.answer(call, motion, end.frame, point)
-            if answer is None:
-                return None
-            found.append(answer.reshape(answer.shape[-2:]))
-        return np.array(found)
-
-    def _apart(self, at: OnTies, jacobians: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Return the part of the pairs' first frames minus that of the second ones, (6, P, n, 1)."""
-        moves = jacobians[: at.tables.pairs].copy()
-        moves[: at.tables.ties] -= jacobians[at.tables.pairs :]
-        return moves.transpose(1, 0, 2)[..., None]
+    def rates(self, qd: Numbers) -> Numbers:
+        """Return dA/dt (..., C, n), for velocities (..., n) of the same samples."""
+        found = self._functions.answer("jacobian_rate", [self._q, qd])
+        return self._else_at().rates(qd) if found is None else found[0]
 
 
 def _pairs(at: OnTies) -> Pairs | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -13,7 +14,6 @@ from ..structure import Structure
 from .chosen_constraints import ChosenConstraints
 from .closed_places import (
     ClosedPlace,
-    DependentMap,
     RowNames,
     TiesAt,
     checked_place,
@@ -112,15 +112,25 @@ class TiedJoints:
         self, backend: ArrayBackend, place: ClosedPlace, qd: Numbers
     ) -> tuple[Numbers, Numbers, Numbers]:
         """Return c2^ = G^T c2 G, c1^ = G^T (c2 dG/dt + c1 G) and g^ = G^T g, for each link."""
+        acceleration, velocity, g = self._moved_coefficients(backend, place, qd)
+        left = partial(independent_torque, place.found)
+        return _projected_cubes(left, acceleration), _projected_cubes(left, velocity), left(g)
+
+    def force_coefficients(
+        self, backend: ArrayBackend, place: ClosedPlace, qd: Numbers
+    ) -> tuple[Numbers, Numbers, Numbers]:
+        """Return what rows bear of these, A_d^+T times c2 G, c2 dG/dt + c1 G and g, for each link."""
+        acceleration, velocity, g = self._moved_coefficients(backend, place, qd)
+        left = partial(tie_forces, place.found)
+        return _projected_cubes(left, acceleration), _projected_cubes(left, velocity), left(g)
+
+    def _moved_coefficients(
+        self, backend: ArrayBackend, place: ClosedPlace, qd: Numbers
+    ) -> tuple[Numbers, Numbers, Numbers]:
+        """Return c2 G, c2 dG/dt + c1 G and g of all joints."""
         c2, c1, g = backend.answers.coefficients(place.q, qd)
-        found, rate = place.found, place.map_rate(qd)[..., None, :, :]
-        mapped = found.map[..., None, :, :]
-        acceleration, velocity = c2 @ mapped, c2 @ rate + c1 @ mapped
-        return (
-            _projected_cubes(found, acceleration),
-            _projected_cubes(found, velocity),
-            independent_torque(found, g),
-        )
+        mapped, rate = (a[..., None, :, :] for a in (place.found.map, place.map_rate(qd)))
+        return c2 @ mapped, c2 @ rate + c1 @ mapped, g
 
     def _solved(self, place: ClosedPlace, mass: Numbers, force: Numbers, bias: Numbers) -> Numbers:
         found = place.found
@@ -135,9 +145,9 @@ def without_gradient(like: Numbers) -> AbstractContextManager[object]:
     return nullcontext() if isinstance(like, np.ndarray) else cast(Any, namespace(like)).no_grad()
 
 
-def _projected_cubes(found: DependentMap, parts: Numbers) -> Numbers:
-    """Return G^T, over i, times parts (..., n, N, m)."""
+def _projected_cubes(left: Callable[[Numbers], Numbers], parts: Numbers) -> Numbers:
+    """Return G^T, or what else turns torques (..., n, X) into rows, over i of parts (..., n, N, m)."""
     *batch, n, links, m = parts.shape
-    flat = independent_torque(found, parts.reshape(*batch, n, links * m))
-    cubes: Numbers = flat.reshape(*batch, m, links, m)
+    flat = left(parts.reshape(*batch, n, links * m))
+    cubes: Numbers = flat.reshape(*batch, flat.shape[-2], links, m)
     return cubes

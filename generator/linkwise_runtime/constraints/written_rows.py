@@ -85,6 +85,7 @@ class WrittenRows:
     """Rows that a user wrote on one back end; see `ConstraintRows`."""
 
     unit_rows = True
+    functions = None
 
     def __init__(self, backend: ArrayBackend, written: WrittenConstraints) -> None:
         self.backend, self.written, self.couplings = backend, written, len(written.names)

@@ -11,6 +11,7 @@ in the null space of A: with qd = G yd of the independent coordinates y and A be
     qdd_x = G (G^T M G)^-1 G^T (F_x - M beta_x) + beta_x      A^T lambda_x = M qdd_x - F_x
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -99,7 +100,33 @@ class TiedResponse:
         return tie_forces(self.place.found, torque if forces is None else torque - forces)
 
 
-Response = FreeResponse | TiedResponse
+@dataclass(frozen=True)
+class FunctionResponse:
+    """Response of coordinates to forces under constraints, as a back end's own functions answer it."""
+
+    response: Numbers
+    """G (G^T M G)^-1 G^T, (..., n, n)."""
+    by_forces: Numbers
+    """Forces of rows by forces on the joints, (..., C, n)."""
+    by_velocity: Numbers
+    """Accelerations of the constraints' own source, by cause (..., n, n)."""
+    borne: Numbers
+    """Forces of rows by this source, (..., C, n)."""
+
+    def accelerations(self, forces: Numbers) -> Numbers:
+        """Return the accelerations (..., n, X) that columns of forces (..., n, X) cause."""
+        return self.response @ forces
+
+    def of_velocities(self) -> Numbers:
+        """Return the accelerations of the constraints' own source, by cause (..., n, n)."""
+        return self.by_velocity
+
+    def reactions(self, forces: Numbers | None, accelerations: Numbers) -> Numbers:
+        """Return lambda (..., C, X), for columns of forces, or None for the constraints' own source."""
+        return self.borne if forces is None else self.by_forces @ forces
+
+
+Response = FreeResponse | TiedResponse | FunctionResponse
 
 
 def response_of(
@@ -201,14 +228,20 @@ def driven_sources(robot: DrivenRobot, asked: Driven, point: object = None) -> D
     backend, (q, qd, last, *vectors) = robot.door.read(named, beside={**loads.beside, **points})
     constraints = constraints_of(robot, asked.constraints)
     pulls = loads.torques_by_frame(backend, q, vectors[: len(loads.beside)])
-    place = None if constraints is None else constraints.ties.place(backend, q)
-    if place is not None:
+    found = None if constraints is None or tau is None else _by_functions(constraints, asked, backend, q, qd)
+    place = None if constraints is None or found is not None else constraints.ties.place(backend, q)
+    if found is not None:
+        qd = found[0]
+    elif place is not None:
         qd = place.velocity(place.own(qd))
     others = source_forces(backend, q, qd, [sum(parts, 0.0 * q) for parts in pulls], asked.passive)
-    response: Response = FreeResponse(robot.structure, others.mass)
-    if constraints is not None and place is not None:
+    if found is not None:
+        response: Response = FunctionResponse(*found[1:])
+    elif constraints is not None and place is not None:
         response = TiedResponse(backend, others.mass, constraints, place, place.bias_by_cause(qd))
-    if tau is None:
+    else:
+        response = FreeResponse(robot.structure, others.mass)
+    if tau is None and not isinstance(response, FunctionResponse):
         if place is not None:
             last = place.velocity(place.own(last)) + place.bias(qd)
         needed = (others.mass @ last[..., None])[..., 0] - others.columns.sum(-1)
@@ -217,6 +250,15 @@ def driven_sources(robot: DrivenRobot, asked: Driven, point: object = None) -> D
     placed = dict(zip(points, vectors[len(loads.beside) :], strict=True))
     forces = with_actuators(others, last, identity)
     return DrivenSources(backend, q, qd, placed, forces, response, loads, pulls)
+
+
+def _by_functions(
+    constraints: Constraints[Any], asked: Driven, backend: ArrayBackend, q: Numbers, qd: Numbers
+) -> Sequence[Numbers] | None:
+    """Return velocities that follow, and the response, of the back end's own functions; None without any."""
+    functions = constraints.ties.rows(backend).functions
+    call = "response" if asked.passive else "response_of_links"
+    return None if functions is None else functions.answer(call, [q, qd])
 
 
 def _jacobians(at: DrivenSources, frame: object) -> tuple[Numbers, Numbers]:

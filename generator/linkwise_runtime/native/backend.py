@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..answers.answers import Answers
-from ..answers.packed import TorqueOfOne
+from ..answers.packed import TiedFunctions, TorqueOfOne
 from ..arguments import NOTHING, Beside, as_given, has_tensors
 from ..arrays.backend import ArrayBackend
 from ..arrays.numpy_backend import NumpyBackend
 from ..call_table import CALLS
+from ..constraints.chosen_constraints import TreeConstraints
 from ..control.frame_impedance import FrameTargets
 from ..control.joint_impedance import JointTargets
 from ..interface import ClosedForms, Numbers
@@ -23,6 +24,7 @@ from ..rule.calls import RigidRule
 from ..structure import Structure
 from .calls import FUNCTIONS, LINK_WRENCHES, SHARE_VARIANCES, NativeCalls, checked_threads
 from .compiled_calls import QuickCalls
+from .constraints import NativeTies, has_functions
 from .control import ControlCalls, NativeTorque
 from .memory import NumberArray, NumberType, memory
 
@@ -172,6 +174,12 @@ class NativeBackend(NumpyBackend):
         """Return the object that computes a controller's torque for one sample in C."""
         targets, framed = cast(JointTargets, joints), cast("FrameTargets | None", frame)
         return NativeTorque(self.calls, self.tree is not None, targets, framed)
+
+    def tied_functions(self, chosen: object, tolerance: float | None) -> TiedFunctions | None:
+        """Return the functions of C for constraints that have been chosen."""
+        if not has_functions(self.calls, chosen):
+            return None
+        return NativeTies(self.calls, cast(TreeConstraints, chosen), tolerance)
 
     def separate(self) -> ArrayBackend:
         """Return a copy whose parameters may be set."""

@@ -25,6 +25,7 @@ PARTS = {
     "gradient": ("POSITION_GRADIENT", "SINES"),
     "regressors": ("REGRESSORS", "SINES"),
     "control": ("CONTROL", "SINES"),
+    "constraints": ("CONSTRAINTS", "SINES"),
 }
 """Parts of a robot's C file (see numbers.h) by library; a library is compiled when first asked for."""
 

@@ -34,12 +34,12 @@ SHARE_VARIANCES = "share_variances"
 """Variances of packed values by uncertain bodies, which `uncertainty` takes the roots of; no row either."""
 LINK_WRENCHES = "link_wrenches"
 """Wrenches of links by cause, of which `reactions` are made; they too are no row."""
-FUNCTIONS = {key: row.c for key, row in CALLS.items() if row.c and not row.one} | {
+FUNCTIONS = {key: row.c for key, row in CALLS.items() if row.c and not row.one and row.ties != "kept"} | {
     PACKED_GRADIENT: "position_gradient",
     LINK_WRENCHES: "reactions",
     SHARE_VARIANCES: SHARE_VARIANCES,
 }
-"""Names in C of the calls for many samples."""
+"""Names in C of the calls for many samples; constraints.py has those of tied joints."""
 
 AT_REST = ("coefficients", "coefficient_regressors", LINK_WRENCHES)
 """Calls that take no qdd."""

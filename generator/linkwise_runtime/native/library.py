@@ -32,6 +32,19 @@ CONTROL = {row.c: Control(len(row.motion), "point" in row.options) for row in CA
 """Functions that take one sample and no count."""
 IMPEDANCE = ("partial_impedance", "frame_partial_impedance", "cancel")
 """Functions of one sample for control: of joints, of a frame, and of what is cancelled at an acceleration."""
+TIED = (
+    "constraint_rows",
+    "closed",
+    "following",
+    "constrained_coefficients",
+    "constrained_propagation",
+    "constrained_torque",
+    "constrained_response",
+    "constrained_response_of_links",
+    "constrained_dynamics",
+    "constrained_dynamics_of_links",
+)
+"""Functions of joints that are tied."""
 
 
 @cache
@@ -63,6 +76,8 @@ def symbol(sources: Sources, call: str, kind: str) -> "CFunction":
 
 def _library_of(call: str) -> str:
     """Return which of a robot's libraries, by its key in PARTS, has a function."""
+    if call in TIED:
+        return "constraints"
     if call in CONTROL or call in IMPEDANCE:
         return "control"
     if call.endswith("position_gradient"):

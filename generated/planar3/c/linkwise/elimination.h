@@ -47,7 +47,7 @@ static inline int vague(const struct pivot *weakest)
 /* 1 / (a_cc (a^-1)_cc) of a positive a = L D L', of which rows hold D L' and 1 / D: (a^-1)_cc = y' D^-1 y, L y = e_c. */
 static inline real left_when_free(int n, int width, int c, real size, const real *rows)
 {
-    real y[LARGEST] = {0}, mobility = 0;
+    ALIGNED real y[LARGEST] = {0}, mobility = 0;
     y[c] = 1;
     for (int m = c; m < n; ++m) {
         const real *const row = rows + m * width, moved = y[m] * row[m];
@@ -63,11 +63,12 @@ static inline real left_when_free(int n, int width, int c, real size, const real
    or what is left is rounding beside that, or of a positive matrix negative, or not a number, its column is the answer, counted
    from 1, and b is as it was; otherwise the answer is 0. `weakest`, given as {0, 1}, is found, unless it is NULL: x is known to
    a relative error of about EPSILON / left. Of a matrix that is not known to be positive its pivot is all that is looked at. */
+/* The rows are ALIGNED as gcc 12 takes them to be, where it vectorizes what is left of a loop. */
 INLINE int eliminate(int regular, int n, int sides, const real *size, const real *a, real *b, struct pivot *weakest)
 {
     const real least = ROUNDING(n);
     const int width = (n + sides + FILLED - 1) / FILLED * FILLED;
-    real rows[LARGEST * (LARGEST + 6 + FILLED)], scale[LARGEST];
+    ALIGNED real rows[LARGEST * (LARGEST + 6 + FILLED)], scale[LARGEST];
     for (int r = 0; r < n; ++r) {
         for (int k = 0; k < n; ++k)
             rows[r * width + k] = a[r * n + k];

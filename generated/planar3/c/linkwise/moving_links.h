@@ -14,6 +14,25 @@ struct sample {
     moving_link links[LINKS];
 };
 
+/* Where a point of the frame is: the motion has places but for what no joint turns (tree.h), which is added here. */
+static inline vector place_in_world(const struct sample *s, int frame, const struct offsets *o, const real *point, const real *q)
+{
+    vector at = place_of(&s->m, frame, o, point);
+    DISPLACED(1, q);
+    for (int f = named_frames[frame].frame; f; f = joints[f - 1].parent) {
+        const struct joint *const joint = &joints[f - 1];
+        if (joint->placed)
+            continue;
+        at = add(at, turned(s->m.turn[joint->parent], s->x->placings[f - 1].place));
+        if (joint->kind == PRISMATIC) {
+            const matrix turn = s->m.turn[f];
+            const vector z = {turn.x.z, turn.y.z, turn.z.z};
+            at = add(at, scale(s->x->placings[f - 1].ratio * moved[MOVED_BY(f - 1)], z));
+        }
+    }
+    return at;
+}
+
 static inline void observe(const struct numbers *x, const real *q, const real *qd, struct sample *s)
 {
     const real rest[N] = {0};

@@ -72,14 +72,15 @@ typedef double real;
 #endif
 
 /* Compiled as it stands, a robot's file is whole. A build may also compile it in parts, side by side, and link them:
-   -DLINKWISE_PART=SINES, ONE_SAMPLE, BLOCKS, POSITION_GRADIENT, REGRESSORS or CONTROL, of which the last three may be left
-   away. */
+   -DLINKWISE_PART=SINES, ONE_SAMPLE, BLOCKS, POSITION_GRADIENT, REGRESSORS, CONTROL or CONSTRAINTS, of which the last four
+   may be left away. */
 #define SINES 1
 #define ONE_SAMPLE 2
 #define BLOCKS 3
 #define POSITION_GRADIENT 4
 #define REGRESSORS 5
 #define CONTROL 6
+#define CONSTRAINTS 7
 #if defined(LINKWISE_PART) && defined(LINKWISE_SMALL)
 #error "LINKWISE_SMALL is for a robot's file as a whole: leave LINKWISE_PART away"
 #endif
@@ -93,6 +94,14 @@ typedef double real;
 #else
 #define SHARED
 #endif
+#endif
+
+/* Functions of what ties joints take more stack and code than all others: with LINKWISE_SMALL they are there where a build asks
+   for them by -DLINKWISE_CONSTRAINTS. */
+#if PART(CONSTRAINTS) && (!defined(LINKWISE_SMALL) || defined(LINKWISE_CONSTRAINTS))
+#define CONSTRAINED 1
+#else
+#define CONSTRAINED 0
 #endif
 
 #endif

@@ -4,25 +4,6 @@
    E w is the rate of v under an angular velocity w, so that E' K x is what a spring of energy x' K x / 2 asks for. */
 #include "impedance.h"
 
-/* Where a point of the frame is: the motion has places but for what no joint turns (tree.h), which is added here. */
-static inline vector place_in_world(const struct sample *s, int frame, const struct offsets *o, const real *point, const real *q)
-{
-    vector at = place_of(&s->m, frame, o, point);
-    DISPLACED(1, q);
-    for (int f = named_frames[frame].frame; f; f = joints[f - 1].parent) {
-        const struct joint *const joint = &joints[f - 1];
-        if (joint->placed)
-            continue;
-        at = add(at, turned(s->m.turn[joint->parent], s->x->placings[f - 1].place));
-        if (joint->kind == PRISMATIC) {
-            const matrix turn = s->m.turn[f];
-            const vector z = {turn.x.z, turn.y.z, turn.z.z};
-            at = add(at, scale(s->x->placings[f - 1].ratio * moved[MOVED_BY(f - 1)], z));
-        }
-    }
-    return at;
-}
-
 /* The turn R R_d' that leads from a target to a frame, as a quaternion (w, x, y, z) with w >= 0: the largest of the four is
    found first (S. Shepperd, J. Guidance and Control 1(3), 1978). */
 static inline void turn_from(const struct sample *s, int frame, const real *target, real *quaternion)

@@ -12,6 +12,7 @@
 
 #include "arrays.h"
 
+#if PART(CONTROL)
 /* The frame's matrix is that in its joint's frame, taken to the parent's, and so on to the base. */
 void API(pose)(int frame, AT_POSITION, real *pose)
 {
@@ -43,6 +44,7 @@ void API(pose)(int frame, AT_POSITION, real *pose)
     pose[12] = pose[13] = pose[14] = 0;
     pose[15] = 1;
 }
+#endif
 
 /* The motion of what carries frame f, without accelerations. */
 static inline void carriers_moved(const struct numbers *x, int f, const real *q, const real *qd, motion *m)
@@ -97,6 +99,7 @@ static inline void rate_rows(const motion *m, int f, vector at, real *rows)
     }
 }
 
+#if PART(CONTROL)
 void API(jacobian)(int frame, const real *point, AT_POSITION, real *jacobian)
 {
     NUMBERS(x);
@@ -117,3 +120,4 @@ void API(jacobian_rate)(int frame, const real *point, AT_REST, real *rate)
     carriers_moved(x, carrier, q, qd, &m);
     rate_rows(&m, carrier, place_of(&m, frame, o, point), rate);
 }
+#endif

@@ -66,4 +66,19 @@ struct offsets {
     real place[NAMED][3];
 };
 
+/* What two frames hold of each other, or the ground of a frame: its point, with or without its z axis or all axes, its distance,
+   or a point of what rolls: see ties.h. NAME.h has names of those that a caller may ask for. */
+enum { HELD_POINT, HELD_HINGE, HELD_FRAME, HELD_DISTANCE, HELD_ROLLING };
+
+/* A tie of the robot's own, by the numbers of its frames among those that have names. */
+struct tie {
+    short kind, first, second;
+    real length;
+};
+
+/* A polynomial of a coordinate in a coupling's sum: its coefficients among those of all, from `first` on. */
+struct term {
+    short coordinate, first, factors;
+};
+
 #endif

@@ -10,6 +10,7 @@ from linkwise_runtime.structure import passive_sums
 
 from linkwise.dynamics.link_forms import lowering, parameter_names
 from linkwise.emit.c.sizes import EntryCounts, Span
+from linkwise.emit.c.tie_tables import tie_view
 from linkwise.emit.printer import CPrinter
 from linkwise.emit.straight_line import straight_line
 from linkwise.escape import c_comment
@@ -69,7 +70,7 @@ def path_spans(system: RigidSystem) -> tuple[Span, ...]:
 def table_view(system: RigidSystem) -> dict[str, Any]:
     """Return the fields of NAME_tree.h but for its name."""
     found, robot, links = columns(system), system.robot, path_spans(system)
-    return {
+    return tie_view(system) | {
         "frames": len(robot.links),
         "columns": len(robot.links) + len(found.sums),
         "joints": list(_joints(system)),

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from linkwise.emit.c.robot_files import free
 from linkwise.emit.c.robot_tables import columns, path_spans
 from linkwise.emit.c.sizes import Span, most_counts, tile, waiting_counts, whole
+from linkwise.emit.c.tie_tables import MOST_CONTACTS, tied_rows
 from linkwise.symbolic.system import RigidSystem, System
 
 VALUE = 64
@@ -94,8 +95,20 @@ def loops_stack(system: RigidSystem) -> int:
 
 
 def control_stack(system: System, links: tuple[Span, ...]) -> int:
-    """Return the bytes that functions for control of one sample take at most."""
-    return 8 * _control_values(system, links) + OWN
+    """Return the bytes that functions for control of one sample, or of tied joints, take at most."""
+    tied = _tied_values(system) if isinstance(system, RigidSystem) else 0
+    return 8 * max(_control_values(system, links), tied) + OWN
+
+
+def _tied_values(system: RigidSystem) -> int:
+    """Return how many numbers functions of tied joints keep: `struct tied`, and matrices beside it."""
+    n, frames, rows = len(system.coordinates), len(system.robot.links), tied_rows(system) + 6 * MOST_CONTACTS
+    pitch, borne = n + 15, rows + 7
+    standing = _moved(system) + 34 * len(system.links) + n
+    tied = standing + rows * (3 * n + pitch + 3) + n * (2 * pitch + 4)
+    beside = rows * pitch + n * (borne + 4 * pitch + 5 * n + 40) + 49 * (frames + 1)
+    offsets = 3 * len(system.robot.named_frames) if system.parameters else 0
+    return tied + max(beside, standing) + 24 * _longest(system) + _numbers(system) + offsets
 
 
 def _control_values(system: System, links: tuple[Span, ...]) -> int:

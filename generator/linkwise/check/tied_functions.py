@@ -1,0 +1,60 @@
+"""Declarations that a package's header must have of functions of tied joints.
+
+They take more than arrays, what ties the joints, so that only their declarations and presence are checked
+here: the native back end's constraints, which are compared with least squares, call them all.
+"""
+
+from linkwise.check.compiled_c import Prototype
+from linkwise.package.manifest import Manifest
+
+PARTS = ("acceleration", "velocity", "gravity", "force_acceleration", "force_velocity", "force_gravity")
+RESPONSES = ("velocity", "response", "reactions", "accelerations", "forces")
+TIED: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
+    "constraint_rows": (("q", "qd"), ("held_at",), ("violation", "jacobian", "rate")),
+    "closed": (("q",), ("held_at",), ("closed",)),
+    "following": (("q", "qd"), (), ("map", "velocity", "accelerations")),
+    "constrained_coefficients": (("q", "qd"), (), PARTS),
+    "constrained_propagation": (("q", "qd", "qdd"), (), PARTS),
+    "constrained_torque": (("q", "qd", "qdd"), (), ("torque", "forces")),
+    "constrained_response": (("q", "qd"), (), RESPONSES),
+    "constrained_response_of_links": (("q", "qd"), (), RESPONSES),
+    "constrained_dynamics": (("q", "qd", "tau"), (), ("qdd", "forces")),
+    "constrained_dynamics_of_links": (("q", "qd", "tau"), (), ("qdd", "forces")),
+}
+"""Functions of tied joints: their motion, what they take behind the constraints, and what they write."""
+CONSTANTS = {
+    "CONTACT_POINT": 0,
+    "CONTACT_HINGED": 1,
+    "CONTACT_HELD": 2,
+    "CONTACT_ROLLING": 4,
+    "MOST_CONTACTS": 8,
+    "STEPS": 50,
+    "TIES_OPEN": 1,
+    "TIES_SINGULAR": 2,
+    "TIES_CONTRADICT": 3,
+    "TIES_UNCLOSED": 4,
+    "NO_INERTIA": 5,
+    "UNKNOWN": 6,
+}
+"""Constants of the header, without the robot's name."""
+
+
+def tied_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Prototype]:
+    """Return the functions of one number type; none for links of energies."""
+    if manifest.tree is None:
+        return []
+    parameters = ("p",) if manifest.parameters else ()
+    kind = (("constraints", f"{manifest.name}_constraints{suffix}"),)
+    return [
+        Prototype(
+            name + suffix,
+            real,
+            "count",
+            (*motion, *parameters, "constraints", *behind),
+            outputs,
+            "int",
+            kind,
+        )
+        for name, (motion, behind, outputs) in TIED.items()
+        if manifest.passive or not name.endswith("_of_links")
+    ]

@@ -1,0 +1,233 @@
+"""C of tied joints through the native back end: against NumPy, one sample and many, in both precisions."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import needs_compiler
+from linkwise import Options, generate, read_system, write_package
+from linkwise.package.load import import_package
+
+pytestmark = needs_compiler
+
+ARM = """schema = 1
+name = "arm"
+gravity = [0.3, -0.5, -9.81]
+parameters = {L = 0.42}
+joint = [
+  {name = "lift", type = "prismatic", parent = "base", child = "mast", xyz = [0.1, 0.2, 0.3]},
+  {name = "turn", parent = "mast", child = "a", axis = [0, 0, 1], stiffness = 3.0, rest = 0.1, damping = 0.2},
+  {name = "shoulder", parent = "a", child = "b", axis = [0, 1, 0], xyz = [0.1, 0, 0.2], armature = 0.05},
+  {name = "elbow", parent = "b", child = "c", axis = [0.1, 1, 0], xyz = [0.4, 0, 0], friction = 0.3},
+  {name = "wrist", parent = "c", child = "d", axis = [1, 0, 0.2], xyz = ["L", 0, 0]},
+  {name = "slide", type = "prismatic", parent = "d", child = "e", axis = [1, 0.3, 0]},
+  {name = "far", parent = "base", child = "f", axis = [0, 1, 0], xyz = [0.9, 0.2, 0.5]},
+]
+link = [
+  {name = "mast", mass = 2.0, com = [0, 0, 0.1], inertia = {xx = 0.1, yy = 0.1, zz = 0.05}},
+  {name = "a", mass = 1.2, com = [0.1, 0.01, 0], inertia = {xx = 0.01, yy = 0.02, zz = 0.02}},
+  {name = "b", mass = 1.7, com = [0.2, -0.02, 0], inertia = {xx = 0.01, yy = 0.05, zz = 0.06}},
+  {name = "c", mass = 1.5, com = [0.2, 0, 0.03], inertia = {xx = 0.01, yy = 0.03, zz = 0.03}},
+  {name = "d", mass = 0.5, com = [0.05, 0, 0], inertia = {xx = 0.004, yy = 0.003, zz = 0.002}},
+  {name = "e", mass = 0.4, com = [0.03, 0, 0], inertia = {xx = 0.001, yy = 0.002, zz = 0.002}},
+  {name = "f", mass = 0.7, com = [0, 0, 0.2], inertia = {xx = 0.01, yy = 0.01, zz = 0.003}},
+]
+"""
+TIES = """
+[[constraint]]
+name = "rod"
+type = "distance"
+length = 0.6
+first = {frame = "c", xyz = [0.1, 0.05, 0]}
+second = {frame = "f", xyz = [0, 0, 0.3]}
+[[constraint]]
+name = "rack"
+type = "coupling"
+terms = {slide = 1.0, wrist = [0.01, -0.8, 0.1]}
+"""
+ON_MOTION = {
+    "jacobian": 1,
+    "jacobian_rate": 2,
+    "velocity_map": 1,
+    "velocity_accelerations": 2,
+    "inverse_dynamics": 3,
+    "partial_torque": 3,
+    "coefficients": 2,
+    "propagation": 3,
+    "forces": 3,
+    "force_coefficients": 2,
+    "force_propagation": 3,
+    "forward_dynamics": 3,
+}
+"""Calls, and how many arrays of motion each takes."""
+EXACT, SINGLE = 1e-12, 3e-4
+
+
+def package(folder: Path, text: str, kernel: str) -> ModuleType:
+    (folder / "robot.toml").write_text(text)
+    made = generate(
+        read_system(folder / "robot.toml", Options("symbolic")), ["numpy", "native"], kernel=kernel
+    )
+    write_package(made, folder / "arm")
+    return import_package(folder / "arm")
+
+
+@pytest.fixture(scope="module", params=["straight", "loops"])
+def tied(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    return package(tmp_path_factory.mktemp(request.param), ARM + TIES, request.param)
+
+
+@pytest.fixture(scope="module")
+def free(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    return package(tmp_path_factory.mktemp("free"), ARM, "loops")
+
+
+def contacts(module: ModuleType, *kinds: str) -> list[Any]:
+    about = {"point": (0.02, -0.01, 0.03), "axis": (0.2, 1.0, -0.4), "radius": 0.07}
+    frames = ("e", "f", "d")
+    return [module.Contact(frame, kind=kind, **about) for frame, kind in zip(frames, kinds, strict=False)]
+
+
+def both(module: ModuleType, kinds: tuple[str, ...], at: Any = None) -> list[Any]:
+    """Return the same constraints on NumPy and in C, at a parameter that is not the file's."""
+    robots = [module.load(name, parameters={"L": 0.4}) for name in ("numpy", "native")]
+    if not kinds:
+        return [robot.constraints for robot in robots]
+    exact = robots[0].constrained(contacts=contacts(module, *kinds), at=at)
+    own = list(exact.independent)
+    return [r.constrained(independent=own, contacts=contacts(module, *kinds), at=at) for r in robots]
+
+
+def motion(exact: Any, samples: int = 9) -> list[Any]:
+    draw = np.random.default_rng(3)
+    q = exact.closed_position + draw.uniform(-0.05, 0.05, (samples, len(exact.closed_position)))
+    return [exact.closed(q), *draw.uniform(-1.0, 1.0, (2, *q.shape))]
+
+
+def parts(answer: Any) -> list[Any]:
+    return list(answer) if isinstance(answer, tuple) else [answer]
+
+
+def compare(found: Any, expected: Any, limit: float) -> None:
+    for one, other in zip(parts(found), parts(expected), strict=True):
+        assert one.shape == other.shape
+        np.testing.assert_allclose(one, other, rtol=0, atol=limit * max(1.0, np.abs(other).max(initial=0.0)))
+
+
+CASES: list[tuple[bool, tuple[str, ...]]] = [
+    (True, ()),
+    (True, ("point",)),
+    (False, ("held",)),
+    (False, ("hinged",)),
+    (False, ("point", "rolling")),
+    (False, ("rolling", "hinged")),
+]
+"""Cases: True where the robot has ties of its own, and kinds of contacts."""
+
+
+@pytest.mark.parametrize(("has_ties", "kinds"), CASES)
+def test_c_says_what_numpy_says(
+    has_ties: bool, kinds: tuple[str, ...], tied: ModuleType, free: ModuleType
+) -> None:
+    module = tied if has_ties else free
+    at = np.array([0.1, 0.3, 0.5, -0.7, 0.4, 0.05, 0.2])
+    exact, compiled = both(module, kinds, None if has_ties and not kinds else at if not has_ties else None)
+    assert compiled.ties.rows(compiled._robot.backend).functions is not None
+    given = motion(exact)
+    for call, count in ON_MOTION.items():
+        expected = getattr(exact, call)(*given[:count])
+        compare(getattr(compiled, call)(*given[:count]), expected, EXACT)
+        for _ in range(2):  # the second one goes past what reads the first
+            alone = getattr(compiled, call)(*(a[4] for a in given[:count]))
+            compare(
+                alone,
+                type(expected)(*(a[4] for a in expected)) if isinstance(expected, tuple) else expected[4],
+                EXACT,
+            )
+        single = getattr(compiled, call)(*(a.astype(np.float32) for a in given[:count]))
+        assert all(part.dtype == np.float32 for part in parts(single))
+        compare(single, expected, SINGLE)
+    compare(
+        compiled.forward_dynamics(*given, passive=False), exact.forward_dynamics(*given, passive=False), EXACT
+    )
+
+
+@pytest.mark.parametrize(("has_ties", "kinds"), CASES)
+def test_c_closes_what_numpy_closes(
+    has_ties: bool, kinds: tuple[str, ...], tied: ModuleType, free: ModuleType
+) -> None:
+    at = None if has_ties else np.array([0.1, 0.3, 0.5, -0.7, 0.4, 0.05, 0.2])
+    exact, compiled = both(tied if has_ties else free, kinds, at)
+    q = motion(exact)[0] + 0.03 * np.random.default_rng(4).uniform(-1.0, 1.0, (9, 7))
+    compare(compiled.violation(q), exact.violation(q), EXACT)
+    closed = compiled.closed(q)
+    compare(closed, exact.closed(q), EXACT)
+    compare(compiled.closed(q[2]), closed[2], EXACT)
+    if has_ties or "rolling" in kinds:
+        return
+    held = motion(exact)[0]
+    compare(compiled.violation(q, held_at=held), exact.violation(q, held_at=held), EXACT)
+    compare(compiled.closed(q, held_at=held), exact.closed(q, held_at=held), 1e-10)
+
+
+@pytest.mark.parametrize(("has_ties", "kinds"), CASES)
+@pytest.mark.parametrize("passive", [True, False])
+def test_c_induces_what_numpy_induces(
+    passive: bool, has_ties: bool, kinds: tuple[str, ...], tied: ModuleType, free: ModuleType
+) -> None:
+    at = None if has_ties else np.array([0.1, 0.3, 0.5, -0.7, 0.4, 0.05, 0.2])
+    module = tied if has_ties else free
+    exact, compiled = both(module, kinds, at)
+    q, qd, tau = motion(exact)
+    load = module.AppliedLoad("d", force=np.array([3.0, -2.0, 1.0]))
+    for call in ("induced_accelerations", "induced_reactions"):
+
+        def induced(one: Any, *state: Any, call: str = call) -> Any:
+            asked = getattr(one._robot, call)
+            return asked(*state, loads=[load], passive=passive, constraints=one)
+
+        expected = induced(exact, q, qd, tau)
+        compare(induced(compiled, q, qd, tau), expected, EXACT)
+        compare(induced(compiled, q[3], qd[3], tau[3]), type(expected)(*(a[3] for a in expected)), EXACT)
+
+
+def test_forces_by_cause_are_those_of_the_links(tied: ModuleType) -> None:
+    for constraints in both(tied, ()):
+        given = motion(constraints)
+        c2, c1, g = constraints.force_propagation(*given)
+        compare(c2.sum(-1) + c1.sum(-1) + g, constraints.forces(*given), EXACT)
+
+
+def message(call: Callable[[], Any]) -> str:
+    with pytest.raises(ValueError, match=r"\w") as told:
+        call()
+    return str(told.value)
+
+
+def test_what_c_does_not_answer_is_told_as_numpy_tells_it(tied: ModuleType) -> None:
+    exact, compiled = both(tied, ())
+    q, qd, qdd = motion(exact)
+    wrong = q + 0.2
+    for given in ((wrong, qd, qdd), (wrong[0], qd[0], qdd[0])):
+        told = message(lambda given=given: exact.coefficients(*given[:2]))  # type: ignore[misc]
+        assert "is open by" in told
+        assert told == message(lambda given=given: compiled.coefficients(*given[:2]))  # type: ignore[misc]
+    own = ["lift", "turn", "shoulder", "wrist", "far"]
+    exact, compiled = (tied.load(name).constrained(independent=own) for name in ("numpy", "native"))
+    far = exact.closed_position + np.array([5.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0])
+    assert "does not close" in message(lambda: exact.closed(far))
+    assert message(lambda: exact.closed(far)) == message(lambda: compiled.closed(far))
+    with pytest.raises(ValueError, match="tau has shape"):
+        compiled.forward_dynamics(q, qd, qdd[:, :2])
+
+
+def test_more_contacts_than_c_takes_are_answered_by_arrays(free: ModuleType) -> None:
+    robot = free.load("native")
+    held = [free.Contact("f", kind="point", point=(0.0, 0.0, 0.01 * k), name=f"p{k}") for k in range(9)]
+    many = robot.constrained(contacts=held)
+    assert many.ties.rows(robot.backend).functions is None
+    assert robot.constrained(contacts=held[:8]).ties.rows(robot.backend).functions is not None
+    np.testing.assert_allclose(many.jacobian(np.zeros(7))[:3], many.jacobian(np.zeros((1, 7)))[0, :3])
