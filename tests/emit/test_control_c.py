@@ -5,6 +5,7 @@ import json
 import re
 import subprocess
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -184,9 +185,10 @@ def test_where_a_sliding_base_is_does_not_matter(tmp_path: Path) -> None:
 
 
 CONTROLLERS = {"partial_impedance", "frame_partial_impedance", "cancel"}
-FREE = {"forward_dynamics", "forward_dynamics_of_links", *CONTROLLERS}
+FREE = {"forward_dynamics", "forward_dynamics_of_links"}
 """Calls that move joints that nothing ties."""
-OF_PASSIVE = {"forward_dynamics_of_links", "passive_torque"}
+TIED_OF_PASSIVE = {"constrained_response_of_links", "constrained_dynamics_of_links"}
+OF_PASSIVE = {"forward_dynamics_of_links", "passive_torque", *TIED_OF_PASSIVE}
 """Calls that only robots have a use for whose joints have anything of their own."""
 
 
@@ -248,6 +250,36 @@ def in_python(package: ModuleType, robot: Any) -> dict[str, Callable[[], Any]]:
         "partial_impedance": lambda: robot.partial_impedance()(q, q),
         "frame_partial_impedance": of_frame,
         "cancel": lambda: robot.cancel({(0, 0, 0, 1)})(q, q, qdd=q),
+        **of_ties(package, robot, q),
+    }
+
+
+def of_ties(package: ModuleType, robot: Any, q: Any) -> dict[str, Callable[[], Any]]:
+    """Return the same of functions of tied joints; a robot without ties is held at a point.
+
+    An arm so short that it cannot move then is left out.
+    """
+    ties, at = (robot.constraints, None) if robot.backend.ties_joints else (None, q)
+    for name in reversed(robot.link_names if ties is None else ()):
+        with suppress(ValueError):
+            ties = robot.constrained(contacts=[package.Contact(name, "point", (0.1, 0.2, 0.3))], at=q)
+            break
+
+    def on(call: str, given: int, **named: Any) -> Callable[[], Any]:
+        place = ties.closed_position if ties is not None and at is None else q
+        return lambda: ties and getattr(ties, call)(place, *[q] * (given - 1), **named)
+
+    return {
+        "constraint_rows": on("jacobian_rate", 2),
+        "closed": on("closed", 1),
+        "following": on("velocity_accelerations", 2),
+        "constrained_coefficients": on("coefficients", 2),
+        "constrained_propagation": on("propagation", 3),
+        "constrained_torque": on("partial_torque", 3),
+        "constrained_response": on("forward_dynamics", 3),
+        "constrained_response_of_links": on("forward_dynamics", 3, passive=False),
+        "constrained_dynamics": on("forward_dynamics", 3),
+        "constrained_dynamics_of_links": on("forward_dynamics", 3, passive=False),
     }
 
 
@@ -273,11 +305,12 @@ def test_c_offers_nothing_that_python_refuses(kind: str, kinds: dict[str, Path])
     tied = "tied" in kind or kind == "coupled"
     assert FREE & calls.keys() <= refused if tied else not {"forward_dynamics", "partial_impedance"} & refused
     if robot.backend.tree is not None:  # of energies C has less
-        lacking = (set() if robot.structure.passive else OF_PASSIVE) | ({"reactions"} if tied else set())
+        lacking = set() if robot.structure.passive else OF_PASSIVE
+        lacking |= {"reactions", *CONTROLLERS} if tied else set()
         assert offered == calls.keys() - refused - lacking
     told = [
         f"There is no {name}_forward_dynamics",
-        "robot.constraints",
+        "which functions of tied joints",
         "'gear'" if kind == "coupled" else "'pin'",
     ]
     assert [words in header for words in told] == [tied] * 3

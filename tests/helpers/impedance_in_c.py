@@ -103,7 +103,7 @@ def formula(model: Any, q: Any, qd: Any, given: Given, to: Any, task: Any, exter
 
 
 def cancel_formula(model: Any, q: Any, qd: Any, qdd: Any, given: Given, task: Any) -> Any:
-    """What is not kept at qdd, and what moves without motion."""
+    """Torques of what is not kept at qdd, and of what is there at rest."""
     natural = Natural(model, q, qd)
     inertia, damping = natural.wanted(given)
     kept = inertia @ qdd + damping @ qd

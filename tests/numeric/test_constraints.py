@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from conftest import needs_compiler
 from helpers.answers import relative_error
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
@@ -27,11 +28,13 @@ SAMPLES = 6
 class Closed:
     """A mechanism, its oracle, and motions in which its loops stay closed."""
 
-    def __init__(self, name: str, folder: Path) -> None:
+    def __init__(self, name: str, backend: str, folder: Path) -> None:
         mechanism = MECHANISMS[name]
         (folder / "robot.toml").write_text(mechanism.text)
-        write_package(generate(read_system(folder / "robot.toml"), ["numpy"], kernel="loops"), folder / name)
-        self.robot: Any = import_package(folder / name).load("numpy")
+        write_package(
+            generate(read_system(folder / "robot.toml"), ["numpy", "c"], kernel="loops"), folder / name
+        )
+        self.robot: Any = import_package(folder / name).load(backend)
         self.constraints: Any = self.robot.constraints
         self.oracle = LoopOracle(mechanism, self.robot.joint_names)
         self.free = mechanism.free
@@ -48,9 +51,14 @@ class Closed:
         return np.array([of_sample(*(a[s] for a in motion)) for s in range(SAMPLES)])
 
 
+@pytest.fixture(scope="module", params=["numpy", pytest.param("native", marks=needs_compiler)])
+def backend(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
 @pytest.fixture(scope="module", params=list(MECHANISMS))
-def closed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Closed:
-    return Closed(request.param, tmp_path_factory.mktemp(request.param))
+def closed(request: pytest.FixtureRequest, backend: str, tmp_path_factory: pytest.TempPathFactory) -> Closed:
+    return Closed(request.param, backend, tmp_path_factory.mktemp(request.param))
 
 
 def test_loops_are_closed_and_have_the_freedoms_that_they_have(closed: Closed) -> None:
@@ -80,7 +88,7 @@ def test_joints_move_and_ties_bear_as_in_one_system_of_equations(closed: Closed)
 
 @pytest.mark.parametrize("name", ["fourbar", "held_arm"])
 def test_joints_move_as_pinocchios_constraint_dynamics_says(name: str, tmp_path: Path) -> None:
-    closed = Closed(name, tmp_path)
+    closed = Closed(name, "numpy", tmp_path)
     found = closed.constraints.forward_dynamics(closed.q, closed.qd, closed.tau, passive=False)
     motion = closed.q, closed.qd, closed.tau
     expected = closed.each(lambda *state: constraint_dynamics(closed.oracle, *state), *motion)
@@ -176,8 +184,8 @@ def lagrange_fourbar() -> Callable[..., Any]:
     return solved
 
 
-def test_a_fourbar_is_as_lagranges_multipliers_say(tmp_path: Path) -> None:
-    closed = Closed("fourbar", tmp_path)
+def test_a_fourbar_is_as_lagranges_multipliers_say(backend: str, tmp_path: Path) -> None:
+    closed = Closed("fourbar", backend, tmp_path)
     motion = closed.q, closed.qd, closed.qdd
     expected = closed.each(lagrange_fourbar(), *motion)
     torque = closed.constraints.inverse_dynamics(*motion)
@@ -197,12 +205,12 @@ MUJOCO = """<mujoco><option gravity="0.5 -9.81 0"/><compiler balanceinertia="fal
 <equality><connect name="pin" body1="b" body2="c" anchor="0.7 0 0"/></equality></mujoco>"""
 
 
-def test_projected_torques_are_mujocos_inverse_dynamics(tmp_path: Path) -> None:
+def test_projected_torques_are_mujocos_inverse_dynamics(backend: str, tmp_path: Path) -> None:
     mujoco = pytest.importorskip("mujoco")
     # At q = 0, where `connect` takes its second anchor, its bodies lie stretched: c's place is 0.4, -0.1.
     (tmp_path / "fourbar.xml").write_text(MUJOCO)
-    write_package(generate(read_system(tmp_path / "fourbar.xml"), ["numpy"]), tmp_path / "fourbar")
-    robot: Any = import_package(tmp_path / "fourbar").load("numpy")
+    write_package(generate(read_system(tmp_path / "fourbar.xml"), ["numpy", "c"]), tmp_path / "fourbar")
+    robot: Any = import_package(tmp_path / "fourbar").load(backend)
     constraints: Any = robot.constraints
     q = constraints.closed(np.array([0.6, -0.7, 0.3]))
     qd = constraints.velocity(q, np.array([0.8]))
@@ -224,11 +232,13 @@ FEET = {
 
 @pytest.mark.skipif(not ROBOTS.is_dir(), reason="needs real robots: pip install example-robot-data")
 @pytest.mark.parametrize("name", FEET)
-def test_a_floating_robot_with_feet_on_the_ground_moves_as_pinocchios(name: str, tmp_path: Path) -> None:
+def test_a_floating_robot_with_feet_on_the_ground_moves_as_pinocchios(
+    name: str, backend: str, tmp_path: Path
+) -> None:
     path = next(ROBOTS.rglob(f"{name}.urdf"))
     system = read_system(path, Options(base="floating"))
-    write_package(generate(system, ["numpy"], kernel="loops"), tmp_path / "robot")
-    robot: Any = import_package(tmp_path / "robot").load("numpy")
+    write_package(generate(system, ["numpy", "c"], kernel="loops"), tmp_path / "robot")
+    robot: Any = import_package(tmp_path / "robot").load(backend)
     constraints = robot.constrained(contacts=FEET[name])
     draw = np.random.default_rng(1)
     q = draw.uniform(-0.6, 0.6, robot.n)

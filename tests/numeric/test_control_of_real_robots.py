@@ -119,8 +119,8 @@ def test_impedance_is_what_pinocchios_matrices_say(robot: str, tmp_path: Path) -
 
     def command(function: str, *given: Any) -> Any:
         found, kept = np.full(n, np.nan), list[Any]()
-        pointers = [pointer_to(a, float, kept) for a in (*given, found)]
-        pointers[-1] = ctypes.c_void_p(found.ctypes.data)
+        pointers = [pointer_to(a, float, kept) for a in (*given, found, None)]  # the last one is of qdd
+        pointers[-2] = ctypes.c_void_p(found.ctypes.data)
         assert getattr(library, f"robot_{function}")(*pointers) == 0
         return found
 

@@ -149,6 +149,8 @@ def calls(package: Any, robot: Any, times: Any) -> Iterator[tuple[str, tuple[Any
     for name in ("inverse_dynamics", "partial_torque", "propagation", "forces"):
         yield f"constraints.{name}", (q, qd, qdd), {}
     yield "constraints.coefficients", (q, qd), {}
+    yield "constraints.force_coefficients", (q, qd), {}
+    yield "constraints.force_propagation", (q, qd, qdd), {}
     yield "constraints.forward_dynamics", (q, qd, tau), {"passive": True}
 
 

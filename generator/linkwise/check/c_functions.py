@@ -54,7 +54,7 @@ header."""
 VARIANCES = "share_variances"
 """Function that takes a covariance of what links carry beside the motion."""
 VARIED = {"c2": "Y c2", "c1": "Y c1", "g": "Y g", "tau": "Y"}
-"""Its outputs, and the rows by which they lean on what links carry."""
+"""Outputs of it, and the rows by which they lean on what links carry."""
 
 REACTIONS = {
     "reactions": (("acceleration", "velocity", "gravity"), ("acceleration", "velocity", "gravity")),

@@ -4,6 +4,8 @@ They take more than arrays, what ties the joints, so that only their declaration
 here: the native back end's constraints, which are compared with least squares, call them all.
 """
 
+from linkwise_runtime.native.library import MOST_TIED
+
 from linkwise.check.compiled_c import Prototype
 from linkwise.package.manifest import Manifest
 
@@ -40,8 +42,8 @@ CONSTANTS = {
 
 
 def tied_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Prototype]:
-    """Return the functions of one number type; none for links of energies."""
-    if manifest.tree is None:
+    """Return the functions of one number type; none for links of energies, and for very many joints."""
+    if manifest.tree is None or len(manifest.joints) > MOST_TIED:
         return []
     parameters = ("p",) if manifest.parameters else ()
     kind = (("constraints", f"{manifest.name}_constraints{suffix}"),)

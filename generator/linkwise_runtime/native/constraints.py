@@ -14,7 +14,7 @@ from ..constraints.held_frames import Held
 from ..interface import Numbers
 from .calls import NativeCalls, plain
 from .control import RealType
-from .library import OneSampleCall, OneSamplePool, one_sample_call, symbol
+from .library import MOST_TIED, OneSampleCall, OneSamplePool, one_sample_call, symbol
 from .memory import NumberArray, NumberType, address, memory
 
 if TYPE_CHECKING:
@@ -234,7 +234,7 @@ class NativeTies:
 
 def has_functions(calls: NativeCalls, chosen: object) -> bool:
     """Return whether C has functions for constraints: of rigid links, with numbers that stay as they are."""
-    if calls.learned or not isinstance(chosen, TreeConstraints):
+    if calls.structure.n > MOST_TIED or calls.learned or not isinstance(chosen, TreeConstraints):
         return False
     contacts = sum(one.second is None for one in chosen.held)
     return contacts <= MOST_CONTACTS and math.prod((len(chosen.rows), len(chosen.independent))) > 0

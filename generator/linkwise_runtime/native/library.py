@@ -32,6 +32,8 @@ CONTROL = {row.c: Control(len(row.motion), "point" in row.options) for row in CA
 """Functions that take one sample and no count."""
 IMPEDANCE = ("partial_impedance", "frame_partial_impedance", "cancel")
 """Functions of one sample for control: of joints, of a frame, and of what is cancelled at an acceleration."""
+MOST_TIED = 200
+"""Most joints of robots with functions of tied joints: their matrices lie on the stack."""
 TIED = (
     "constraint_rows",
     "closed",

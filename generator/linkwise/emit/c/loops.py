@@ -13,6 +13,7 @@ from linkwise.emit.c.robot_files import free, header_view, input_arrays, path_fi
 from linkwise.emit.c.robot_tables import path_spans, table_view
 from linkwise.emit.c.sizes import Span, whole
 from linkwise.emit.c.stack import loops_stack, small_stack
+from linkwise.emit.c.tie_tables import has_tied_functions
 from linkwise.emit.derivation import Derivation
 from linkwise.render import render
 from linkwise.symbolic.system import RigidSystem
@@ -51,6 +52,7 @@ def _robot_view(system: RigidSystem, links: Sequence[Span]) -> dict[str, Any]:
         "n": len(system.coordinates),
         "links": len(links),
         "free": free(system),
+        "constrained": has_tied_functions(system),
         "totals": totals(robot.size),
         "parameters": list(enumerate(parameter_names(system).values())),
         "inputs": pointers("const real", motion),

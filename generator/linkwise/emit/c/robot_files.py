@@ -10,7 +10,7 @@ from linkwise.emit.c.calls import LinkFormFunctions, group_calls, link_calls, mo
 from linkwise.emit.c.prototypes import at_position, cost, functions, pointers, under_torque
 from linkwise.emit.c.quantity_table import causes, potential, quantity_lines
 from linkwise.emit.c.sizes import EntryCounts, Span, groups, most_counts, tile, waiting_counts, whole
-from linkwise.emit.c.tie_tables import MOST_CONTACTS
+from linkwise.emit.c.tie_tables import MOST_CONTACTS, has_tied_functions
 from linkwise.escape import c_string
 from linkwise.symbolic.system import EnergySystem, RigidSystem, System
 
@@ -59,6 +59,7 @@ def robot_view(
         "largest": max(waiting.of(array) for array in arrays),
         "rigid": isinstance(system, RigidSystem),
         "free": free(system),
+        "constrained": has_tied_functions(system),
         "of_sample": [(array, total(array)) for array in arrays],
         "largest_gradient": max(link.size.c1 for link in links),
     }
@@ -98,6 +99,7 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "blocks": tuple(header.BLOCK.values()),
         "rigid": isinstance(system, RigidSystem),
         "free": free(system),
+        "constrained": has_tied_functions(system),
         "contacts": MOST_CONTACTS,
         "varying": isinstance(system, EnergySystem) and any(link.degree > 2 for link in system.links),
         "passive": isinstance(system, RigidSystem) and bool(system.robot.passive),

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from linkwise.emit.c.robot_files import free
 from linkwise.emit.c.robot_tables import columns, path_spans
 from linkwise.emit.c.sizes import Span, most_counts, tile, waiting_counts, whole
-from linkwise.emit.c.tie_tables import MOST_CONTACTS, tied_rows
+from linkwise.emit.c.tie_tables import MOST_CONTACTS, has_tied_functions, tied_rows
 from linkwise.symbolic.system import RigidSystem, System
 
 VALUE = 64
@@ -96,7 +96,7 @@ def loops_stack(system: RigidSystem) -> int:
 
 def control_stack(system: System, links: tuple[Span, ...]) -> int:
     """Return the bytes that functions for control of one sample, or of tied joints, take at most."""
-    tied = _tied_values(system) if isinstance(system, RigidSystem) else 0
+    tied = _tied_values(system) if isinstance(system, RigidSystem) and has_tied_functions(system) else 0
     return 8 * max(_control_values(system, links), tied) + OWN
 
 

@@ -5,9 +5,10 @@ from itertools import accumulate
 from typing import Any
 
 from linkwise_runtime.constraints.held_frames import ROWS
+from linkwise_runtime.native.library import MOST_TIED
 
 from linkwise.escape import c_comment
-from linkwise.symbolic.system import RigidSystem
+from linkwise.symbolic.system import RigidSystem, System
 
 MOST_CONTACTS = 8
 """Most contacts that functions of tied joints take at a time, as in ties.h."""
@@ -32,6 +33,11 @@ def tie_view(system: RigidSystem) -> dict[str, Any]:
         for tie in system.robot.ties
     ]
     return {"ties": ties, "couplings": _couplings(system), "tied_rows": tied_rows(system)}
+
+
+def has_tied_functions(system: System) -> bool:
+    """Return whether C has functions of tied joints: for rigid links, and not for very many joints."""
+    return isinstance(system, RigidSystem) and len(system.coordinates) <= MOST_TIED
 
 
 def tied_rows(system: RigidSystem) -> int:
