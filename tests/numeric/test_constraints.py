@@ -32,7 +32,7 @@ class Closed:
         mechanism = MECHANISMS[name]
         (folder / "robot.toml").write_text(mechanism.text)
         write_package(
-            generate(read_system(folder / "robot.toml"), ["numpy", "c"], kernel="loops"), folder / name
+            generate(read_system(folder / "robot.toml"), ["numpy", "native"], kernel="loops"), folder / name
         )
         self.robot: Any = import_package(folder / name).load(backend)
         self.constraints: Any = self.robot.constraints
@@ -209,7 +209,7 @@ def test_projected_torques_are_mujocos_inverse_dynamics(backend: str, tmp_path: 
     mujoco = pytest.importorskip("mujoco")
     # At q = 0, where `connect` takes its second anchor, its bodies lie stretched: c's place is 0.4, -0.1.
     (tmp_path / "fourbar.xml").write_text(MUJOCO)
-    write_package(generate(read_system(tmp_path / "fourbar.xml"), ["numpy", "c"]), tmp_path / "fourbar")
+    write_package(generate(read_system(tmp_path / "fourbar.xml"), ["numpy", "native"]), tmp_path / "fourbar")
     robot: Any = import_package(tmp_path / "fourbar").load(backend)
     constraints: Any = robot.constraints
     q = constraints.closed(np.array([0.6, -0.7, 0.3]))
@@ -237,7 +237,7 @@ def test_a_floating_robot_with_feet_on_the_ground_moves_as_pinocchios(
 ) -> None:
     path = next(ROBOTS.rglob(f"{name}.urdf"))
     system = read_system(path, Options(base="floating"))
-    write_package(generate(system, ["numpy", "c"], kernel="loops"), tmp_path / "robot")
+    write_package(generate(system, ["numpy", "native"], kernel="loops"), tmp_path / "robot")
     robot: Any = import_package(tmp_path / "robot").load(backend)
     constraints = robot.constrained(contacts=FEET[name])
     draw = np.random.default_rng(1)

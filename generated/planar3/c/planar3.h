@@ -336,7 +336,7 @@ typedef struct {
    PLANAR3_TIES_CONTRADICT where what holds a loop twice does not agree, PLANAR3_TIES_UNCLOSED where PLANAR3_STEPS steps do not
    close them, PLANAR3_NO_INERTIA where independent joints can move without mass, or fewer than half of the digits of
    accelerations are known, and PLANAR3_UNKNOWN for too many contacts, or a kind, frame or joint that is not there.
-   Of qd and qdd the independent joints count, and the others follow; outputs may be NULL.
+   Of qd and qdd the independent joints count, and the others follow; outputs may be NULL unless it says otherwise.
 
    Rows phi, A and dA/dt, at any q and qd, which are used as they are given: contacts are open from where they took hold,
    held_at, or not at all where it is NULL.
@@ -356,7 +356,7 @@ int planar3_following(size_t count, const double *q, const double *qd, const pla
     double *map, double *velocity, double *accelerations);
 
 /* Coefficients of the independent joints, c2^ = G' c2 G, c1^ = G' (c2 dG/dt + c1 G) and g^ = G' g, link by link, while all other joints
-   move freely; and what rows bear, A_d+' c2_d G and so on. The first three outputs may be NULL together, and the last three.
+   move freely; and what rows bear, A_d+' c2_d G and so on. The first three outputs may be NULL, all of them or none, and the last three.
    Reads q, qd (count, JOINTS); writes acceleration, velocity (count, FREE, LINKS, FREE), gravity (count, FREE, LINKS),
    force_acceleration, force_velocity (count, ROWS, LINKS, FREE), force_gravity (count, ROWS, LINKS). */
 int planar3_constrained_coefficients(size_t count, const double *q, const double *qd,
@@ -610,7 +610,7 @@ typedef struct {
    PLANAR3_TIES_CONTRADICT where what holds a loop twice does not agree, PLANAR3_TIES_UNCLOSED where PLANAR3_STEPS steps do not
    close them, PLANAR3_NO_INERTIA where independent joints can move without mass, or fewer than half of the digits of
    accelerations are known, and PLANAR3_UNKNOWN for too many contacts, or a kind, frame or joint that is not there.
-   Of qd and qdd the independent joints count, and the others follow; outputs may be NULL.
+   Of qd and qdd the independent joints count, and the others follow; outputs may be NULL unless it says otherwise.
 
    Rows phi, A and dA/dt, at any q and qd, which are used as they are given: contacts are open from where they took hold,
    held_at, or not at all where it is NULL.
@@ -630,7 +630,7 @@ int planar3_followingf(size_t count, const float *q, const float *qd, const plan
     float *map, float *velocity, float *accelerations);
 
 /* Coefficients of the independent joints, c2^ = G' c2 G, c1^ = G' (c2 dG/dt + c1 G) and g^ = G' g, link by link, while all other joints
-   move freely; and what rows bear, A_d+' c2_d G and so on. The first three outputs may be NULL together, and the last three.
+   move freely; and what rows bear, A_d+' c2_d G and so on. The first three outputs may be NULL, all of them or none, and the last three.
    Reads q, qd (count, JOINTS); writes acceleration, velocity (count, FREE, LINKS, FREE), gravity (count, FREE, LINKS),
    force_acceleration, force_velocity (count, ROWS, LINKS, FREE), force_gravity (count, ROWS, LINKS). */
 int planar3_constrained_coefficientsf(size_t count, const float *q, const float *qd,

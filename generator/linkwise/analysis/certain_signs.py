@@ -148,7 +148,9 @@ class CertainSigns:
             yield self.sentence
 
     def record(self) -> dict[str, Any]:
-        """Return this as plain data."""
+        """Return this as plain data; nothing where no share is among the columns that were asked for."""
+        if not self.shares:
+            return {}
         return {
             "sign_is_certain_from_deviations": DEVIATIONS,
             "left_out_below_part_of_largest": SMALL,

@@ -19,6 +19,7 @@ from linkwise.analysis.samples import Samples
 from linkwise.analysis.settings import Processing
 from linkwise.analysis.torques import Decomposer
 from linkwise.analysis.traced_rows import ExtendedBlock
+from linkwise.analysis.turned_rows import scratch
 from linkwise.analysis.verify import SAMPLES, Closure
 from linkwise.analysis.whole_movement import WholeMovement
 from linkwise.analysis.worker_threads import worker_threads
@@ -158,7 +159,7 @@ def stream(
     sums, inner = MovementSums(rows, decomposer.robot, phases), _at_once(decomposer)
     parts = Parts(samples, decomposer, processing, sums, (start, stop))
     quiet = np.errstate(over="ignore", invalid="ignore")
-    with ThreadPoolExecutor(parts.threads) as pool, ThreadPoolExecutor(1) as writer, quiet:
+    with ThreadPoolExecutor(parts.threads) as pool, ThreadPoolExecutor(1) as writer, quiet, scratch:
         pending: Future[None] | None = None
         for first, block, found in parts.blocks(pool, inner):
             last = first + block.shape[1]

@@ -29,6 +29,13 @@ class Scratch(threading.local):
             held = self._held[use] = np.empty(count)
         return held[:count].reshape(shape)
 
+    def __enter__(self) -> None:
+        """Begin with what is there."""
+
+    def __exit__(self, *_: object) -> None:
+        """Give the memory of this thread back; that of others ends with them."""
+        self._held.clear()
+
 
 scratch = Scratch()
 

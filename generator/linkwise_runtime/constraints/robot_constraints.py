@@ -368,7 +368,7 @@ class Constraints(Generic[Array]):
         functions = self._functions
         if functions is None or not motion:
             return None
-        found = functions.at_once(call, motion)
+        found = None if self._robot.door.check_finite else functions.at_once(call, motion)
         if found is None and len(motion) <= len(names):
             backend, arrays = self._read(NOTHING, **dict(zip(names, motion, strict=False)))
             found = functions.answer(call, arrays) if backend is self._robot.backend else None

@@ -171,7 +171,9 @@ class NativeBackend(NumpyBackend):
         return self, self.arrays(named, n, beside)
 
     def controller(self, joints: object, frame: object) -> TorqueOfOne | None:
-        """Return the object that computes a controller's torque for one sample in C."""
+        """Return the object by which C computes a torque for one sample; None for tied joints."""
+        if self.ties_joints:
+            return None
         targets, framed = cast(JointTargets, joints), cast("FrameTargets | None", frame)
         return NativeTorque(self.calls, self.tree is not None, targets, framed)
 

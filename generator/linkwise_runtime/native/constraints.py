@@ -136,6 +136,8 @@ class NativeTies:
     def at_once(self, call: str, motion: Sequence[object]) -> Sequence[NumberArray] | None:
         """Return the answer for one plain sample of a call made before; None for anything else."""
         kind, shape = getattr(motion[0], "dtype", None), self._shape
+        if len(motion) != CALLS[call].motion:  # which the call itself refuses
+            return None
         for a in motion:
             if type(a) is not np.ndarray or a.dtype is not kind or a.shape != shape:
                 return None
@@ -153,6 +155,8 @@ class NativeTies:
         self, call: str, motion: Sequence[Numbers], held_at: Numbers | None = None
     ) -> Sequence[NumberArray] | None:
         """Return the answer for arrays (..., n) of one shape; None where C has none."""
+        if len(motion) != CALLS[self._name(call)].motion:
+            return None
         arrays = [*motion] if held_at is None else [*motion, held_at]
         given = [a for a in arrays if isinstance(a, np.ndarray)]
         if len(given) < len(arrays):

@@ -143,6 +143,10 @@ static int tied_shares(size_t count, const struct numbers *numbers, const struct
     const real *qdd, const API(constraints) *c, const struct tied_results *first)
 {
     ALIGNED struct tied x;
+    const int shares = !first->acceleration + !first->velocity + !first->gravity;
+    const int forces = !first->force_acceleration + !first->force_velocity + !first->force_gravity;
+    if (shares % 3 || forces % 3)
+        return IS_UNKNOWN;
     for (size_t s = 0; s < count; ++s) {
         const int why = observe_tied(&x, numbers, offsets, c, q + s * N);
         if (why)
