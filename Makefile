@@ -49,9 +49,11 @@ demo-control: $(READY)
 # What compilers made of what, which later runs find again; Python's too, which every process that a test starts reads.
 KEPT = LINKWISE_TEST_CACHE=$(CURDIR)/.cache/tests TORCHINDUCTOR_CACHE_DIR=$(CURDIR)/.cache/inductor PYTHONDONTWRITEBYTECODE=
 
-# Two files of tests at a time.
+# Two files of tests at a time; the rooms with most robots begin in processes of their own, as memory is bounded.
+LARGE = tests/numeric tests/runtime
 test: $(READY)
-	$(KEPT) $(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not (ship or browser)"
+	$(KEPT) $(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not (ship or browser)" $(LARGE:%=--ignore=%)
+	$(KEPT) $(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not (ship or browser)" $(LARGE)
 
 # What leaves the house, as others get it: pages in a browser, wheels, CMake's projects, exports, other processors and
 # systems; minutes. Three files at a time for two cores, as some wait for the browser or for compilers.
