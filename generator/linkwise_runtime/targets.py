@@ -39,7 +39,7 @@ class FrameImpedance(NamedTuple):
 class Grip(NamedTuple):
     """Limits of what the ground bears at a contact: it pushes, and friction holds up to a share of that.
 
-    At each point where the frame touches the force keeps within a cone, |f_t| <= friction f_n.
+    At each point where the frame touches the force keeps within a cone, ``|f_t| <= friction f_n``.
     """
 
     contact: str

@@ -85,7 +85,7 @@ def analyze(
     uncertain: file of how uncertain bodies are, which gives torques a standard deviation beside them
     cutoff_sweep: lowest and highest cutoff in Hz, and their number if not 7, at which sizes of all torques
     are told by `Analysis.cutoff_sweep`; `processing` needs a low-pass
-    columns: columns that are computed, written as for --columns: "sums", "tau_gravity/*/hand"; all where
+    columns: columns that are computed, written as for --columns: "sums", ``"tau_gravity/*/hand"``; all where
     there are none, and where points, powers, a trace or a sweep, made of all torques, are asked for
 
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
