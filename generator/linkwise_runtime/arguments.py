@@ -78,6 +78,19 @@ def refuse_gradient(name: str, value: object) -> None:
         raise TypeError(f"{name} requires a gradient, which nothing carries from there; give {name}.detach()")
 
 
+def kept_numbers(name: str, value: object) -> NDArray[np.float64] | None:
+    """Return finite real numbers that are read once and kept; None where they are something else.
+
+    Raises TypeError for a tensor whose gradient would be lost.
+    """
+    refuse_gradient(name, value)
+    try:
+        read = as_array(name, value)
+    except (TypeError, ValueError):
+        return None
+    return read.astype(float) if read.dtype.kind in "iuf" and np.isfinite(read).all() else None
+
+
 def shape_of(value: object) -> tuple[int, ...]:
     """Return the shape of a value that will be read as an array or tensor; () where it is not clear yet."""
     try:

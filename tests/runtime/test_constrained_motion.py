@@ -258,3 +258,44 @@ def test_an_error_of_the_users_own_comes_through(
 
     with pytest.raises(ValueError, match="the motor is out of breath"):
         robot.simulate(q, 0.0 * q, [0.0, 0.5], pull, method=method, constraints=robot.constrained(["knee"]))
+
+
+HELD = """schema = 1
+name = "held"
+gravity = [0, -9.81, 0]
+joint = [
+  {{name = "a", parent = "base", child = "la", friction = 0.2}},
+  {{name = "b", parent = "la", child = "lb", xyz = [0.3, 0, 0]}},
+  {{name = "c", parent = "lb", child = "lc", xyz = [0.3, 0, 0], friction = {friction}}},
+]
+link = [
+  {{name = "la", mass = 0.4, com = [0.06, 0.01, 0], inertia = {{xx = 0.001, yy = 0.002, zz = 0.002}}}},
+  {{name = "lb", mass = 0.9, com = [0.15, 0, 0], inertia = {{xx = 0.002, yy = 0.007, zz = 0.007}}}},
+  {{name = "lc", mass = 0.9, com = [0.15, 0, 0], inertia = {{xx = 0.002, yy = 0.007, zz = 0.007}}}},
+]
+[[constraint]]
+name = "belt"
+type = "coupling"
+terms = {{a = 0.7, b = -0.3, c = 0.9}}
+[[constraint]]
+name = "tray"
+type = "coupling"
+terms = {{a = 0.7, b = -0.3, c = 0.1}}
+"""
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_joint_that_ties_hold_where_it_is_has_no_friction(backend: str, tmp_path: Path) -> None:
+    """Two rows leave c none of the motion but rounding, whose sign is not that of a velocity."""
+    found = []
+    for friction in (0.0, 50.0):
+        (tmp_path / "held.toml").write_text(HELD.format(friction=friction))
+        made = generate(read_system(tmp_path / "held.toml"), ["numpy", "torch", "native"])
+        write_package(made, tmp_path / f"held{friction:.0f}")
+        robot: Any = import_package(tmp_path / f"held{friction:.0f}").load(backend)
+        state = np.random.default_rng(2).uniform(-1.0, 1.0, (3, 20, 3))
+        q, qd, tau = state if backend != "torch" else torch.tensor(state)
+        q = robot.constraints.closed(q)
+        found.append([np.asarray(a) for a in robot.constraints.forward_dynamics(q, qd, tau)])
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)

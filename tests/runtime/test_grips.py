@@ -35,7 +35,7 @@ def test_a_foot_is_kept_from_slipping_and_the_motion_stays(walker: ModuleType) -
     qd = moving(ties, q)
     free, rough, smooth = (
         robot.partial_impedance(stiffness=[0, 0, 0, 20, 20, 20, 20], constraints=ties, grips=grips)
-        for grips in ((), both(walker, 5.0), both(walker, SLIPPERY))
+        for grips in ((), both(walker, np.float32(5.0)), both(walker, SLIPPERY))
     )
     plain, tau = free(q, qd, Q), smooth(q, qd, Q)
     forces = smooth.forces(q, qd, Q).reshape(4, 2, 3)
@@ -116,6 +116,8 @@ def test_what_is_no_limit_is_refused_by_name(walker: ModuleType) -> None:
         (ties, [grip("r", 0.5), grip("r", 0.4)], r"grips\[1\] is of 'r', as another is"),
         (ties, [grip("r", -0.5)], r"grips\[0\].friction is -0.5; give a number, 0 or above"),
         (ties, [grip("r", True)], r"grips\[0\].friction is True"),
+        (whole, [grip("r", 0.5, "abc")], r"grips\[0\].corners is 'abc'; r bears moments"),
+        (whole, [grip("r", 0.5, [line[0], (0.0, 1.0)])], r"grips\[0\].corners is .*; r bears moments"),
         (ties, [grip("r", 0.5, line)], "corners is given, but r touches at one point"),
         (ties, [grip("r", 0.5, normal=(0.0, 0.0, 0.0))], r"grips\[0\].normal is .* no direction"),
         (whole, [grip("r", 0.5)], "r bears moments: give three points or more"),

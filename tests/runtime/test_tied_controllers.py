@@ -208,6 +208,7 @@ def test_what_cannot_be_is_refused_by_name(
         ({"actuated": ["hip_r", "hip_r"]}, "which names a joint twice"),
         ({"actuated": []}, "actuated names no joint"),
         ({"torque_weight": [1.0]}, "torque_weight is .* give a number above 0 for each of x, z, pitch"),
+        ({"torque_weight": {"x": 1.0}}, "torque_weight is {'x': 1.0}; give a number above 0 for each"),
         (
             {"constraints": ties, "torque_weight": [1.0, 0.0, 1.0, 1.0]},
             "each of hip_r, knee_r, hip_l, knee_l",
@@ -227,6 +228,30 @@ def test_what_cannot_be_is_refused_by_name(
         soft().forces(Q, 0.0 * Q)
     with pytest.raises(ValueError, match=r"pin is open by .*give positions in which ties close"):
         loop.partial_impedance()(np.array([0.5, 0.5, 0.5]), np.zeros(3))
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_sample_that_is_no_number_leaves_the_others_theirs(backend: str, walker: ModuleType) -> None:
+    """LAPACK and conic solvers refuse what has a NaN; a controller without check_finite says NaN."""
+    robot = walker.load(backend)
+    ties = robot.constrained(contacts=feet(walker))
+    q = Q + 0.02 * np.random.default_rng(3).uniform(-1.0, 1.0, (3, 7))
+    qd, wanted = moving(walker.load("numpy").constrained(contacts=feet(walker)), q), 0.9 * q
+    grips = [walker.Grip(side, 0.5) for side in "rl"]
+    for given in (
+        {"constraints": ties},
+        {"constraints": ties, "grips": grips},
+        {"constraints": robot.constrained(contacts=feet(walker, "r"))},
+        {"actuated": ["hip_r", "knee_r", "hip_l", "knee_l"]},
+    ):
+        control = robot.partial_impedance(stiffness=2.0, **given)
+        whole = np.asarray(control(*as_kind(backend, q, qd, wanted)))
+        state = [q.copy(), qd.copy(), wanted.copy()]
+        for part in state:
+            part[1] = np.nan
+        found = np.asarray(control(*as_kind(backend, *state)))
+        assert np.isnan(found[1][3:]).all()
+        np.testing.assert_allclose(found[::2], whole[::2], rtol=0, atol=1e-6)
 
 
 def test_a_dead_centre_is_told(tmp_path: Path, package_of: Callable[[str], ModuleType]) -> None:

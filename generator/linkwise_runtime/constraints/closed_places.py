@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 import numpy as np
 
 from ..chosen_names import plain, sample_of
-from ..interface import Numbers, array_of, is_traced, namespace
+from ..interface import Numbers, array_of, epsilon_of, is_traced, namespace
 from .chosen_constraints import OPEN
 from .independent_joints import JointColumns, check_factors, check_following, row_sizes
 from .rows import ConstraintRows, RowsThere
@@ -163,10 +163,19 @@ def pseudoinverse(factors: tuple[Numbers, Numbers]) -> Numbers:
 
 
 def velocity_map(rows: Numbers, columns: JointColumns, inverse: Numbers) -> Numbers:
-    """Return the velocity map G (..., n, m)."""
+    """Return the velocity map G (..., n, m), with zeros for joints that ties hold where they are.
+
+    Of such a joint only rounding is left, |G_ia| <= eps^(2/3) |A_d^+ row i| |A_y column a|, whose sign would
+    be that of its Coulomb friction. Zeros are made by what has no gradient: the joint may begin to move.
+    """
     xp = namespace(rows)
-    moved = -inverse @ columns.own(rows)
+    own = columns.own(rows)
+    moved = -inverse @ own
     m = columns.independent.shape[-1]
+    reach = (inverse * inverse).sum(-1)[..., None] * (own * own).sum(-2)[..., None, :]
+    held = (moved * moved <= epsilon_of(rows) ** (4.0 / 3.0) * reach).all(-1)[..., None]
+    left = moved if isinstance(moved, np.ndarray) else cast("Tensor", moved).detach()
+    moved = moved - xp.where(held, left, xp.zeros_like(left))
     # Zeros made from the motion give a unit matrix of its kind, through which gradients can flow.
     unit = xp.zeros_like(moved[..., :1, :]) + xp.eye(m, **_kind(rows))
     return columns.ordered(xp.concat([unit, moved], -2), -2)

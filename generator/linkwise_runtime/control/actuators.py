@@ -25,9 +25,10 @@ from contextlib import suppress
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..answers.inertia_solve import moving_most
+from ..arguments import kept_numbers
 from ..arrays.backend import ArrayBackend
 from ..chosen_names import listed, sample_of, short
 from ..constraints.chosen_constraints import TreeConstraints
@@ -146,9 +147,8 @@ class Actuators:
         free = xp.eye(lost.shape[-1], dtype=lost.dtype) - lost
         inner = free @ mass @ free
         if not is_traced(inner):
-            sizes = np.linalg.svd(array_of(inner), compute_uv=False)
-            least, most = sizes[..., self.undriven - 1], array_of(mass).max((-2, -1))
-            _refuse(~(least > epsilon_of(inner) * most), lambda at: _massless(array_of(free)[at], names))
+            least, most = _sizes(array_of(inner))[..., self.undriven - 1], array_of(mass).max((-2, -1))
+            _refuse(least <= epsilon_of(inner) * most, lambda at: _massless(array_of(free)[at], names))
         return _inverse(inner)
 
     def _check(self, own: Numbers, freedom: Freedom) -> None:
@@ -159,7 +159,7 @@ class Actuators:
         if is_traced(own) or freedom.place is None:
             return
         matrices, most = array_of(own), np.abs(array_of(freedom.place.found.map)).max((-2, -1))
-        least = np.linalg.svd(matrices, compute_uv=False)[..., self._rank - 1]
+        least = _sizes(matrices)[..., self._rank - 1]
         lost = least <= epsilon_of(own) ** 0.5 * most
 
         def told(at: tuple[int, ...]) -> str:
@@ -190,8 +190,27 @@ def _refuse(wrong: NDArray[np.bool_], told: Any) -> None:
 
 def _inverse(matrix: Numbers) -> Numbers:
     """Return the pseudoinverse: singular values of nothing but rounding count as zero."""
-    inverse: Numbers = namespace(matrix).linalg.pinv(matrix, rtol=_rounding(matrix))
+    finite, kept = _finite(matrix)
+    xp = namespace(matrix)
+    inverse: Numbers = xp.where(finite, xp.linalg.pinv(kept, rtol=_rounding(matrix)), np.nan)
     return inverse
+
+
+def _sizes(matrix: NDArray[Any]) -> NDArray[np.floating]:
+    """Return the singular values, (..., X)."""
+    finite, kept = _finite(matrix)
+    values = np.linalg.svd(cast(NDArray[Any], kept), compute_uv=False)
+    return np.where(cast(NDArray[np.bool_], finite)[..., 0], values, np.nan)
+
+
+def _finite(matrix: Numbers) -> tuple[Numbers, Numbers]:
+    """Return which samples (..., 1, 1) are numbers, and the matrices with zeros for those that are not.
+
+    LAPACK gives none of all samples an answer if one has a NaN.
+    """
+    xp = namespace(matrix)
+    finite = xp.isfinite(matrix).all(-1)[..., None].all(-2)[..., None]
+    return finite, xp.where(finite, matrix, xp.zeros_like(matrix))
 
 
 def _rounding(like: Numbers) -> float:
@@ -229,8 +248,8 @@ def _weight(given: object, names: Sequence[str]) -> NDArray[np.float64]:
     """Return W; raises ValueError for what is not a number above 0 for each driven joint."""
     if given is None:
         return np.ones(len(names))
-    weight = np.array(cast(ArrayLike, given), float)
-    if weight.shape != (len(names),) or not (np.isfinite(weight) & (weight > 0.0)).all():
+    weight = kept_numbers("torque_weight", given)
+    if weight is None or weight.shape != (len(names),) or not (weight > 0.0).all():
         raise ValueError(
             f"torque_weight is {short(given)}; give a number above 0 for each of {listed(list(names))}"
         )

@@ -15,12 +15,13 @@ are chosen as L. Righetti et al., 2013, choose them (`actuators`).
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, cast
+from numbers import Real
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ..arguments import refuse_gradient
+from ..arguments import kept_numbers
 from ..arrays.backend import ArrayBackend
 from ..chosen_names import known_kind, listed, sample_of, short
 from ..constraints.chosen_constraints import TreeConstraints
@@ -112,6 +113,9 @@ class Grips:
         moves, forces = 0.0 * total, np.zeros(rows.shape[:-1])
         for at in np.ndindex(total.shape[:-1]):
             there = _numbers(least)[at]
+            if not np.isfinite(there).all():
+                forces[at] = np.nan
+                continue
             program = self._program(mapped[at], rows[at], total[at] - there, others, [p[at] for p in poses])
             found = least_change(program.program)
             if found is None:
@@ -228,7 +232,7 @@ def _gripped(chosen: TreeConstraints, grip: Grip, where: str) -> Gripped:
             f"{where} is of {short(held.name)}, which is hinged; hold two points of its line in its place"
         )
     mu = grip.friction
-    if isinstance(mu, bool) or not isinstance(mu, int | float) or not 0.0 <= mu < np.inf:
+    if isinstance(mu, bool) or not isinstance(mu, Real) or not 0.0 <= mu < np.inf:
         raise ValueError(f"{where}.friction is {short(mu)}; give a number, 0 or above")
     normal: Sequence[float] = held.arm
     if grip.normal is not None or not any(held.arm):
@@ -241,16 +245,15 @@ def _gripped(chosen: TreeConstraints, grip: Grip, where: str) -> Gripped:
 
 def _corners(held: Held, grip: Grip, where: str) -> Floats:
     """Return the points where a contact touches, (K, 3)."""
-    refuse_gradient(f"{where}.corners", grip.corners)
+    corners = kept_numbers(f"{where}.corners", grip.corners)
     if held.kind != "frame":
-        if len(grip.corners):
+        if corners is None or corners.size:
             raise ValueError(
                 f"{where}.corners is given, but {held.name} touches at one point; leave it out, or hold the "
                 "whole frame"
             )
         return np.array([held.point], float)
-    corners = np.array(cast(ArrayLike, grip.corners), float)
-    if corners.ndim != 2 or corners.shape[1] != 3 or not np.isfinite(corners).all():
+    if corners is None or corners.ndim != 2 or corners.shape[1] != 3:
         raise ValueError(
             f"{where}.corners is {short(grip.corners)}; {held.name} bears moments: give three points or more "
             "(x, y, z) of its frame where it touches, in m"
