@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from linkwise.analysis.column_patterns import fitting
+from linkwise.analysis.column_patterns import fitting, matching
 from linkwise.analysis.result_quantities import FORCES, PASSIVE, POWER_TERMS, TERMS, TORQUE_OF
 from linkwise.analysis.result_rows import DEVIATION, OF_MOTION, ResultRows
 from linkwise.arrays import Index
@@ -24,26 +24,42 @@ FLAG = f"--columns, which takes {', '.join(PRESETS)}, or columns,"
 def chosen_rows(rows: ResultRows, asked: Sequence[str], power_terms: bool) -> Index:
     """Return the numbers of the rows that presets and patterns choose, ascending; all where none are given.
 
-    A power comes with the torque that it is made of, and a deviation with what it is of.
+    A power comes with the torque that it is made of, a deviation with what it is of, and this with it.
     power_terms: whether powers by cause and order are asked for otherwise
 
     Raises LinkwiseError for a pattern that fits no column.
     """
     if not asked:
         return np.arange(len(rows))
+    fits = fitting(FLAG, [column.name for column in rows.columns], _patterns(asked))
+    return _rows_of(rows, asked, power_terms, set(fits))
+
+
+def computed_rows(rows: ResultRows, asked: Sequence[str], power_terms: bool) -> Index:
+    """Return the numbers of the rows of torques that `chosen_rows` needs of these, which others come beside.
+
+    A pattern may fit columns of these others alone.
+    """
+    if not asked:
+        return np.arange(len(rows))
+    names = [column.name for column in rows.columns]
+    fits = [matching(names, one.removeprefix(DEVIATION)) for one in _patterns(asked)]
+    return _rows_of(rows, asked, power_terms, set().union(*fits))
+
+
+def _patterns(asked: Sequence[str]) -> list[str]:
+    return [one for one in asked if one not in PRESETS]
+
+
+def _rows_of(rows: ResultRows, asked: Sequence[str], power_terms: bool, fits: set[str]) -> Index:
     quantities = {name for preset in asked for name in PRESETS.get(preset, ())}
     quantities |= {*ALWAYS, *(POWER_TERMS if power_terms else ())}
-    names = [column.name for column in rows.columns if column.quantity in CHOOSABLE]
-    fits = set(fitting(FLAG, names, [one for one in asked if one not in PRESETS]))
+    places = [(name.removeprefix(DEVIATION).removeprefix(OF_MOTION), at) for name, at in rows.places]
     kept = {
         place
-        for column, place in zip(rows.columns, rows.places, strict=True)
+        for column, place in zip(rows.columns, places, strict=True)
         if place[0] in quantities or (place[0] in CHOOSABLE and column.name in fits)
     }
     kept |= {(TORQUE_OF[name], at) for name, at in kept if name in TORQUE_OF}
-    numbers = []
-    for number, (name, at) in enumerate(rows.places):
-        quantity = name.removeprefix(DEVIATION).removeprefix(OF_MOTION)
-        if quantity not in CHOOSABLE or (quantity, at) in kept:
-            numbers.append(number)
+    numbers = [k for k, place in enumerate(places) if place[0] not in CHOOSABLE or place in kept]
     return np.array(numbers, np.intp)

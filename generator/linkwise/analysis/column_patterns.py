@@ -13,6 +13,14 @@ LONGEST = 200
 """Most characters of a pattern that a message shows, and that names are compared with."""
 
 
+def patterns_of(given: object) -> tuple[str, ...]:
+    """Return presets and patterns, one or a list; raises LinkwiseError for what is none of these."""
+    several = (given,) if isinstance(given, str) else given
+    if not isinstance(several, list | tuple) or not all(isinstance(one, str) for one in several):
+        raise LinkwiseError(f'columns is {short(str(given))}; give words such as "sums", or a list of them')
+    return tuple(several)
+
+
 def fitting(place: str, names: Iterable[str], patterns: Sequence[str]) -> list[str]:
     """Return the names that any pattern fits, in their order: tau/* fits tau/knee, and not tau/knee/foot.
 
@@ -21,8 +29,7 @@ def fitting(place: str, names: Iterable[str], patterns: Sequence[str]) -> list[s
     names = list(names)
     found = set[str]()
     for pattern in dict.fromkeys(patterns):
-        pieces = WILD.split(pattern)
-        fits = {name for name in names if _fits(pieces, name)}
+        fits = matching(names, pattern)
         if not fits:
             near = listed(map(repr, nearest_first(pattern[:LONGEST], names)))
             raise LinkwiseError(
@@ -30,6 +37,12 @@ def fitting(place: str, names: Iterable[str], patterns: Sequence[str]) -> list[s
             )
         found |= fits
     return [name for name in names if name in found]
+
+
+def matching(names: Iterable[str], pattern: str) -> set[str]:
+    """Return the names that a pattern fits."""
+    pieces = WILD.split(pattern)
+    return {name for name in names if _fits(pieces, name)}
 
 
 def _fits(pieces: Sequence[str], name: str) -> bool:

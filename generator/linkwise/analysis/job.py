@@ -2,12 +2,10 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from linkwise_runtime.motion.induced_power import fed_by_couplings
 
-from linkwise.analysis.chosen_columns import chosen_rows
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.cutoff_sweep import RowSizes
 from linkwise.analysis.outputs import named_result, record, result_table
@@ -82,6 +80,8 @@ class Job:
     asked: Request
     samples: Samples
     decomposer: Decomposer
+    told: Index
+    """Numbers of the rows of a block that a table has: of those that are computed, those asked for."""
     closed: ClosedLog | None = None
     """Largest violation of a constraint by positions of the log, where joints are tied."""
     phases: tuple[PlacedPhase, ...] = ()
@@ -121,12 +121,6 @@ class Job:
             "uncertain": self.uncertain.record(),
             "asked_columns": self.asked.outputs.columns or ["all"],
         }
-
-    @cached_property
-    def told(self) -> Index:
-        """Numbers of the rows of a block that a table has: of those that were computed, those asked for."""
-        outputs = self.asked.outputs
-        return chosen_rows(self.decomposer.rows, outputs.columns, outputs.power_terms)
 
     def table_rows(self, block: Array) -> Array:
         """Return the rows of a block (rows, samples) that a table has."""

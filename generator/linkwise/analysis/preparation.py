@@ -7,6 +7,7 @@ from pathlib import Path
 
 from linkwise.analysis.asked_trace import AskedTrace, restart_times
 from linkwise.analysis.borne_joints import borne_joints
+from linkwise.analysis.chosen_columns import chosen_rows
 from linkwise.analysis.closed_motion import ClosedLog, closed_samples, slip_warnings
 from linkwise.analysis.column_matching import with_columns
 from linkwise.analysis.contacts.times import contact_times, switch_columns
@@ -85,12 +86,13 @@ def prepared(
     columns = () if outputs.tells_of_all or unfiltered is not None else outputs.columns
     told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, inputs, columns)
     decomposer = Decomposer.of(robot, processing.convention, borne, times, told)
-    if unfiltered is None:
-        return Job(log.name, asked, samples, decomposer, closed, phases, inputs)
-    bare = told._replace(traced=None, uncertain=UncertainInputs())
-    plain = Decomposer.of(robot, processing.convention, borne, times, bare)
-    swept = SweptLog(unfiltered, plain, processing, buffer)
-    return Job(log.name, asked, samples, decomposer, closed, phases, inputs, swept)
+    in_table = chosen_rows(decomposer.rows, outputs.columns, outputs.power_terms)
+    swept = None
+    if unfiltered is not None:
+        bare = told._replace(traced=None, uncertain=UncertainInputs())
+        plain = Decomposer.of(robot, processing.convention, borne, times, bare)
+        swept = SweptLog(unfiltered, plain, processing, buffer)
+    return Job(log.name, asked, samples, decomposer, in_table, closed, phases, inputs, swept)
 
 
 def _samples(

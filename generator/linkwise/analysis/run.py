@@ -8,6 +8,7 @@ from pathlib import Path
 from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.asked_trace import EVERY, TraceChoices, Weight
+from linkwise.analysis.column_patterns import patterns_of
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.standing import with_contacts
 from linkwise.analysis.cutoff_range import CutoffRange
@@ -95,7 +96,7 @@ def analyze(
     loaded, borne = with_contacts(loaded, held), Loads.of(loads, loads_cutoff)
     outputs = Outputs(
         page=False,
-        columns=(columns,) if isinstance(columns, str) else tuple(columns),
+        columns=patterns_of(columns),
         induced=tuple(induced),
         induced_whole=induced_whole,
         induced_power=induced_power,

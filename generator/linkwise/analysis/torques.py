@@ -9,7 +9,7 @@ import numpy as np
 from linkwise_runtime.motion.tracer import TraceState
 
 from linkwise.analysis.borne_joints import ReactionShares
-from linkwise.analysis.chosen_columns import chosen_rows
+from linkwise.analysis.chosen_columns import computed_rows
 from linkwise.analysis.closed_motion import reason_of
 from linkwise.analysis.closing_sums import ClosingSums, closing
 from linkwise.analysis.contacts.ground import Standing
@@ -98,7 +98,7 @@ class Decomposer:
             of_robot = terms.rows
         measured = [] if times is None else [at for at, loads in enumerate(times.measured) if loads]
         every_place = torque_places(robot, of_robot, loads, told.power_terms, measured)
-        chosen = chosen_rows(ResultRows.of(robot, every_place, loads), told.columns, told.power_terms)
+        chosen = computed_rows(ResultRows.of(robot, every_place, loads), told.columns, told.power_terms)
         places, points = [every_place[row] for row in chosen.tolist()], told.induced.points
         left_out = frozenset(name for name, _ in {*every_place} - {*places})
         sources = _sources(of_robot, places)

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from linkwise.analysis.certain_signs import LargestTorque
+from linkwise.analysis.chosen_columns import PRESETS
 from linkwise.analysis.cutoff_sweep import CutoffSweep
 from linkwise.analysis.verify import Closure
 from linkwise.arrays import Array
@@ -12,8 +13,11 @@ from linkwise.escape import listed
 
 
 def not_asked_for(quantities: Sequence[str]) -> LinkwiseError:
-    """Return an error that says which quantities were not computed."""
-    return LinkwiseError(f"not all columns of {listed(quantities)} were asked for; add them to columns")
+    """Return an error that says which preset of columns has what was not computed."""
+    preset = next(name for name in ("sums", "causes", "all") if {*quantities} <= {*PRESETS[name]})
+    return LinkwiseError(
+        f"columns left out what this is made of ({listed(quantities)}); it is there with columns {preset!r}"
+    )
 
 
 @dataclass(frozen=True, eq=False)

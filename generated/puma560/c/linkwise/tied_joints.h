@@ -217,14 +217,42 @@ static void find_bearing(const struct tied *x, real *bearing)
             bearing[x->joint[f] * BORNE + r] = sides[r * PITCH + f] / x->size[r];
 }
 
-/* G, from the factors, which are then no more than R. */
+/* Square of the length of a row of A_d+, which is that of R^-1. */
+static real square_of_row(const struct tied *x, int f)
+{
+    ALIGNED real row[N];
+    real square = 0;
+    for (int g = f; g < x->bound; ++g) {
+        row[g] = g == f;
+        for (int h = f; h < g; ++h)
+            row[g] -= row[h] * x->factor[h * PITCH + g];
+        row[g] /= x->factor[g * PITCH + g];
+        square += row[g] * row[g];
+    }
+    return square;
+}
+
+/* G, from the factors, which are then no more than R. Of joints that ties hold where they are only rounding is left,
+   |G_ia| <= LOST |A_d+ row i| |A_y column a|, whose sign would be that of their Coulomb friction: these get zeros. */
 static void find_map(struct tied *x)
 {
     const int m = x->free, d = x->bound;
+    ALIGNED real reach[N] = {0};
+    for (int r = 0; r < x->t.rows; ++r)
+        for (int a = 0; a < m; ++a)
+            reach[a] += x->factor[r * PITCH + d + a] * x->factor[r * PITCH + d + a];
     solve_above(x, m, x->factor + d);
-    for (int i = 0; i < N; ++i)
+    for (int i = 0; i < N; ++i) {
+        real *const row = x->map + x->joint[i] * PITCH;
         for (int a = 0; a < PITCH; ++a)
-            x->map[x->joint[i] * PITCH + a] = a >= m ? R(0.0) : i < d ? -x->factor[i * PITCH + d + a] : (real)(i - d == a);
+            row[a] = a >= m ? R(0.0) : i < d ? -x->factor[i * PITCH + d + a] : (real)(i - d == a);
+        const real rounding = i < d ? LOST * LOST * square_of_row(x, i) : R(0.0);
+        int moves = i >= d;
+        for (int a = 0; a < m; ++a)
+            moves |= row[a] * row[a] > rounding * reach[a];
+        for (int a = 0; a < m && !moves; ++a)
+            row[a] = 0;
+    }
 }
 
 /* Whether redundant rows contradict those they follow from, A G being not 0 beside the largest row of their tie. */
