@@ -49,6 +49,14 @@ def rows(constraints: Any, call: str, *motion: Any) -> Callable[[], Any]:
     return lambda: functions.answer(call, many)
 
 
+def once(controller: Any, q: Any, qd: Any) -> Callable[[], Any]:
+    """Return a controller's call of C for one sample, whose arguments are in place."""
+    controller(q, qd, q)
+    (of_one,) = controller._of_one.values()
+    ((call,),) = of_one._of_one.free.values()
+    return call.compute  # type: ignore[no-any-return]
+
+
 class Alone:
     """The joints that move one link, and its inertia alone, in Pinocchio."""
 
@@ -98,6 +106,11 @@ def quadruped(folder: Path) -> dict[str, Callable[[], Any]]:
     pin.initConstraintDynamics(model, data, held, kept)
     settings = pin.ProximalSettings(1e-12, 0.0, 1)
     alone = [Alone(model, j) for j in range(1, model.njoints)]
+    trunk = module.Natural({ours.link_names[0]: 0.8})
+    springs = [
+        ours.partial_impedance(stiffness=3.0, constraints=constraints, **more)
+        for more in ({}, {"inertia": trunk, "damping": trunk})
+    ]
     follows = np.asarray(constraints.velocity_map(q))
     bears = np.linalg.pinv(np.asarray(constraints.jacobian(q))).T
 
@@ -119,6 +132,10 @@ def quadruped(folder: Path) -> dict[str, Callable[[], Any]]:
         "quadruped, C: shares and forces by cause": rows(constraints, "shares_and_forces", q, qd),
         "quadruped, C: forward dynamics": rows(constraints, "forward_dynamics", q, qd, qdd),
         "quadruped, native: shares": lambda: constraints.coefficients(q, qd),
+        "quadruped, one sample in C: springs": once(springs[0], q, qd),
+        "quadruped, one sample in C: another inertia": once(springs[1], q, qd),
+        "quadruped, native: springs": lambda: springs[0](q, qd, q),
+        "quadruped, Pinocchio: rnea of the free robot": lambda: pin.rnea(model, data, place, moved, moved),
         "quadruped, Pinocchio: constraintDynamics": lambda: pin.constraintDynamics(
             model, data, place, moved, moved, held, kept, settings
         ),
@@ -164,6 +181,10 @@ def main() -> None:
             "quadruped, Pinocchio and NumPy: same numbers"
         ]
         / whole,
+        "springs of a standing robot / rnea of the free one": times["quadruped, one sample in C: springs"]
+        / times["quadruped, Pinocchio: rnea of the free robot"],
+        "another inertia of a standing robot / the same": times["quadruped, one sample in C: another inertia"]
+        / times["quadruped, Pinocchio: rnea of the free robot"],
         "from Python / C, quadruped": times["quadruped, native: shares"] / shares,
         "from Python / C, four-bar": times["four-bar, native: shares"] / times["four-bar, C: shares"],
     }

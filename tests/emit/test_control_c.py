@@ -185,6 +185,7 @@ def test_where_a_sliding_base_is_does_not_matter(tmp_path: Path) -> None:
 
 
 CONTROLLERS = {"partial_impedance", "frame_partial_impedance", "cancel"}
+ANY = {(0, 0, 0, 1)}
 FREE = {"forward_dynamics", "forward_dynamics_of_links"}
 """Calls that move joints that nothing ties."""
 TIED_OF_PASSIVE = {"constrained_response_of_links", "constrained_dynamics_of_links"}
@@ -249,7 +250,7 @@ def in_python(package: ModuleType, robot: Any) -> dict[str, Callable[[], Any]]:
         "forward_dynamics_of_links": lambda: robot.forward_dynamics(q, q, q, passive=False),
         "partial_impedance": lambda: robot.partial_impedance()(q, q),
         "frame_partial_impedance": of_frame,
-        "cancel": lambda: robot.cancel({(0, 0, 0, 1)})(q, q, qdd=q),
+        "cancel": lambda: robot.cancel(ANY)(q, q, qdd=q),
         **of_ties(package, robot, q),
     }
 
@@ -265,8 +266,9 @@ def of_ties(package: ModuleType, robot: Any, q: Any) -> dict[str, Callable[[], A
             ties = robot.constrained(contacts=[package.Contact(name, "point", (0.1, 0.2, 0.3))], at=q)
             break
 
+    place = ties.closed_position if ties is not None and at is None else q
+
     def on(call: str, given: int, **named: Any) -> Callable[[], Any]:
-        place = ties.closed_position if ties is not None and at is None else q
         return lambda: ties and getattr(ties, call)(place, *[q] * (given - 1), **named)
 
     return {
@@ -280,6 +282,9 @@ def of_ties(package: ModuleType, robot: Any, q: Any) -> dict[str, Callable[[], A
         "constrained_response_of_links": on("forward_dynamics", 3, passive=False),
         "constrained_dynamics": on("forward_dynamics", 3),
         "constrained_dynamics_of_links": on("forward_dynamics", 3, passive=False),
+        "constrained_partial_impedance": lambda: ties and robot.partial_impedance(constraints=ties)(place, q),
+        "constrained_cancel": lambda: ties and robot.cancel(ANY, constraints=ties)(place, q, qdd=q),
+        "contacts_keep": lambda: ties and robot.partial_impedance(constraints=ties).forces(place, q),
     }
 
 

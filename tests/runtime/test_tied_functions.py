@@ -1,5 +1,6 @@
 """C of tied joints through the native back end: against NumPy, one sample and many, in both precisions."""
 
+import ctypes
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -10,6 +11,7 @@ import pytest
 from conftest import needs_compiler
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
+from linkwise_runtime.native.library import symbol
 
 pytestmark = needs_compiler
 
@@ -231,3 +233,83 @@ def test_more_contacts_than_c_takes_are_answered_by_arrays(free: ModuleType) -> 
     assert many.ties.rows(robot.backend).functions is None
     assert robot.constrained(contacts=held[:8]).ties.rows(robot.backend).functions is not None
     np.testing.assert_allclose(many.jacobian(np.zeros(7))[:3], many.jacobian(np.zeros((1, 7)))[0, :3])
+
+
+@pytest.mark.parametrize(("has_ties", "kinds"), CASES)
+def test_c_controls_what_numpy_controls(
+    has_ties: bool, kinds: tuple[str, ...], tied: ModuleType, free: ModuleType
+) -> None:
+    module = tied if has_ties else free
+    at = None if has_ties else np.array([0.1, 0.3, 0.5, -0.7, 0.4, 0.05, 0.2])
+    ties = both(module, kinds, at)
+    q, qd, other = motion(ties[0])
+    aim = module.Target(q=q[0] - 0.2, qd=other[1], qdd=other[2])
+    half, links = module.Natural({"b": 0.5, "e": 0.0}), [module.Natural(plus=0.3)]
+    # Few driven joints leave a motion to itself, and many share by their weights.
+    few, more = [ties[0].independent[-1]], [name for name in ties[0]._robot.joint_names if name != "turn"]
+    for asked in (
+        {"stiffness": 3.0, "damping": links[0]},
+        {"stiffness": 3.0, "inertia": half, "damping": half, "friction_width": 0.1},
+        {"stiffness": 3.0, "inertia": half, "actuated": few},
+        {"stiffness": 3.0, "actuated": more, "torque_weight": [1.0, 3.0, 0.5, 2.0, 1.0, 4.0]},
+    ):
+        exact, compiled = (one._robot.partial_impedance(**asked, constraints=one) for one in ties)
+        single = ties[1]._robot.partial_impedance(**asked, constraints=ties[1])
+        for call in ("__call__", "acceleration", "forces"):
+            for s in range(3):
+                given = (q[s], qd[s], aim, other[3])
+                expected = getattr(exact, call)(*given)
+                compare(getattr(compiled, call)(*given), expected, EXACT)
+                part = [a.astype(np.float32) for a in (*given[:2], *aim[:3], given[3])]
+                found = getattr(single, call)(*part[:2], module.Target(*part[2:5]), part[5])
+                assert found.dtype == np.float32
+                compare(found, expected, SINGLE)
+        assert {key[0] for of_one in compiled._of_one.values() for key in of_one._of_one.free} == {
+            "tau",
+            "qdd",
+            "forces",
+        }
+    for driven in (None, few):
+        exact, compiled = (
+            one._robot.cancel({(None, "e", None, None)}, constraints=one, actuated=driven) for one in ties
+        )
+        for call, given in (("__call__", (q, qd, other, None, other)), ("acceleration", (q, qd, other))):
+            row = [None if a is None else a[5] for a in given]
+            compare(getattr(compiled, call)(*row), getattr(exact, call)(*row), EXACT)
+
+
+class GripStruct(ctypes.Structure):
+    """The struct NAME_grip of double."""
+
+    _fields_ = (("contact", ctypes.c_int), ("friction", ctypes.c_double), ("normal", ctypes.c_double * 3))
+
+
+def test_c_tells_which_contacts_keep(free: ModuleType) -> None:
+    """On a slope: what pulls, slips, is not there, or does not touch at one point."""
+    at, normal = np.array([0.1, 0.3, 0.5, -0.7, 0.4, 0.05, 0.2]), np.array([0.1, 0.0, 0.9])
+    held = [both(free, kinds, at)[1] for kinds in (("point", "rolling"), ("rolling", "hinged"))]
+    functions = [one.ties.rows(one._robot.backend).functions for one in held]
+    keep = symbol(functions[0]._calls.sources, "contacts_keep", "f8")
+
+    def told(forces: Any, second: int = 1, of: int = 0) -> int:
+        grips = (GripStruct * 2)(
+            *(GripStruct(k, 0.5, (ctypes.c_double * 3)(*normal)) for k in (0, second)),
+        )
+        struct = functions[of]._struct(np.dtype(float))
+        found: int = keep(
+            ctypes.c_size_t(2), ctypes.byref(struct), grips, ctypes.c_void_p(forces.ctypes.data)
+        )
+        return found
+
+    across = np.cross(normal, [0.0, 1.0, 0.0])
+    unit, across = normal / np.linalg.norm(normal), across / np.linalg.norm(across)
+    for first, second, expected in (
+        (10.0 * unit + 4.9 * across, unit, 0),
+        (10.0 * unit + 5.1 * across, unit, 1),
+        (10.0 * unit, 0.6 * across + unit, 2),
+        (10.0 * unit, -0.1 * unit, 2),
+        (10.0 * unit, np.full(3, np.nan), 2),
+    ):
+        assert told(np.concatenate([first, second])) == expected
+    pressed = np.concatenate([unit, np.zeros(5)])
+    assert told(pressed, 2) == told(pressed, -1) == told(pressed, of=1) == -2

@@ -67,6 +67,9 @@ BESIDE_IN_C = {
     "partial_impedance": "a [controller](control.md)",
     "cancel": "what a [controller](control.md) cancels at a given acceleration",
     "frame_partial_impedance": "a [controller](control.md) of a frame",
+    "constrained_partial_impedance": "a [controller](control.md) of tied joints, and what ties bear then",
+    "constrained_cancel": "what such a controller cancels at a given acceleration",
+    "contacts_keep": "whether contacts that touch at one point keep within their cones of friction",
 }
 """Functions of C that no row has."""
 

@@ -107,7 +107,10 @@ enum {
     PLANAR3_TIES_CONTRADICT = 3,
     PLANAR3_TIES_UNCLOSED = 4,
     PLANAR3_NO_INERTIA = 5,
-    PLANAR3_UNKNOWN = 6
+    PLANAR3_UNKNOWN = 6,
+    PLANAR3_NOT_POSITIVE = 7,
+    PLANAR3_UNDRIVEN = 8,
+    PLANAR3_NOT_FINITE = 9
 };
 
 /* No two arrays that are given to a function may overlap. Shapes leave PLANAR3_ out of the names above; the last index
@@ -387,6 +390,47 @@ int planar3_constrained_dynamics(size_t count, const double *q, const double *qd
 int planar3_constrained_response(size_t count, const double *q, const double *qd, const planar3_constraints *constraints,
     double *velocity, double *response, double *reactions, double *accelerations, double *forces);
 
+/* Joints that something drives, as the legs of a robot with a floating base, or the crank of a loop. */
+typedef struct {
+    int driven; /* how many */
+    const int *joint; /* (driven) their numbers, from 0, ascending */
+    const double *weight; /* (driven) weights of the squares of their torques, above 0, or NULL: 1 each */
+    int undriven; /* motions of the independent joints in which no driven joint takes part, as of who stands on two points: 0 or more */
+} planar3_actuators;
+
+/* Partial impedance of joints that are tied, of one sample: it holds along all motions that ties leave, of the independent joints
+   times G' from the left, and driven joints give what it needs, of all torques that do those of the least sum of weighted squares.
+   Motions that nothing drives go as they do under these torques, and all driven joints as they are asked to.
+   Arguments are those of a free robot's partial_impedance, `wanted` among them: of qd, and of the wanted acceleration, the
+   independent joints count; outputs may be NULL, each. With forces, or qdd, M* is solved for in any case.
+   Returns 0, or as functions of tied joints do why there is no answer, with outputs as they were, and beside these
+   PLANAR3_NOT_POSITIVE where M* is not positive along what ties leave, or not regular, PLANAR3_UNDRIVEN where driven joints cannot
+   drive what they do elsewhere, as at a dead centre, and PLANAR3_NOT_FINITE. Where rounding leaves fewer than half of the digits of
+   qdd it writes all and returns the number of an independent joint among these, from 1, negative.
+   Reads q, qd (JOINTS), q_d, qd_d, qdd_d, task, external (JOINTS);
+   writes tau, qdd (JOINTS), forces (ROWS) of ties and contacts. */
+int planar3_constrained_partial_impedance(const double *q, const double *qd, const planar3_constraints *constraints,
+    const planar3_actuators *actuators, const planar3_impedance *wanted, const double *q_d,
+    const double *qd_d, const double *qdd_d, const double *task, const double *external, double *tau,
+    double *qdd, double *forces);
+
+/* What is not kept, at a given acceleration, measured or wanted, as cancel has it, given by driven joints alone. `wanted` and task may be
+   NULL. Returns as constrained_partial_impedance does. Reads q, qd, qdd (JOINTS), task (JOINTS); writes tau (JOINTS). */
+int planar3_constrained_cancel(const double *q, const double *qd, const double *qdd, const planar3_constraints *constraints,
+    const planar3_actuators *actuators, const planar3_impedance *wanted, const double *task, double *tau);
+
+/* What the ground bears at a contact: it pushes along its normal, and friction holds up to a share of that. */
+typedef struct {
+    int contact; /* its number among those of the constraints, from 0: a point, or what rolls */
+    double friction; /* coefficient of friction, 0 or above */
+    double normal[3]; /* away from the ground, in the world's axes, of any length */
+} planar3_grip;
+
+/* Whether contacts keep, under forces (ROWS) of the rows: 0, or the number, from 1, of the first of `grip` (grips) at which the ground
+   would have to pull or a foot slips, |f_t| > friction f_n; negative for one that does not touch at one point. */
+int planar3_contacts_keep(size_t grips, const planar3_constraints *constraints,
+    const planar3_grip *grip, const double *forces);
+
 /* ---- All links, many samples, in float ---- */
 
 /* All quantities but c0: 146 operations.
@@ -660,6 +704,47 @@ int planar3_constrained_dynamicsf(size_t count, const float *q, const float *qd,
    accelerations (count, JOINTS, JOINTS), forces (count, ROWS, JOINTS), none of which may be NULL. */
 int planar3_constrained_responsef(size_t count, const float *q, const float *qd, const planar3_constraintsf *constraints,
     float *velocity, float *response, float *reactions, float *accelerations, float *forces);
+
+/* Joints that something drives, as the legs of a robot with a floating base, or the crank of a loop. */
+typedef struct {
+    int driven; /* how many */
+    const int *joint; /* (driven) their numbers, from 0, ascending */
+    const float *weight; /* (driven) weights of the squares of their torques, above 0, or NULL: 1 each */
+    int undriven; /* motions of the independent joints in which no driven joint takes part, as of who stands on two points: 0 or more */
+} planar3_actuatorsf;
+
+/* Partial impedance of joints that are tied, of one sample: it holds along all motions that ties leave, of the independent joints
+   times G' from the left, and driven joints give what it needs, of all torques that do those of the least sum of weighted squares.
+   Motions that nothing drives go as they do under these torques, and all driven joints as they are asked to.
+   Arguments are those of a free robot's partial_impedance, `wanted` among them: of qd, and of the wanted acceleration, the
+   independent joints count; outputs may be NULL, each. With forces, or qdd, M* is solved for in any case.
+   Returns 0, or as functions of tied joints do why there is no answer, with outputs as they were, and beside these
+   PLANAR3_NOT_POSITIVE where M* is not positive along what ties leave, or not regular, PLANAR3_UNDRIVEN where driven joints cannot
+   drive what they do elsewhere, as at a dead centre, and PLANAR3_NOT_FINITE. Where rounding leaves fewer than half of the digits of
+   qdd it writes all and returns the number of an independent joint among these, from 1, negative.
+   Reads q, qd (JOINTS), q_d, qd_d, qdd_d, task, external (JOINTS);
+   writes tau, qdd (JOINTS), forces (ROWS) of ties and contacts. */
+int planar3_constrained_partial_impedancef(const float *q, const float *qd, const planar3_constraintsf *constraints,
+    const planar3_actuatorsf *actuators, const planar3_impedancef *wanted, const float *q_d,
+    const float *qd_d, const float *qdd_d, const float *task, const float *external, float *tau,
+    float *qdd, float *forces);
+
+/* What is not kept, at a given acceleration, measured or wanted, as cancel has it, given by driven joints alone. `wanted` and task may be
+   NULL. Returns as constrained_partial_impedance does. Reads q, qd, qdd (JOINTS), task (JOINTS); writes tau (JOINTS). */
+int planar3_constrained_cancelf(const float *q, const float *qd, const float *qdd, const planar3_constraintsf *constraints,
+    const planar3_actuatorsf *actuators, const planar3_impedancef *wanted, const float *task, float *tau);
+
+/* What the ground bears at a contact: it pushes along its normal, and friction holds up to a share of that. */
+typedef struct {
+    int contact; /* its number among those of the constraints, from 0: a point, or what rolls */
+    float friction; /* coefficient of friction, 0 or above */
+    float normal[3]; /* away from the ground, in the world's axes, of any length */
+} planar3_gripf;
+
+/* Whether contacts keep, under forces (ROWS) of the rows: 0, or the number, from 1, of the first of `grip` (grips) at which the ground
+   would have to pull or a foot slips, |f_t| > friction f_n; negative for one that does not touch at one point. */
+int planar3_contacts_keepf(size_t grips, const planar3_constraintsf *constraints,
+    const planar3_gripf *grip, const float *forces);
 
 #ifdef __cplusplus
 }

@@ -22,7 +22,7 @@ from linkwise.check.control_functions import (
 )
 from linkwise.check.frame_checks import FrameReference
 from linkwise.check.model_calls import FLOAT32
-from linkwise.check.tied_functions import CONSTANTS, TIED, tied_prototypes
+from linkwise.check.tied_functions import CONSTANTS, OF_TIES, tied_prototypes
 from linkwise.errors import LinkwiseError
 from linkwise.oracle.reference import Reference, dense_quantities
 from linkwise.oracle.states import NUMBERS
@@ -109,7 +109,7 @@ class CFunctions:
             if not hasattr(self.compiled.library, symbol):
                 yield Result(name, False, None, "there is no such function")
                 continue
-            if function.short == NOT_CALLED or function.short in TIED:
+            if function.short in (NOT_CALLED, *OF_TIES):
                 continue
             single = FLOAT32 if function.real == "float" else {"tolerance": reference.tolerance}
             try:

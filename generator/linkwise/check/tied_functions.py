@@ -24,6 +24,27 @@ TIED: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
     "constrained_dynamics_of_links": (("q", "qd", "tau"), (), ("qdd", "forces")),
 }
 """Functions of tied joints: their motion, what they take behind the constraints, and what they write."""
+CONTROLLERS: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
+    "constrained_partial_impedance": (
+        ("q", "qd"),
+        ("q_d", "qd_d", "qdd_d", "task", "external"),
+        ("tau", "qdd", "forces"),
+    ),
+    "constrained_cancel": (("q", "qd", "qdd"), ("task",), ("tau",)),
+}
+"""Controllers of tied joints, for one sample, likewise; what they take behind what is CONTROLLED."""
+CONTROLLED = ("constraints", "actuators", "wanted")
+KEEP = "contacts_keep"
+"""Function that says whether contacts keep."""
+OF_TIES = (*TIED, *CONTROLLERS, KEEP)
+"""All functions of tied joints."""
+STRUCTS = (
+    ("constraints", "constraints"),
+    ("actuators", "actuators"),
+    ("wanted", "impedance"),
+    ("grip", "grip"),
+)
+"""Arguments that are structs, and whose names these have."""
 CONSTANTS = {
     "CONTACT_POINT": 0,
     "CONTACT_HINGED": 1,
@@ -37,6 +58,9 @@ CONSTANTS = {
     "TIES_UNCLOSED": 4,
     "NO_INERTIA": 5,
     "UNKNOWN": 6,
+    "NOT_POSITIVE": 7,
+    "UNDRIVEN": 8,
+    "NOT_FINITE": 9,
 }
 """Constants of the header, without the robot's name."""
 
@@ -46,17 +70,20 @@ def tied_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Prototyp
     if manifest.tree is None or len(manifest.joints) > MOST_TIED:
         return []
     parameters = ("p",) if manifest.parameters else ()
-    kind = (("constraints", f"{manifest.name}_constraints{suffix}"),)
+    kinds = tuple((name, f"{manifest.name}_{kind}{suffix}") for name, kind in STRUCTS)
+
+    def declared(name: str, counted: str, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Prototype:
+        return Prototype(name + suffix, real, counted, inputs, outputs, "int", kinds)
+
     return [
-        Prototype(
-            name + suffix,
-            real,
-            "count",
-            (*motion, *parameters, "constraints", *behind),
-            outputs,
-            "int",
-            kind,
-        )
-        for name, (motion, behind, outputs) in TIED.items()
-        if manifest.passive or not name.endswith("_of_links")
+        *(
+            declared(name, "count", (*motion, *parameters, "constraints", *behind), outputs)
+            for name, (motion, behind, outputs) in TIED.items()
+            if manifest.passive or not name.endswith("_of_links")
+        ),
+        *(
+            declared(name, "", (*motion, *parameters, *CONTROLLED, *behind), outputs)
+            for name, (motion, behind, outputs) in CONTROLLERS.items()
+        ),
+        declared(KEEP, "grips", ("constraints", "grip", "forces"), ()),
     ]

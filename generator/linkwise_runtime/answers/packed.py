@@ -26,6 +26,19 @@ class OneSample(Protocol):
         """
 
 
+class TorqueOfOne(Protocol):
+    """A controller's torque for one sample, which a back end has beside that for many."""
+
+    def torque(self, given: Mapping[str, Numbers]) -> Numbers | None:
+        """Return the torque (n,) for motion and targets by name; None where the function has no answer."""
+
+    def acceleration(self, given: Mapping[str, Numbers]) -> Numbers | None:
+        """Return the acceleration (n,) that follows, likewise."""
+
+    def forces(self, given: Mapping[str, Numbers]) -> Numbers | None:
+        """Return the forces of ties and contacts (C,) that follow, likewise."""
+
+
 class TiedFunctions(Protocol):
     """Functions of a back end for joints that are tied, with constraints and independent joints as chosen."""
 
@@ -40,15 +53,10 @@ class TiedFunctions(Protocol):
         There is none where ties are open or singular, say: the operations on arrays then say what is wrong.
         """
 
-
-class TorqueOfOne(Protocol):
-    """A controller's torque for one sample, which a back end has beside that for many."""
-
-    def torque(self, given: Mapping[str, Numbers]) -> Numbers | None:
-        """Return the torque (n,) for motion and targets by name; None where the function has no answer."""
-
-    def acceleration(self, given: Mapping[str, Numbers]) -> Numbers | None:
-        """Return the acceleration (n,) that follows, likewise."""
+    def controller(
+        self, targets: object, driven: Sequence[int], weight: NDArray[np.float64], undriven: int
+    ) -> TorqueOfOne:
+        """Return functions for one sample, for targets of joints and for joints that are driven."""
 
 
 class PackedBackend(Library):

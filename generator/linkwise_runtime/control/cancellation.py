@@ -79,8 +79,9 @@ class Cancellation(Controller, Generic[Array]):
 
     def forces(self, q: Array, qd: Array, tau: Array | None = None, external: Array | None = None) -> Array:
         """Return the forces lambda of ties and contacts that follow, (..., C), as `Constraints` has them."""
-        need = self._followed(*self._given(q, qd, tau, external), whole=True)
-        return cast("Array", self._borne(need))
+        backend, given = self._given(q, qd, tau, external)
+        found = self._forces_of_one(backend, given)
+        return cast("Array", self._borne(self._followed(backend, given, True)) if found is None else found)
 
     def _followed(self, backend: ArrayBackend, given: Given, whole: bool = False) -> Need:
         """Return what the acceleration that follows, or one that is given, needs of the joints.

@@ -109,12 +109,25 @@ class Controller:
         of_one = self._for_one(backend)
         return None if of_one is None else of_one.acceleration(given)
 
+    def _forces_of_one(self, backend: ArrayBackend, given: Given) -> Numbers | None:
+        """Return the forces of ties and contacts that follow, likewise."""
+        of_one = self._for_one(backend)
+        return None if of_one is None else of_one.forces(given)
+
     def _for_one(self, backend: ArrayBackend) -> TorqueOfOne | None:
-        if not self._actuators.drive_all:
-            return None
         if backend not in self._of_one:
-            self._of_one[backend] = backend.controller(self._joints.targets, self._frame)
+            self._of_one[backend] = self._made_for_one(backend)
         return self._of_one[backend]
+
+    def _made_for_one(self, backend: ArrayBackend) -> TorqueOfOne | None:
+        """Return the back end's functions; None without any, as of frames of tied joints and of limits."""
+        by, targets = self._actuators, self._joints.targets
+        if self._constraints is None:
+            return backend.controller(targets, self._frame) if by.drive_all else None
+        functions = self._constraints.ties.rows(backend).functions
+        if functions is None or self._frame is not None or self._grips:
+            return None
+        return functions.controller(targets, by.joints, by.weight, by.undriven)
 
     def _arrays(
         self, q: object, qd: object, motion: Mapping[str, object], beside: Mapping[str, Beside] = NOTHING

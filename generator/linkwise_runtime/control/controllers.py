@@ -88,7 +88,9 @@ class PartialImpedance(Controller, Generic[Array]):
 
     def forces(self, q: Array, qd: Array, target: object = None, external: Array | None = None) -> Array:
         """Return the forces lambda of ties and contacts that follow, (..., C), as `Constraints` has them."""
-        return cast("Array", self._borne(self._followed(*self._given(q, qd, target, external))))
+        backend, given = self._given(q, qd, target, external)
+        found = self._forces_of_one(backend, given)
+        return cast("Array", self._borne(self._followed(backend, given)) if found is None else found)
 
     def stored_energy(self, q: Array, qd: Array, target: object = None) -> Array:
         """Return the stored energy (ed' M* ed + e' K* e) / 2 in J, (...); with a frame, that of the frame."""

@@ -4,18 +4,20 @@ import ctypes
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..constraints.chosen_constraints import TreeConstraints
 from ..constraints.held_frames import Held
+from ..control.joint_impedance import JointTargets
 from ..interface import Numbers
 from .calls import NativeCalls, plain
 from .control import RealType
 from .library import MOST_TIED, OneSampleCall, OneSamplePool, one_sample_call, symbol
 from .memory import NumberArray, NumberType, address, memory
+from .tied_control import TiedStance, TiedTorque
 
 if TYPE_CHECKING:
     from ctypes import _NamedFuncPointer as CFunction
@@ -170,6 +172,13 @@ class NativeTies:
         shapes = [self._shape_of(letters) for letters in CALLS[name].outputs if letters]
         return [a.reshape(*batch, *shape) for a, shape in zip(found, shapes, strict=True)] if found else None
 
+    def controller(
+        self, targets: object, driven: Sequence[int], weight: NDArray[np.float64], undriven: int
+    ) -> TiedTorque:
+        """Return the object by which C computes a controller's torque for one sample."""
+        stance = TiedStance(self._struct, self._sizes["C"], driven, weight, undriven)
+        return TiedTorque(self._calls, cast(JointTargets, targets), stance)
+
     def _function(self, name: str, kind: NumberType) -> "CFunction":
         """Return a C function for a dtype, compiled if it is not there yet."""
         if (name, kind) not in self._functions:
@@ -218,8 +227,6 @@ class NativeTies:
         held: bool,
     ) -> list[object]:
         """Return the arguments in the order of C; the constants are empty without parameters."""
-        if kind not in self._told:
-            self._told[kind] = told(self._contacts, self._independent, self._tolerance, kind)
         missing = [None] * (asked.takes - asked.motion)
         last = [given[-1] if held else None] if asked.held else []
         return [
@@ -227,10 +234,16 @@ class NativeTies:
             *given[: asked.motion],
             *missing,
             self._calls.constants(kind),
-            ctypes.byref(self._told[kind].struct),
+            ctypes.byref(self._struct(kind)),
             *last,
             *results,
         ]
+
+    def _struct(self, kind: NumberType) -> ctypes.Structure:
+        """Return the constraints as C takes them, made once."""
+        if kind not in self._told:
+            self._told[kind] = told(self._contacts, self._independent, self._tolerance, kind)
+        return self._told[kind].struct
 
     def _shape_of(self, letters: str) -> tuple[int, ...]:
         return tuple(self._sizes[letter] for letter in letters)

@@ -133,6 +133,10 @@ class NativeTorque:
         """Return the acceleration (n,) that follows, likewise."""
         return self._answer("qdd", given)
 
+    def forces(self, given: Mapping[str, Numbers]) -> NumberArray | None:
+        """Return the forces of ties (C,) that follow, likewise; joints that nothing ties have none."""
+        return None
+
     def _answer(self, asked: str, given: Mapping[str, Numbers]) -> NumberArray | None:
         q = given["q"]
         if not self._known or self._calls.learned or type(q) is not np.ndarray or q.ndim > 1:
@@ -145,15 +149,19 @@ class NativeTorque:
         found = self._of_one.results((asked, q.dtype, names), numbers)
         return found[0] if found else None
 
+    def _memory(self, kind: NumberType, names: Sequence[str]) -> tuple[NumberArray, dict[str, NumberArray]]:
+        """Return memory for q, qd and arrays of these names, one after another, and the arrays in it."""
+        n, every = self._structure.n, ("q", "qd", *names)
+        sizes = [ON_FRAME.get(name, n) for name in every]
+        memory = np.empty(sum(sizes), kind)
+        return memory, dict(zip(every, np.split(memory, np.cumsum(sizes)[:-1]), strict=True))
+
     def _one_sample(self, key: tuple[str, NumberType, tuple[str, ...]]) -> OneSampleCall:
         """Return a call for "tau", "qdd" or "cancel" that is given these arrays besides q and qd."""
         asked, kind, names = key
         n, settings = self._structure.n, self._set(kind)
-        sizes = [n, n, *(ON_FRAME.get(name, n) for name in names)]
-        memory = np.empty(sum(sizes), kind)
-        q, qd, *parts = np.split(memory, np.cumsum(sizes)[:-1])
-        placed = dict(zip(names, parts, strict=True))
-        told = [placed.get(name) for name in self._beside]
+        memory, placed = self._memory(kind, names)
+        q, qd, told = placed["q"], placed["qd"], [placed.get(name) for name in self._beside]
         constants, wanted, answer = (
             self._calls.constants(kind),
             ctypes.byref(settings.joints),

@@ -45,6 +45,9 @@ TIED = (
     "constrained_response_of_links",
     "constrained_dynamics",
     "constrained_dynamics_of_links",
+    "constrained_partial_impedance",
+    "constrained_cancel",
+    "contacts_keep",
 )
 """Functions of joints that are tied."""
 

@@ -25,7 +25,7 @@
 #define OPEN R(1e-4)
 
 /* What functions answer with where they have no answer; NAME.h has names for them. */
-enum { IS_OPEN = 1, IS_SINGULAR, IS_CONTRADICTED, IS_UNCLOSED, HAS_NO_INERTIA, IS_UNKNOWN };
+enum { IS_OPEN = 1, IS_SINGULAR, IS_CONTRADICTED, IS_UNCLOSED, HAS_NO_INERTIA, IS_UNKNOWN, IS_NOT_POSITIVE, IS_UNDRIVEN, IS_NOT_FINITE };
 
 enum { PITCH = (N + 2 * LANES - 1) / LANES * LANES, BORNE = (ROWS + LANES - 1) / LANES * LANES };
 
@@ -90,6 +90,21 @@ static inline void reflect_one_side(int first, int rows, const real *v, real twi
         x[r] -= v[r] * (sum * twice);
 }
 
+/* Turns column f of x, from row f on, along its first entry, which is then the answer; `v` and `twice` are the reflector, which
+   `reflect` applies to the columns behind it. */
+static real turn_column(int f, int rows, real *x, real *v, real *twice)
+{
+    real square = 0;
+    for (int r = f; r < rows; ++r) {
+        v[r] = x[r * PITCH + f];
+        square += v[r] * v[r];
+    }
+    const real left = F(sqrt)(square), kept = v[f] > 0 ? -left : left;
+    *twice = 1 / (square - v[f] * kept);
+    v[f] -= kept;
+    return x[f * PITCH + f] = kept;
+}
+
 /* A_d = Q R, or 0 where A_d has lost its rank. */
 static int factor_rows(struct tied *x)
 {
@@ -106,20 +121,13 @@ static int factor_rows(struct tied *x)
     if (rows < d)
         return 0;
     for (int f = 0; f < d; ++f) {
-        real *const v = x->reflector + f * ROWS, square = 0, above = 0;
+        real *const v = x->reflector + f * ROWS, above = 0;
         for (int r = 0; r < f; ++r)
             above += x->factor[r * PITCH + f] * x->factor[r * PITCH + f];
-        for (int r = f; r < rows; ++r) {
-            v[r] = x->factor[r * PITCH + f];
-            square += v[r] * v[r];
-        }
-        const real left = F(sqrt)(square), kept = v[f] > 0 ? -left : left;
-        if (!(left > LOST * F(sqrt)(square + above)))
+        const real left = turn_column(f, rows, x->factor, v, &x->twice[f]), square = left * left;
+        if (!(square > LOST * LOST * (square + above)))
             return 0;
-        x->twice[f] = 1 / (square - v[f] * kept);
-        v[f] -= kept;
         reflect(f, rows, N - f - 1, v, x->twice[f], x->factor + f + 1);
-        x->factor[f * PITCH + f] = kept;
     }
     return 1;
 }
@@ -337,19 +345,25 @@ static void times_map(const struct tied *x, int rows, const real *matrix_of, rea
         }
 }
 
-/* Velocities that follow those of the independent joints, and what they change: dA/dt, dG/dt and the accelerations
-   -A_d+ dA/dt qd; then accelerations that follow, where qdd is given. */
-static void move_tied(struct tied *x, const real *qd, const real *qdd)
+/* Velocities that follow those of the independent joints. */
+static void follow_velocities(struct tied *x, const real *qd)
 {
-    const int m = x->free, rows = x->t.rows;
     ALIGNED const real rest[N] = {0};
-    ALIGNED real sides[ROWS * PITCH], acceleration[N];
     for (int i = 0; i < N; ++i) {
         x->qd[i] = 0;
-        for (int a = 0; a < m; ++a)
+        for (int a = 0; a < x->free; ++a)
             x->qd[i] += x->map[i * PITCH + a] * qd[x->joint[x->bound + a]];
     }
     set_motion(&x->at.s.m, x->qd, rest);
+}
+
+/* These, and what they change: dA/dt, dG/dt and the accelerations -A_d+ dA/dt qd; then accelerations that follow, where qdd is
+   given. */
+static void move_tied(struct tied *x, const real *qd, const real *qdd)
+{
+    const int m = x->free, rows = x->t.rows;
+    ALIGNED real sides[ROWS * PITCH], acceleration[N];
+    follow_velocities(x, qd);
     rates_at(x->c, &x->at, x->o, x->qd, &x->t);
     times_map(x, rows, x->t.rate, sides);
     follow(x, m, sides, x->map_rate);

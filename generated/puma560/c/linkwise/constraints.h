@@ -10,3 +10,5 @@
 #include "tied_motion.h"
 
 #include "tied_response.h"
+
+#include "tied_impedance.h"
