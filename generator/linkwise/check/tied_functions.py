@@ -1,10 +1,11 @@
-"""Declarations that a package's header must have of functions of tied joints.
+"""Declarations that a package's header must have of functions of tied joints, and of motions over time.
 
 They take more than arrays, what ties the joints, so that only their declarations and presence are checked
-here: the native back end's constraints, which are compared with least squares, call them all.
+here: the native back end's constraints, which are compared with least squares, call them all, and its
+`simulate`, which is compared with the recursion's equations of motion.
 """
 
-from linkwise_runtime.native.library import MOST_TIED
+from linkwise_runtime.native.library import MOST_TIED, scratch_numbers
 
 from linkwise.check.compiled_c import Prototype
 from linkwise.package.manifest import Manifest
@@ -22,8 +23,11 @@ TIED: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
     "constrained_response_of_links": (("q", "qd"), (), RESPONSES),
     "constrained_dynamics": (("q", "qd", "tau"), (), ("qdd", "forces")),
     "constrained_dynamics_of_links": (("q", "qd", "tau"), (), ("qdd", "forces")),
+    "simulate": (("q", "qd"), (), ("scratch", "positions", "velocities", "torques", "work")),
 }
 """Functions of tied joints: their motion, what they take behind the constraints, and what they write."""
+OF_SIMULATION = "wanted", "simulation"
+"""Argument in which a simulation has its constraints, and its type, without the robot's name."""
 CONSTANTS = {
     "CONTACT_POINT": 0,
     "CONTACT_HINGED": 1,
@@ -37,8 +41,19 @@ CONSTANTS = {
     "TIES_UNCLOSED": 4,
     "NO_INERTIA": 5,
     "UNKNOWN": 6,
+    "TIES_LOST": 7,
+    "NOT_FINITE": 8,
 }
 """Constants of the header, without the robot's name."""
+
+
+def tied_constants(manifest: Manifest) -> dict[str, int]:
+    """Return the constants of these functions; none for links of energies."""
+    tree, n = manifest.tree, len(manifest.joints)
+    if tree is None or n > MOST_TIED:
+        return {} if tree is None else CONSTANTS
+    kinds = (tie.kind for tie in tree.ties)
+    return CONSTANTS | {"SCRATCH": scratch_numbers(n, kinds, len(tree.couplings))}
 
 
 def tied_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Prototype]:
@@ -46,16 +61,17 @@ def tied_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Prototyp
     if manifest.tree is None or len(manifest.joints) > MOST_TIED:
         return []
     parameters = ("p",) if manifest.parameters else ()
-    kind = (("constraints", f"{manifest.name}_constraints{suffix}"),)
+    tied = "constraints", "constraints"
+    told = {name: OF_SIMULATION if name == "simulate" else tied for name in TIED}
     return [
         Prototype(
             name + suffix,
             real,
             "count",
-            (*motion, *parameters, "constraints", *behind),
+            (*motion, *parameters, told[name][0], *behind),
             outputs,
             "int",
-            kind,
+            ((told[name][0], f"{manifest.name}_{told[name][1]}{suffix}"),),
         )
         for name, (motion, behind, outputs) in TIED.items()
         if manifest.passive or not name.endswith("_of_links")

@@ -14,14 +14,12 @@ from ..constraints.held_frames import Held
 from ..interface import Numbers
 from .calls import NativeCalls, plain
 from .control import RealType
-from .library import MOST_TIED, OneSampleCall, OneSamplePool, one_sample_call, symbol
+from .library import MOST_CONTACTS, MOST_TIED, OneSampleCall, OneSamplePool, one_sample_call, symbol
 from .memory import NumberArray, NumberType, address, memory
 
 if TYPE_CHECKING:
     from ctypes import _NamedFuncPointer as CFunction
 
-MOST_CONTACTS = 8
-"""Most contacts that C takes at a time."""
 KINDS = {"point": 0, "hinge": 1, "frame": 2, "rolling": 4}
 """Numbers of the kinds of contacts in C."""
 
@@ -170,6 +168,12 @@ class NativeTies:
         shapes = [self._shape_of(letters) for letters in CALLS[name].outputs if letters]
         return [a.reshape(*batch, *shape) for a, shape in zip(found, shapes, strict=True)] if found else None
 
+    def settings(self, kind: NumberType) -> TiedSettings:
+        """Return the constraints as C takes them in one number type, made once."""
+        if kind not in self._told:
+            self._told[kind] = told(self._contacts, self._independent, self._tolerance, kind)
+        return self._told[kind]
+
     def _function(self, name: str, kind: NumberType) -> "CFunction":
         """Return a C function for a dtype, compiled if it is not there yet."""
         if (name, kind) not in self._functions:
@@ -218,8 +222,6 @@ class NativeTies:
         held: bool,
     ) -> list[object]:
         """Return the arguments in the order of C; the constants are empty without parameters."""
-        if kind not in self._told:
-            self._told[kind] = told(self._contacts, self._independent, self._tolerance, kind)
         missing = [None] * (asked.takes - asked.motion)
         last = [given[-1] if held else None] if asked.held else []
         return [
@@ -227,7 +229,7 @@ class NativeTies:
             *given[: asked.motion],
             *missing,
             self._calls.constants(kind),
-            ctypes.byref(self._told[kind].struct),
+            ctypes.byref(self.settings(kind).struct),
             *last,
             *results,
         ]
