@@ -174,14 +174,15 @@ def simulate_motion(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
     if constraints is not None:
         q, qd = _of_all_joints(constraints, q, qd)
     named: dict[str, object] = {"q": q, "qd": qd}
-    if asked.tau is not None and not callable(asked.tau):
-        named["tau"] = asked.tau
+    drive = controller_of(asked.tau)
+    if drive is not None and not callable(drive):
+        named["tau"] = drive
     loads = loads_of(robot.backend, () if callable(asked.loads) else asked.loads)
     backend, numbers = robot.door.read(named, beside=loads.beside)
     motion = dict(zip(named, numbers[: len(named)], strict=True))
     check_numbers(motion, robot.joint_names)
     start, rate = motion["q"], motion["qd"]
-    tau = cast(Given, controller_of(asked.tau)) if callable(asked.tau) else motion.get("tau", 0.0 * start)
+    tau = cast(Given, drive) if callable(drive) else motion.get("tau", 0.0 * start)
     pulls = ReadLoads(loads, numbers[len(named) :])
     given = cast(Given, asked.loads) if callable(asked.loads) else pulls
     times = rising_instants("time", asked.time)
