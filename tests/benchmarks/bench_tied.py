@@ -8,12 +8,16 @@ forces, sums alone, by constraintDynamics, and with the same numbers by its best
 joints that move it, with that link's inertia alone, through crba, computeCoriolisMatrix and
 computeGeneralizedGravity, and products with G and A_d+ in NumPy. C goes over rows of samples, without Python;
 Pinocchio's calls go through its Python wrappers.
+
+A step of `simulate` by RK4, with all that it answers with, is timed of these robots and of a Panda that
+nothing ties, on native beside NumPy: of one motion, of 64 at once, and with a controller of Python.
 Prints microseconds of a sample, and ratios.
 """
 
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +27,7 @@ import pinocchio as pin
 sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent))
 
+from conftest import PANDA
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
 from runtime.test_constraints import FOURBAR
@@ -32,6 +37,8 @@ from tools.corpus import ROBOTS
 SOLO = ROBOTS / "solo_description" / "robots" / "solo12.urdf"
 ROWS = 64
 """Samples of a call of C."""
+STEPS = {"numpy": 8, "native": 400}
+"""Steps of a simulation."""
 SECONDS = 1.0
 
 
@@ -158,14 +165,58 @@ def fourbar(folder: Path) -> dict[str, Callable[[], Any]]:
     }
 
 
+def motions(name: str, module: Any, start: Any, how: Callable[[Any], Any]) -> dict[str, Callable[[], Any]]:
+    """Return simulations of some steps, of one motion and of many; `how` has the constraints of a robot."""
+    calls = {}
+    for backend, steps in STEPS.items():
+        ours = module.load(backend)
+        time, constraints = 1e-4 * np.arange(steps + 1), how(ours)
+        kinds = {"one": (start, None)}
+        if backend == "native":
+            many = np.tile(start, (ROWS, 1))
+            kinds |= {"at once": (many, None), "controller": (start, lambda t, q, qd: -0.01 * qd)}
+        for kind, (q, tau) in kinds.items():
+            calls[f"{name}, step, {backend}, {kind}"] = partial(
+                ours.simulate, q, 0.0 * q, time, tau, constraints=constraints
+            )
+    return calls
+
+
+def simulations(folders: list[Path]) -> dict[str, Callable[[], Any]]:
+    """Return simulations of the quadruped, the four-bar and a Panda."""
+    solo, bars = import_package(folders[0] / "robot"), import_package(folders[1] / "robot")
+    panda, stance = robot(PANDA, folders[2], Options()), solo.load("numpy")
+    feet = [solo.Contact(name, "point") for name in stance.kinematics.frames if name.endswith("_FOOT")]
+    legs = np.concatenate([np.zeros(6), np.tile([0.1, 0.7, -1.3], 4)])
+    closed = bars.load("numpy").constraints.closed_position
+    return (
+        motions("quadruped", solo, legs, lambda ours: ours.constrained(contacts=feet, at=legs))
+        | motions("four-bar", bars, closed, lambda ours: ours.constraints)
+        | motions("Panda", panda, np.full(panda.load("numpy").n, 0.2), lambda ours: None)
+    )
+
+
+def told_of_steps(found: dict[str, float]) -> None:
+    """Print microseconds of a step of one motion, and ratios."""
+    times = {}
+    for name, ns in found.items():
+        backend, kind = name.split(", ")[2:]
+        times[name] = ns / 1e3 / STEPS[backend] / (ROWS if kind == "at once" else 1)
+        print(f"{name:45} {times[name]:8.2f} µs")
+    for name in ("quadruped", "four-bar", "Panda"):
+        ratio = times[f"{name}, step, numpy, one"] / times[f"{name}, step, native, one"]
+        print(f"{f'{name}: a step by NumPy / by native':51} {ratio:.0f}")
+
+
 def main() -> None:
     """Measure, and print a line a call."""
     with tempfile.TemporaryDirectory() as work:
-        folders = [Path(work, name) for name in ("quadruped", "fourbar")]
+        folders = [Path(work, name) for name in ("quadruped", "fourbar", "panda")]
         for folder in folders:
             folder.mkdir()
         calls = quadruped(folders[0]) | fourbar(folders[1])
         found = by_turns(calls, SECONDS)
+        told_of_steps(by_turns(simulations(folders), SECONDS))
     times = {name: ns / 1e3 / (ROWS if ", C:" in name else 1) for name, ns in found.items()}
     for name, time in times.items():
         print(f"{name:45} {time:8.2f} µs")

@@ -251,6 +251,7 @@ def in_python(package: ModuleType, robot: Any) -> dict[str, Callable[[], Any]]:
         "partial_impedance": lambda: robot.partial_impedance()(q, q),
         "frame_partial_impedance": of_frame,
         "cancel": lambda: robot.cancel(ANY)(q, q, qdd=q),
+        "simulate": lambda: robot.kinematics and robot.simulate(q, q, [0.0, 1e-3], constraints=False),
         **of_ties(package, robot, q),
     }
 

@@ -443,6 +443,7 @@ def test_the_header_of_c_has_the_rows_and_nothing_else(which: str, package_at: L
         "constrained_response_of_links": rigid and own,
         "constrained_dynamics_of_links": rigid and own,
         **dict.fromkeys(("constrained_partial_impedance", "constrained_cancel", "contacts_keep"), rigid),
+        "simulate": rigid,
     }
     links = {f"link_{j + 1}" for j in range(load(which).N)}
     assert set(declared) - links == {name for name in {*rows, *BESIDE_IN_C} if beside.get(name, True)} - links

@@ -64,6 +64,7 @@ BESIDE_IN_C = {
     "constrained_response": "of which induced accelerations and reactions of tied joints are made",
     "constrained_response_of_links": "the same with `passive=False`",
     "constrained_dynamics_of_links": "`constraints.forward_dynamics(passive=False)`",
+    "simulate": "`simulate` by RK4, of many motions at once, without loads",
     "partial_impedance": "a [controller](control.md)",
     "cancel": "what a [controller](control.md) cancels at a given acceleration",
     "frame_partial_impedance": "a [controller](control.md) of a frame",

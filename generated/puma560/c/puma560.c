@@ -544,6 +544,7 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 #include "linkwise/frames.h"
 #include "linkwise/moving_links.h"
 #include "linkwise/passive.h"
+#include "linkwise/equations.h"
 #endif
 #if PART(CONTROL)
 #include "linkwise/forward_dynamics.h"

@@ -71,6 +71,7 @@ enum {
     PUMA560_C2 = 56,
     PUMA560_C1 = 91,
     PUMA560_G = 21,
+    PUMA560_SCRATCH = 528,
     PUMA560_BLOCK = 8,
     PUMA560_BLOCKF = 16
 };
@@ -120,9 +121,10 @@ enum {
     PUMA560_TIES_UNCLOSED = 4,
     PUMA560_NO_INERTIA = 5,
     PUMA560_UNKNOWN = 6,
-    PUMA560_NOT_POSITIVE = 7,
-    PUMA560_UNDRIVEN = 8,
-    PUMA560_NOT_FINITE = 9
+    PUMA560_TIES_LOST = 7,
+    PUMA560_NOT_POSITIVE = 8,
+    PUMA560_UNDRIVEN = 9,
+    PUMA560_NOT_FINITE = 10
 };
 
 /* No two arrays that are given to a function may overlap. Shapes leave PUMA560_ out of the names above; the last index
@@ -455,6 +457,34 @@ typedef struct {
 int puma560_contacts_keep(size_t grips, const puma560_constraints *constraints,
     const puma560_grip *grip, const double *forces);
 
+/* Torques of a controller, or whatever else drives the joints: asked by simulate wherever it evaluates, also between steps and once
+   more at each of the instants, for all motions at once. Reads q, qd (count, JOINTS), which ties keep; writes tau (count, JOINTS).
+   Returns 0, or a number with which simulate then returns: take negative ones, which are not its own. */
+typedef int puma560_controller(void *context, double time, size_t count, const double *q, const double *qd, double *tau);
+
+/* What is to be simulated. */
+typedef struct {
+    size_t instants; /* how many, from 1 on; the motion starts at the first */
+    const double *time; /* (instants) in s, ascending */
+    double step; /* no step is longer, in s; 0: one from instant to instant */
+    puma560_controller *controller; /* NULL: tau all the time */
+    void *context; /* what the controller is given */
+    const double *tau; /* (count, JOINTS), read where there is no controller; NULL: none */
+    const puma560_constraints *constraints; /* NULL: nothing ties the joints, as in forward_dynamics */
+    size_t *reached; /* where to write how many instants were reached; NULL: nowhere */
+} puma560_simulation;
+
+/* Motions over time by Runge and Kutta's method of order 4, in as many equal steps from instant to instant as make none longer than
+   `step`. Ties close at each evaluation and after each step: independent joints are integrated, the others follow, and contacts stay
+   where they took hold at the start. Where independent joints come to tell little of the others, a motion goes on with others.
+   Returns 0; one of the numbers above, of the start; then PUMA560_TIES_LOST where ties do not close any more, where joints leap, or
+   at a position from which there is more than one way; PUMA560_NO_INERTIA, where nothing ties joints too; PUMA560_NOT_FINITE where
+   a motion or its torques are no numbers any more; or what the controller returned. Instants that were reached are written.
+   Reads q, qd (count, JOINTS), and uses scratch (count, SCRATCH); writes positions, velocities, torques
+   (instants, count, JOINTS), and the work of torques less what damping and friction took, (instants, count), in J; outputs may be NULL. */
+int puma560_simulate(size_t count, const double *q, const double *qd, const puma560_simulation *wanted, double *scratch,
+    double *positions, double *velocities, double *torques, double *work);
+
 /* ---- All links, many samples, in float ---- */
 
 /* All quantities but c0: 1516 operations.
@@ -781,6 +811,34 @@ typedef struct {
    would have to pull or a foot slips, |f_t| > friction f_n; negative for one that does not touch at one point. */
 int puma560_contacts_keepf(size_t grips, const puma560_constraintsf *constraints,
     const puma560_gripf *grip, const float *forces);
+
+/* Torques of a controller, or whatever else drives the joints: asked by simulate wherever it evaluates, also between steps and once
+   more at each of the instants, for all motions at once. Reads q, qd (count, JOINTS), which ties keep; writes tau (count, JOINTS).
+   Returns 0, or a number with which simulate then returns: take negative ones, which are not its own. */
+typedef int puma560_controllerf(void *context, double time, size_t count, const float *q, const float *qd, float *tau);
+
+/* What is to be simulated. */
+typedef struct {
+    size_t instants; /* how many, from 1 on; the motion starts at the first */
+    const double *time; /* (instants) in s, ascending */
+    double step; /* no step is longer, in s; 0: one from instant to instant */
+    puma560_controllerf *controller; /* NULL: tau all the time */
+    void *context; /* what the controller is given */
+    const float *tau; /* (count, JOINTS), read where there is no controller; NULL: none */
+    const puma560_constraintsf *constraints; /* NULL: nothing ties the joints, as in forward_dynamics */
+    size_t *reached; /* where to write how many instants were reached; NULL: nowhere */
+} puma560_simulationf;
+
+/* Motions over time by Runge and Kutta's method of order 4, in as many equal steps from instant to instant as make none longer than
+   `step`. Ties close at each evaluation and after each step: independent joints are integrated, the others follow, and contacts stay
+   where they took hold at the start. Where independent joints come to tell little of the others, a motion goes on with others.
+   Returns 0; one of the numbers above, of the start; then PUMA560_TIES_LOST where ties do not close any more, where joints leap, or
+   at a position from which there is more than one way; PUMA560_NO_INERTIA, where nothing ties joints too; PUMA560_NOT_FINITE where
+   a motion or its torques are no numbers any more; or what the controller returned. Instants that were reached are written.
+   Reads q, qd (count, JOINTS), and uses scratch (count, SCRATCH); writes positions, velocities, torques
+   (instants, count, JOINTS), and the work of torques less what damping and friction took, (instants, count), in J; outputs may be NULL. */
+int puma560_simulatef(size_t count, const float *q, const float *qd, const puma560_simulationf *wanted, float *scratch,
+    float *positions, float *velocities, float *torques, float *work);
 
 #ifdef __cplusplus
 }

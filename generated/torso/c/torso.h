@@ -71,6 +71,7 @@ enum {
     TORSO_C2 = 56,
     TORSO_C1 = 91,
     TORSO_G = 21,
+    TORSO_SCRATCH = 643,
     TORSO_BLOCK = 8,
     TORSO_BLOCKF = 16
 };
@@ -122,9 +123,10 @@ enum {
     TORSO_TIES_UNCLOSED = 4,
     TORSO_NO_INERTIA = 5,
     TORSO_UNKNOWN = 6,
-    TORSO_NOT_POSITIVE = 7,
-    TORSO_UNDRIVEN = 8,
-    TORSO_NOT_FINITE = 9
+    TORSO_TIES_LOST = 7,
+    TORSO_NOT_POSITIVE = 8,
+    TORSO_UNDRIVEN = 9,
+    TORSO_NOT_FINITE = 10
 };
 
 /* No two arrays that are given to a function may overlap. Shapes leave TORSO_ out of the names above; the last index
@@ -453,6 +455,34 @@ typedef struct {
 int torso_contacts_keep(size_t grips, const torso_constraints *constraints,
     const torso_grip *grip, const double *forces);
 
+/* Torques of a controller, or whatever else drives the joints: asked by simulate wherever it evaluates, also between steps and once
+   more at each of the instants, for all motions at once. Reads q, qd (count, JOINTS), which ties keep; writes tau (count, JOINTS).
+   Returns 0, or a number with which simulate then returns: take negative ones, which are not its own. */
+typedef int torso_controller(void *context, double time, size_t count, const double *q, const double *qd, double *tau);
+
+/* What is to be simulated. */
+typedef struct {
+    size_t instants; /* how many, from 1 on; the motion starts at the first */
+    const double *time; /* (instants) in s, ascending */
+    double step; /* no step is longer, in s; 0: one from instant to instant */
+    torso_controller *controller; /* NULL: tau all the time */
+    void *context; /* what the controller is given */
+    const double *tau; /* (count, JOINTS), read where there is no controller; NULL: none */
+    const torso_constraints *constraints; /* NULL: nothing ties the joints, as in forward_dynamics */
+    size_t *reached; /* where to write how many instants were reached; NULL: nowhere */
+} torso_simulation;
+
+/* Motions over time by Runge and Kutta's method of order 4, in as many equal steps from instant to instant as make none longer than
+   `step`. Ties close at each evaluation and after each step: independent joints are integrated, the others follow, and contacts stay
+   where they took hold at the start. Where independent joints come to tell little of the others, a motion goes on with others.
+   Returns 0; one of the numbers above, of the start; then TORSO_TIES_LOST where ties do not close any more, where joints leap, or
+   at a position from which there is more than one way; TORSO_NO_INERTIA, where nothing ties joints too; TORSO_NOT_FINITE where
+   a motion or its torques are no numbers any more; or what the controller returned. Instants that were reached are written.
+   Reads q, qd (count, JOINTS), and uses scratch (count, SCRATCH); writes positions, velocities, torques
+   (instants, count, JOINTS), and the work of torques less what damping and friction took, (instants, count), in J; outputs may be NULL. */
+int torso_simulate(size_t count, const double *q, const double *qd, const torso_simulation *wanted, double *scratch,
+    double *positions, double *velocities, double *torques, double *work);
+
 /* ---- All links, many samples, in float ---- */
 
 /* All quantities but c0: 1690 operations.
@@ -775,6 +805,34 @@ typedef struct {
    would have to pull or a foot slips, |f_t| > friction f_n; negative for one that does not touch at one point. */
 int torso_contacts_keepf(size_t grips, const torso_constraintsf *constraints,
     const torso_gripf *grip, const float *forces);
+
+/* Torques of a controller, or whatever else drives the joints: asked by simulate wherever it evaluates, also between steps and once
+   more at each of the instants, for all motions at once. Reads q, qd (count, JOINTS), which ties keep; writes tau (count, JOINTS).
+   Returns 0, or a number with which simulate then returns: take negative ones, which are not its own. */
+typedef int torso_controllerf(void *context, double time, size_t count, const float *q, const float *qd, float *tau);
+
+/* What is to be simulated. */
+typedef struct {
+    size_t instants; /* how many, from 1 on; the motion starts at the first */
+    const double *time; /* (instants) in s, ascending */
+    double step; /* no step is longer, in s; 0: one from instant to instant */
+    torso_controllerf *controller; /* NULL: tau all the time */
+    void *context; /* what the controller is given */
+    const float *tau; /* (count, JOINTS), read where there is no controller; NULL: none */
+    const torso_constraintsf *constraints; /* NULL: nothing ties the joints, as in forward_dynamics */
+    size_t *reached; /* where to write how many instants were reached; NULL: nowhere */
+} torso_simulationf;
+
+/* Motions over time by Runge and Kutta's method of order 4, in as many equal steps from instant to instant as make none longer than
+   `step`. Ties close at each evaluation and after each step: independent joints are integrated, the others follow, and contacts stay
+   where they took hold at the start. Where independent joints come to tell little of the others, a motion goes on with others.
+   Returns 0; one of the numbers above, of the start; then TORSO_TIES_LOST where ties do not close any more, where joints leap, or
+   at a position from which there is more than one way; TORSO_NO_INERTIA, where nothing ties joints too; TORSO_NOT_FINITE where
+   a motion or its torques are no numbers any more; or what the controller returned. Instants that were reached are written.
+   Reads q, qd (count, JOINTS), and uses scratch (count, SCRATCH); writes positions, velocities, torques
+   (instants, count, JOINTS), and the work of torques less what damping and friction took, (instants, count), in J; outputs may be NULL. */
+int torso_simulatef(size_t count, const float *q, const float *qd, const torso_simulationf *wanted, float *scratch,
+    float *positions, float *velocities, float *torques, float *work);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,6 @@
 /* Functions of joints that loops, couplings and contacts tie. The same in every package of linkwise.
 
-   The file that includes this one has what frames.h, moving_links.h and passive.h are made of. */
+   The file that includes this one has what frames.h, moving_links.h, passive.h and equations.h are made of. */
 #include "ties.h"
 
 #include "tied_joints.h"
@@ -12,3 +12,7 @@
 #include "tied_response.h"
 
 #include "tied_impedance.h"
+
+#include "tied_course.h"
+
+#include "simulation.h"

@@ -271,4 +271,5 @@ static void gradient_rows(size_t count, INPUTS, int dense, real *c0)
 #include "frames.h"
 #include "moving_links.h"
 #include "passive.h"
+#include "equations.h"
 #endif

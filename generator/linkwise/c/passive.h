@@ -26,6 +26,12 @@ static inline void add_friction(const real *qd, real *torque)
         torque[i] += passive[i].friction * (real)((qd[i] > 0) - (qd[i] < 0));
 }
 
+/* What damping and friction of a joint ask for, which is lost. */
+static inline real lost_torque(int i, real rate)
+{
+    return passive[i].damping * rate + passive[i].friction * (real)((rate > 0) - (rate < 0));
+}
+
 /* For controllers, which near rest must not jump with the noise of a sensor; none of it without a width. */
 static inline void add_smooth_friction(const real *qd, real width, real *torque)
 {
@@ -45,6 +51,7 @@ void API(passive_torque)(const real *q, const real *qd, const real *qdd, real *t
 #define add_armature(mass) ((void)(mass))
 #define add_passive(q, qd, qdd, torque) ((void)(q), (void)(torque))
 #define add_friction(qd, torque) ((void)(torque))
+#define lost_torque(i, rate) ((void)(i), 0 * (rate))
 #define add_smooth_friction(qd, width, torque) ((void)(torque))
 #endif
 

@@ -25,7 +25,18 @@
 #define OPEN R(1e-4)
 
 /* What functions answer with where they have no answer; NAME.h has names for them. */
-enum { IS_OPEN = 1, IS_SINGULAR, IS_CONTRADICTED, IS_UNCLOSED, HAS_NO_INERTIA, IS_UNKNOWN, IS_NOT_POSITIVE, IS_UNDRIVEN, IS_NOT_FINITE };
+enum {
+    IS_OPEN = 1,
+    IS_SINGULAR,
+    IS_CONTRADICTED,
+    IS_UNCLOSED,
+    HAS_NO_INERTIA,
+    IS_UNKNOWN,
+    IS_LOST,
+    IS_NOT_POSITIVE,
+    IS_UNDRIVEN,
+    IS_NOT_FINITE
+};
 
 enum { PITCH = (N + 2 * LANES - 1) / LANES * LANES, BORNE = (ROWS + LANES - 1) / LANES * LANES };
 

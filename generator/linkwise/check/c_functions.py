@@ -22,7 +22,7 @@ from linkwise.check.control_functions import (
 )
 from linkwise.check.frame_checks import FrameReference
 from linkwise.check.model_calls import FLOAT32
-from linkwise.check.tied_functions import CONSTANTS, OF_TIES, tied_prototypes
+from linkwise.check.tied_functions import OF_TIES, tied_constants, tied_prototypes
 from linkwise.errors import LinkwiseError
 from linkwise.oracle.reference import Reference, dense_quantities
 from linkwise.oracle.states import NUMBERS
@@ -287,8 +287,8 @@ def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[Com
         if isinstance(error, RuntimeError) or is_short_of_memory(error):
             return None, skipped("c: not checked", told)
         return None, Result("c: compiles", False, None, told)
-    constants = CONSTANTS if manifest.tree is not None else {}
-    wrong = wrong_header(manifest, compiled, directory, rows, prototypes(manifest, rows), constants)
+    functions = prototypes(manifest, rows)
+    wrong = wrong_header(manifest, compiled, directory, rows, functions, tied_constants(manifest))
     detail = wrong or "as the manifest's paths say"
     return compiled, Result("c: numbers, indices and functions of the headers", not wrong, None, detail)
 

@@ -146,10 +146,14 @@ def _constants(name: str, header: str) -> dict[str, int]:
 
 
 def declarations(name: str, header: str) -> dict[str, str]:
-    """Return the declaration of each of the package's functions in a header, on one line, by name in C."""
+    """Return the declaration of each of the package's functions in a header, on one line, by name in C.
+
+    Types of functions are not among them.
+    """
     code = " ".join(re.sub(r'/\*.*?\*/|"[^"\n]*"', " ", header, flags=re.DOTALL).split())
     found = re.finditer(rf"[^;{{}}]*\b({re.escape(name)}_\w+) *\([^;]*;", code)
-    return {statement[1]: statement[0].strip() for statement in found}
+    told = {statement[1]: statement[0].strip() for statement in found}
+    return {function: text for function, text in told.items() if not text.startswith("typedef ")}
 
 
 def _compile(compiler: Compiler, sources: Sequence[Path], library: Path, large: int) -> None:

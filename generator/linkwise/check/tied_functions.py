@@ -1,10 +1,13 @@
-"""Declarations that a package's header must have of functions of tied joints.
+"""Declarations that a package's header must have of functions of tied joints, and of motions over time.
 
 They take more than arrays, what ties the joints, so that only their declarations and presence are checked
-here: the native back end's constraints, which are compared with least squares, call them all.
+here: the native back end's constraints, which are compared with least squares, call them all, and its
+`simulate`, which is compared with the recursion's equations of motion.
 """
 
-from linkwise_runtime.native.library import MOST_TIED
+from collections.abc import Mapping
+
+from linkwise_runtime.native.library import MOST_TIED, scratch_numbers
 
 from linkwise.check.compiled_c import Prototype
 from linkwise.package.manifest import Manifest
@@ -22,6 +25,7 @@ TIED: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
     "constrained_response_of_links": (("q", "qd"), (), RESPONSES),
     "constrained_dynamics": (("q", "qd", "tau"), (), ("qdd", "forces")),
     "constrained_dynamics_of_links": (("q", "qd", "tau"), (), ("qdd", "forces")),
+    "simulate": (("q", "qd"), (), ("scratch", "positions", "velocities", "torques", "work")),
 }
 """Functions of tied joints: their motion, what they take behind the constraints, and what they write."""
 CONTROLLERS: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
@@ -38,13 +42,10 @@ KEEP = "contacts_keep"
 """Function that says whether contacts keep."""
 OF_TIES = (*TIED, *CONTROLLERS, KEEP)
 """All functions of tied joints."""
-STRUCTS = (
-    ("constraints", "constraints"),
-    ("actuators", "actuators"),
-    ("wanted", "impedance"),
-    ("grip", "grip"),
-)
+STRUCTS = {"constraints": "constraints", "actuators": "actuators", "wanted": "impedance", "grip": "grip"}
 """Arguments that are structs, and whose names these have."""
+OF_SIMULATION = "wanted", "simulation"
+"""Argument in which a simulation has its constraints, and its type, without the robot's name."""
 CONSTANTS = {
     "CONTACT_POINT": 0,
     "CONTACT_HINGED": 1,
@@ -58,11 +59,21 @@ CONSTANTS = {
     "TIES_UNCLOSED": 4,
     "NO_INERTIA": 5,
     "UNKNOWN": 6,
-    "NOT_POSITIVE": 7,
-    "UNDRIVEN": 8,
-    "NOT_FINITE": 9,
+    "TIES_LOST": 7,
+    "NOT_POSITIVE": 8,
+    "UNDRIVEN": 9,
+    "NOT_FINITE": 10,
 }
 """Constants of the header, without the robot's name."""
+
+
+def tied_constants(manifest: Manifest) -> dict[str, int]:
+    """Return the constants of these functions; none for links of energies."""
+    tree, n = manifest.tree, len(manifest.joints)
+    if tree is None or n > MOST_TIED:
+        return {} if tree is None else CONSTANTS
+    kinds = (tie.kind for tie in tree.ties)
+    return CONSTANTS | {"SCRATCH": scratch_numbers(n, kinds, len(tree.couplings))}
 
 
 def tied_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Prototype]:
@@ -70,17 +81,24 @@ def tied_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Prototyp
     if manifest.tree is None or len(manifest.joints) > MOST_TIED:
         return []
     parameters = ("p",) if manifest.parameters else ()
-    kinds = tuple((name, f"{manifest.name}_{kind}{suffix}") for name, kind in STRUCTS)
 
-    def declared(name: str, counted: str, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Prototype:
+    def declared(
+        name: str,
+        counted: str,
+        inputs: tuple[str, ...],
+        outputs: tuple[str, ...],
+        structs: Mapping[str, str] = STRUCTS,
+    ) -> Prototype:
+        kinds = tuple((of, f"{manifest.name}_{kind}{suffix}") for of, kind in structs.items())
         return Prototype(name + suffix, real, counted, inputs, outputs, "int", kinds)
 
+    def of_samples(name: str) -> Prototype:
+        motion, behind, outputs = TIED[name]
+        of, kind = OF_SIMULATION if name == "simulate" else ("constraints", "constraints")
+        return declared(name, "count", (*motion, *parameters, of, *behind), outputs, {of: kind})
+
     return [
-        *(
-            declared(name, "count", (*motion, *parameters, "constraints", *behind), outputs)
-            for name, (motion, behind, outputs) in TIED.items()
-            if manifest.passive or not name.endswith("_of_links")
-        ),
+        *(of_samples(name) for name in TIED if manifest.passive or not name.endswith("_of_links")),
         *(
             declared(name, "", (*motion, *parameters, *CONTROLLED, *behind), outputs)
             for name, (motion, behind, outputs) in CONTROLLERS.items()

@@ -1,6 +1,6 @@
 """Packed values of back ends, with the operations that answers need, and tables to spread and sum them."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, cast
 
 import numpy as np
@@ -59,6 +59,38 @@ class TiedFunctions(Protocol):
         """Return functions for one sample, for targets of joints and for joints that are driven."""
 
 
+class AskedMotion(NamedTuple):
+    """Motion over time that is to be computed by a back end's own functions, in steps of RK4."""
+
+    q: Numbers
+    """Positions at the start, (..., n)."""
+    qd: Numbers
+    """Velocities there, (..., n)."""
+    times: Sequence[float]
+    """Instants, ascending, in s."""
+    step: float | None
+    """Longest step, in s; None for one from instant to instant."""
+    tau: Numbers | Callable[[float, Numbers, Numbers], Numbers]
+    """Torques (..., n), or a function that gives them, or the robot's `CController`."""
+    passive: bool
+    """True if what joints have of their own counts."""
+    ties: TiedFunctions | None
+    """Functions of the constraints; None where nothing ties the joints."""
+
+
+class ReachedMotion(NamedTuple):
+    """Instants of such a motion that were reached, T or fewer."""
+
+    q: Numbers
+    """Positions, (T, ..., n)."""
+    qd: Numbers
+    """Velocities, (T, ..., n)."""
+    tau: Numbers
+    """Torques, (T, ..., n)."""
+    work: Numbers
+    """Work since the start, (T, ...), in J."""
+
+
 class PackedBackend(Library):
     """Base of back ends: packed values (..., count) in the order of `Layout`, for motion (..., n)."""
 
@@ -86,6 +118,10 @@ class PackedBackend(Library):
 
         tolerance: how far ties may be open, as `Dynamics.constrained` says
         """
+        return None
+
+    def moved(self, asked: AskedMotion) -> ReachedMotion | None:
+        """Return a motion over time as far as functions of the back end's own get; None without any."""
         return None
 
     def decomposition(self, q: Numbers, qd: Numbers, qdd: Numbers) -> Sequence[Numbers]:

@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from ..answers.inertia_solve import solve_inertia
+from ..answers.packed import TiedFunctions
 from ..arrays.backend import ArrayBackend
 from ..interface import Numbers, namespace
 from ..structure import Structure
@@ -54,6 +55,10 @@ class TiedJoints:
         if backend not in self._rows:
             self._rows[backend] = self._rows_on(backend)
         return self._rows[backend]
+
+    def functions(self, backend: ArrayBackend) -> TiedFunctions | None:
+        """Return a back end's own functions for the constraints; None without any."""
+        return self.rows(backend).functions
 
     def columns(self, backend: ArrayBackend, q: Numbers) -> JointColumns:
         """Return the indices of the joints, for taking entries of `q`."""

@@ -12,7 +12,7 @@ qd = G v_y of the independent ones, so that they do not drift.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -107,7 +107,10 @@ class EquationsOfMotion:
         """Return the torques of the actuators, (..., n)."""
         if not callable(self.tau):
             return self.tau
-        (tau,) = read_at(self.backend, q, {"tau": self.tau(t, q, qd)})
+        found = self.tau(t, q, qd)
+        if type(found) is np.ndarray is type(q) and found.dtype == q.dtype and found.shape == q.shape:
+            return cast(Numbers, found.copy())
+        (tau,) = read_at(self.backend, q, {"tau": found})
         return tau
 
     def load_torque(self, t: float, q: Numbers, qd: Numbers) -> Numbers | None:

@@ -16,8 +16,10 @@ from ..chosen_names import short
 from ..constraints.robot_constraints import Constraints
 from ..interface import Numbers, array_of, namespace
 from ..quantities import Trajectory
+from .c_controller import controller_of
 from .equations_of_motion import EquationsOfMotion, Given, ReadLoads, State, varying_of
 from .induced_accelerations import DrivenRobot, constraints_of
+from .reached_motion import by_functions
 from .source_forces import loads_of
 from .tied_motion import TiedMotion, TiesLost
 
@@ -172,14 +174,15 @@ def simulate_motion(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
     if constraints is not None:
         q, qd = _of_all_joints(constraints, q, qd)
     named: dict[str, object] = {"q": q, "qd": qd}
-    if asked.tau is not None and not callable(asked.tau):
-        named["tau"] = asked.tau
+    drive = controller_of(asked.tau)
+    if drive is not None and not callable(drive):
+        named["tau"] = drive
     loads = loads_of(robot.backend, () if callable(asked.loads) else asked.loads)
     backend, numbers = robot.door.read(named, beside=loads.beside)
     motion = dict(zip(named, numbers[: len(named)], strict=True))
     check_numbers(motion, robot.joint_names)
     start, rate = motion["q"], motion["qd"]
-    tau = cast(Given, asked.tau) if callable(asked.tau) else motion.get("tau", 0.0 * start)
+    tau = cast(Given, drive) if callable(drive) else motion.get("tau", 0.0 * start)
     pulls = ReadLoads(loads, numbers[len(named) :])
     given = cast(Given, asked.loads) if callable(asked.loads) else pulls
     times = rising_instants("time", asked.time)
@@ -193,17 +196,33 @@ def simulate_motion(robot: DrivenRobot, asked: Simulated) -> Trajectory[Any]:
         EquationsOfMotion(backend, tau, given, passive, None, varying), start, rate, constraints
     )
     if asked.method == "RK4":
-        states = in_fixed_steps(equations.rates, equations.close_ties, state, times, step)
-    elif asked.method in ADAPTIVE:
-        if not isinstance(start, np.ndarray):
-            raise TypeError(
-                f"method {asked.method!r} computes with arrays and keeps no gradient; take 'RK4', or load "
-                "numpy"
-            )
-        states = by_scipy(equations.rates, equations.close_ties, state, times, asked.method, step, tolerances)
-    else:
+        return _by_fixed_steps(equations, state, times, step)
+    if asked.method not in ADAPTIVE:
         raise ValueError(f"method is {short(asked.method)}; choose RK4 or, of SciPy, {', '.join(ADAPTIVE)}")
-    return _collected(equations, times, _finite(states, times, start))
+    if not isinstance(start, np.ndarray):
+        raise TypeError(
+            f"method {asked.method!r} computes with arrays and keeps no gradient; take 'RK4', or load numpy"
+        )
+    states = by_scipy(equations.rates, equations.close_ties, state, times, asked.method, step, tolerances)
+    return _collected(equations, times, states)
+
+
+def _by_fixed_steps(
+    equations: EquationsOfMotion, state: State, times: Sequence[float], step: float | None
+) -> Trajectory[Any]:
+    """Return the motion by RK4, as far as they get by the back end's own functions."""
+    reached = by_functions(equations, state, times, step)
+    rest, begun = (times, state) if reached is None else (reached.rest, reached.state)
+    states = in_fixed_steps(equations.rates, equations.close_ties, begun, rest, step)
+    if reached is None:
+        return _collected(equations, times, states)
+    q, qd, tau, work = reached.motion
+    before = [q, qd, tau, equations.energy(times[0], q, qd), work]
+    next(states)
+    if len(rest) > 1:
+        after = _collected(equations, rest[1:], states)[1:]
+        before = [namespace(q).concat(both) for both in zip(before, after, strict=True)]
+    return Trajectory[Any](_instants(equations, times, q), *before)
 
 
 def _of_all_joints(constraints: Constraints[Any], q: object, qd: object) -> tuple[object, object]:
@@ -228,10 +247,10 @@ def _started(
     return replace(free, ties=ties), State(place.q, place.velocity(place.own(qd)), work)
 
 
-def _finite(states: Iterator[State], times: Sequence[float], like: Numbers) -> Iterator[State]:
+def _finite(states: Iterator[State], times: Sequence[float]) -> Iterator[State]:
     """Yield the states; raises ValueError for the first that is not finite."""
-    xp = namespace(like)
     for t, state in zip(times, states, strict=True):
+        xp = namespace(state.q)
         if not bool(xp.isfinite(state.q).all() & xp.isfinite(state.v).all()):
             raise ValueError(
                 f"the motion is not finite at t = {t:g} s; take smaller steps, or look at the torques"
@@ -244,14 +263,18 @@ def _collected(
 ) -> Trajectory[Any]:
     """Return the motion at all instants."""
     rows = []
-    for t, state in zip(times, states, strict=True):
+    for t, state in zip(times, _finite(states, times), strict=True):
         q, qd = equations.motion(t, state)
         tau = equations.torques(t, q, qd)
         rows.append((q, qd, tau, equations.energy(t, q, qd), state.work))
     like = rows[0][0]
     xp = namespace(like)
     columns = (xp.stack(column) for column in zip(*rows, strict=True))
-    return Trajectory(equations.backend.weights("time", list(times), like), *columns)
+    return Trajectory(_instants(equations, times, like), *columns)
+
+
+def _instants(equations: EquationsOfMotion, times: Sequence[float], like: Numbers) -> Numbers:
+    return equations.backend.weights("time", list(times), like)
 
 
 def _positive(name: str, value: object) -> float:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..answers.packed import TiedFunctions
 from ..arrays.backend import ArrayBackend
 from ..chosen_names import sample_of
 from ..constraints.closed_places import ClosedPlace, factor_dependent
@@ -52,6 +53,23 @@ class TiedMotion:
         self._last: tuple[Numbers, ClosedPlace] = self.start.q, self.start
         self._chosen = None if is_traced(q) else Followed.at(self.start, self.start.found.columns)
 
+    @property
+    def functions(self) -> TiedFunctions | None:
+        """Functions of the back end for these constraints; None without any."""
+        return self._ties.functions(self._backend)
+
+    def go_on_from(self, q: Numbers) -> None:
+        """Go on from a closed place (..., n) of the motion, to which other functions have led it.
+
+        Contacts stay where they took hold. Raises ValueError where ties do not close.
+        """
+        found = self._closed(q, self._chosen)[0]
+        if found is None or (self._chosen is not None and self._chosen.lost(found).any()):
+            columns = self._pivoted(self._ties.scaled_rows(self._backend, q))
+            found = self._ties.closed_place(self._backend, q, self._held_at, columns)
+            self._chosen = Followed.at(found, columns)
+        self._settled, self._last = found, (found.q, found)
+
     def place(self, t: float, q: Numbers) -> ClosedPlace:
         """Return the closed place beside q (..., n), whose dependent joints are closed first.
 
@@ -61,15 +79,16 @@ class TiedMotion:
         if asked is q:
             return place
         found, error = self._closed(self._near(q), self._chosen)
-        if self._chosen is not None and (found is None or self._chosen.lost_at(found) is not None):
-            other = Followed.at(self._settled, self._pivoted(self._settled.rows))
+        if self._chosen is not None and (found is None or self._chosen.lost(found).any()):
+            where = np.asarray(True) if found is None else self._chosen.lost(found)
+            other = self._exchanged(self._chosen, self._settled, where)
             again = self._closed(self._near(q), other)[0]
             if again is not None:
                 found, self._chosen = again, other
         if found is None:
             with without_gradient(q):
                 raise TiesLost(f"at t = {t:g} s {self._leap(q) or error}")
-        lost = None if self._chosen is None else self._chosen.lost_at(found)
+        lost = None if self._chosen is None else _first_of(self._chosen.lost(found))
         if lost is not None:
             raise TiesLost(f"at t = {t:g} s {self._singular(found, lost)}")
         self._last = q, found
@@ -87,12 +106,13 @@ class TiedMotion:
             crossed = _first_of(rank_lost_between(self._settled, place))
             if crossed is not None:
                 raise TiesLost(f"at t = {t:g} s {self._singular(place, crossed)}")
-            part = chosen.part_left(place)
-            if part < chosen.weak:
-                other = Followed.at(place, self._pivoted(place.rows))
+            part = chosen.parts_left(place)
+            weak = part < chosen.weak
+            if weak.any():
+                other = self._exchanged(chosen, place, weak)
                 again = self._closed(place.q, other)[0]
                 if again is None:
-                    self._chosen = replace(chosen, weak=part / 2.0)
+                    self._chosen = replace(chosen, weak=np.where(weak, part / 2.0, chosen.weak))
                 else:
                     place, self._chosen = again, other
         self._last, self._settled = (place.q, place), place
@@ -134,6 +154,17 @@ class TiedMotion:
             return q
         led = last.q + last.velocity(last.own(q - last.q))
         return led if bool((abs(q - led) > FAR).any()) else q
+
+    def _exchanged(self, chosen: "Followed", place: ClosedPlace, where: NDArray[np.bool_]) -> "Followed":
+        """Return other independent joints, chosen at a place, for samples (...,), and the same for others."""
+        found, at = Followed.at(place, self._pivoted(place.rows)), where[..., None]
+        columns = (
+            np.where(at, array_of(new), array_of(own))
+            for new, own in zip(found.columns, chosen.columns, strict=True)
+        )
+        kept = JointColumns(*(self._backend.index(a, place.rows) for a in columns))
+        left = np.where(where, found.left, chosen.left)
+        return Followed(kept, left, np.where(where, found.weak, chosen.weak))
 
     def _pivoted(self, rows: Numbers) -> JointColumns:
         """Return the independent joints of each sample, by pivoting in rows A (..., C, n)."""
@@ -177,21 +208,21 @@ class Followed:
     columns: JointColumns
     left: NDArray[np.floating]
     """Least part of a column of A_d that was left there, (...,)."""
-    weak: float = WEAK
-    """Part of this below which others are looked for."""
+    weak: float | NDArray[np.floating] = WEAK
+    """Part of this below which others are looked for, (...,)."""
 
     @classmethod
     def at(cls, place: ClosedPlace, columns: JointColumns) -> "Followed":
         """Return how well others follow these at a place."""
         return cls(columns, least_left(factor_dependent(place.rows, columns)[1], place.unit_rows))
 
-    def part_left(self, place: ClosedPlace) -> float:
-        """Return the least part that is left at a place of what there was."""
-        return float((least_left(place.factors[1], place.unit_rows) / self.left).min(initial=1.0))
+    def parts_left(self, place: ClosedPlace) -> NDArray[np.floating]:
+        """Return the least part that is left at a place of what there was, (...,)."""
+        return np.asarray(least_left(place.factors[1], place.unit_rows) / self.left)
 
-    def lost_at(self, place: ClosedPlace) -> tuple[int, ...] | None:
-        """Return the first sample whose independent joints tell the others no more, or None."""
-        return _first_of(least_left(place.factors[1], place.unit_rows) < DEAD * self.left)
+    def lost(self, place: ClosedPlace) -> NDArray[np.bool_]:
+        """Return where independent joints tell the others no more, (...,)."""
+        return np.asarray(least_left(place.factors[1], place.unit_rows) < DEAD * self.left)
 
 
 def rank_lost_between(before: ClosedPlace, after: ClosedPlace) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..answers.answers import Answers
-from ..answers.packed import TiedFunctions, TorqueOfOne
+from ..answers.packed import AskedMotion, ReachedMotion, TiedFunctions, TorqueOfOne
 from ..arguments import NOTHING, Beside, as_given, has_tensors
 from ..arrays.backend import ArrayBackend
 from ..arrays.numpy_backend import NumpyBackend
@@ -27,6 +27,7 @@ from .compiled_calls import QuickCalls
 from .constraints import NativeTies, has_functions
 from .control import ControlCalls, NativeTorque
 from .memory import NumberArray, NumberType, memory
+from .motions import NativeMotions
 
 if TYPE_CHECKING:
     from .operators import TorchSide
@@ -128,6 +129,7 @@ class NativeBackend(NumpyBackend):
         self.direct = self.quick.direct()
         self.at_once = None if self.direct else self.calls.at_once
         self.one_sample = None if self.tree is None else ControlCalls(self.calls)
+        self._motions = None if self.tree is None else NativeMotions(self.calls, self.tree)
         if "torch" in sys.modules:
             _ = self.on_torch  # a compiler could not trace how it is made
 
@@ -183,11 +185,16 @@ class NativeBackend(NumpyBackend):
             return None
         return NativeTies(self.calls, cast(TreeConstraints, chosen), tolerance)
 
+    def moved(self, asked: AskedMotion) -> ReachedMotion | None:
+        """Return a motion over time as far as C gets; None for links that are given by their energies."""
+        return None if self._motions is None else self._motions.moved(asked)
+
     def separate(self) -> ArrayBackend:
         """Return a copy whose parameters may be set."""
         made = cast(NativeBackend, ArrayBackend.separate(self))
         made.calls = self.calls.separate()
         made.quick = QuickCalls(made.calls)
+        made._motions = None  # whose numbers stay as they are
         made.direct, made.at_once = made.quick.direct(), None
         return made
 

@@ -15,15 +15,13 @@ from ..control.joint_impedance import JointTargets
 from ..interface import Numbers
 from .calls import NativeCalls, plain
 from .control import RealType
-from .library import MOST_TIED, OneSampleCall, OneSamplePool, one_sample_call, symbol
+from .library import MOST_CONTACTS, MOST_TIED, OneSampleCall, OneSamplePool, one_sample_call, symbol
 from .memory import NumberArray, NumberType, address, memory
 from .tied_control import TiedStance, TiedTorque
 
 if TYPE_CHECKING:
     from ctypes import _NamedFuncPointer as CFunction
 
-MOST_CONTACTS = 8
-"""Most contacts that C takes at a time."""
 KINDS = {"point": 0, "hinge": 1, "frame": 2, "rolling": 4}
 """Numbers of the kinds of contacts in C."""
 
@@ -176,8 +174,15 @@ class NativeTies:
         self, targets: object, driven: Sequence[int], weight: NDArray[np.float64], undriven: int
     ) -> TiedTorque:
         """Return the object by which C computes a controller's torque for one sample."""
-        stance = TiedStance(self._struct, self._sizes["C"], driven, weight, undriven)
+        rows = self._sizes["C"]
+        stance = TiedStance(lambda kind: self.settings(kind).struct, rows, driven, weight, undriven)
         return TiedTorque(self._calls, cast(JointTargets, targets), stance)
+
+    def settings(self, kind: NumberType) -> TiedSettings:
+        """Return the constraints as C takes them in one number type, made once."""
+        if kind not in self._told:
+            self._told[kind] = told(self._contacts, self._independent, self._tolerance, kind)
+        return self._told[kind]
 
     def _function(self, name: str, kind: NumberType) -> "CFunction":
         """Return a C function for a dtype, compiled if it is not there yet."""
@@ -234,16 +239,10 @@ class NativeTies:
             *given[: asked.motion],
             *missing,
             self._calls.constants(kind),
-            ctypes.byref(self._struct(kind)),
+            ctypes.byref(self.settings(kind).struct),
             *last,
             *results,
         ]
-
-    def _struct(self, kind: NumberType) -> ctypes.Structure:
-        """Return the constraints as C takes them, made once."""
-        if kind not in self._told:
-            self._told[kind] = told(self._contacts, self._independent, self._tolerance, kind)
-        return self._told[kind].struct
 
     def _shape_of(self, letters: str) -> tuple[int, ...]:
         return tuple(self._sizes[letter] for letter in letters)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from ..call_table import CALLS
+from ..constraints.held_frames import ROWS
 from .build import Sources, library
 from .memory import NumberArray, Place
 
@@ -32,6 +33,8 @@ CONTROL = {row.c: Control(len(row.motion), "point" in row.options) for row in CA
 """Functions that take one sample and no count."""
 IMPEDANCE = ("partial_impedance", "frame_partial_impedance", "cancel")
 """Functions of one sample for control: of joints, of a frame, and of what is cancelled at an acceleration."""
+MOST_CONTACTS = 8
+"""Most contacts that C takes at a time."""
 MOST_TIED = 200
 """Most joints of robots with functions of tied joints: their matrices lie on the stack."""
 TIED = (
@@ -48,8 +51,18 @@ TIED = (
     "constrained_partial_impedance",
     "constrained_cancel",
     "contacts_keep",
+    "simulate",
 )
-"""Functions of joints that are tied."""
+"""Functions of joints that are tied, and of motions over time."""
+
+
+def scratch_numbers(joints: int, kinds: Iterable[str], couplings: int) -> int:
+    """Return how many numbers of memory C needs for each motion, as simulation.h lays them out.
+
+    kinds: those of the ties of the robot's file
+    """
+    rows = sum(len(ROWS[kind]) for kind in kinds) + couplings + 6 * MOST_CONTACTS
+    return joints * (4 * joints + rows + 15) + 6
 
 
 @cache

@@ -35,7 +35,9 @@ static int find_response(const struct tied *x, const real *mass, real *response)
 {
     const int m = x->free;
     ALIGNED real small[N * N], size[N] = {0}, sides[N * 6], inverse[N * N];
-    reduce_inertia(x, mass, small, size);
+    reduce_inertia(x, mass, small);
+    for (int a = 0; a < m; ++a)
+        size[a] = small[a * m + a];
     for (int first = 0; first < m; first += 6) {
         const int some = m - first < 6 ? m - first : 6;
         struct pivot weakest = {0, 1};

@@ -51,8 +51,7 @@ static inline void join_force(const real *a, real *force)
 static inline void resist(int n, const real *a, const real *x, real *force)
 {
     for (int i = 0; a && i < n; ++i)
-        for (int k = 0; k < n; ++k)
-            force[i] -= a[i * n + k] * x[k];
+        force[i] -= dot(n, a + i * n, x);
 }
 
 /* 1 by the largest number of the inverse of a regular a (n, n), each beside its size. */

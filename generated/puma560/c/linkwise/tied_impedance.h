@@ -46,7 +46,7 @@ static int wanted_motion(const struct tied *x, const API(impedance) *wanted, con
     struct need *need, struct pivot *weakest)
 {
     const int m = x->free;
-    ALIGNED real natural[N] = {0}, large[N * N], small[N * N], size[N] = {0}, driven[N] = {0};
+    ALIGNED real natural[N] = {0}, small[N * N], own[N * N], driven[N] = {0};
     if (!wanted->keep_velocity)
         answer(&x->at.s, need->from.still, need->from.velocity, 0, natural);
     for (int i = 0; i < N; ++i) {
@@ -58,14 +58,16 @@ static int wanted_motion(const struct tied *x, const API(impedance) *wanted, con
     join_force(external, need->pull);
     join_force(task, need->pull);
     for (int i = 0; i < N; ++i)
-        for (int k = 0; k < N; ++k)
-            need->pull[i] -= need->kept[i * N + k] * (need->qdd[k] - need->from.qdd_d[k]);
+        natural[i] = need->qdd[i] - need->from.qdd_d[i];
+    resist(N, need->kept, natural, need->pull);
     for (int i = 0; i < N; ++i)
         for (int a = 0; a < m; ++a)
             driven[a] += x->map[i * PITCH + a] * need->pull[i];
-    reduce_inertia(x, need->mass, large, size);
-    reduce_inertia(x, need->kept, small, size);
-    if (solve(wanted->regular, m, large, small, driven, weakest))
+    reduce_inertia(x, need->kept, small);
+    const int changed = wanted->keep_inertia || wanted->inertia;
+    if (changed)
+        reduce_inertia(x, need->mass, own);
+    if (solve(wanted->regular, m, changed ? own : small, small, driven, weakest))
         return IS_NOT_POSITIVE;
     for (int i = 0; i < N; ++i)
         for (int a = 0; a < m; ++a)
@@ -74,15 +76,15 @@ static int wanted_motion(const struct tied *x, const API(impedance) *wanted, con
 }
 
 /* Torques of the driven joints for `need`, the acceleration that follows, and what rows bear, each unless it is NULL. */
-static int drive(struct tied *x, struct need *need, int said, real *tau, real *qdd, real *forces)
+static int give_torques(struct tied *x, struct need *need, int said, real *tau, real *qdd, real *forces)
 {
     const int m = x->free;
-    ALIGNED real force[N] = {0}, torque[N], left[N] = {0}, inertia[N * N], size[N] = {0}, borne[ROWS];
+    ALIGNED real force[N] = {0}, torque[N], left[N] = {0}, inertia[N * N], borne[ROWS];
     for (int i = 0; i < N; ++i)
         for (int a = 0; a < m; ++a)
             force[a] += x->map[i * PITCH + a] * need->torque[i];
     if (need->by.rank < m) {
-        reduce_inertia(x, need->mass, inertia, size);
+        reduce_inertia(x, need->mass, inertia);
         const int why = leave_undriven(x, &need->by, inertia, force, left);
         if (why)
             return why;
@@ -141,7 +143,7 @@ int API(constrained_partial_impedance)(AT_REST, const API(constraints) *constrai
             need.torque[i] -= external[i];
     }
     add_own(&x, need.qdd, wanted, need.torque);
-    return drive(&x, &need, -vague(&weakest), tau, follows, forces);
+    return give_torques(&x, &need, -vague(&weakest), tau, follows, forces);
 }
 
 int API(constrained_cancel)(INPUTS, const API(constraints) *constraints, const API(actuators) *actuators,
@@ -168,7 +170,7 @@ int API(constrained_cancel)(INPUTS, const API(constraints) *constraints, const A
     join_force(need.pull, need.torque);
     join_force(task, need.torque);
     copy(N, qdd, need.qdd);
-    return drive(&x, &need, 0, tau, NULL, NULL);
+    return give_torques(&x, &need, 0, tau, NULL, NULL);
 }
 
 int API(contacts_keep)(size_t grips, const API(constraints) *constraints, const API(grip) *grip, const real *forces)

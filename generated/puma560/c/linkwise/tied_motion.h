@@ -132,8 +132,8 @@ static void inertia_of(struct tied *x, int own, real *mass)
         add_armature(mass);
 }
 
-/* G' M G, and its diagonal. */
-static void reduce_inertia(const struct tied *x, const real *mass, real *small, real *size)
+/* G' M G. */
+static void reduce_inertia(const struct tied *x, const real *mass, real *small)
 {
     const int m = x->free;
     ALIGNED real moved[N * PITCH];
@@ -145,41 +145,57 @@ static void reduce_inertia(const struct tied *x, const real *mass, real *small, 
                 sum += x->map[i * PITCH + a] * moved[i * PITCH + b];
             small[a * m + b] = sum;
         }
-    for (int a = 0; a < m; ++a)
-        size[a] = small[a * m + a];
 }
 
-/* (G' M G) ydd = G' (tau - h - M bias), then A' lambda = M qdd + h - tau; with what joints have of their own where it counts. */
-static int accelerate_tied(struct tied *x, const real *tau, int own, real *qdd, real *forces)
+/* Equations of motion of the independent joints, G' M G ydd = G' (tau - rest), and qdd = G ydd + bias of all joints: what they need
+   before torques are known, with G in rows of m; `rest` is M bias + h. */
+struct tied_equations {
+    real inertia[N * N], rest[N], map[N * N], bias[N];
+};
+
+/* These of a motion, with M and h of all joints; with what joints have of their own where it counts. */
+static void tied_equations_of(struct tied *x, int own, real *mass, real *force, struct tied_equations *e)
 {
-    const int m = x->free;
-    ALIGNED const real rest[N] = {0};
-    ALIGNED real mass[N * N], force[N], small[N * N], size[N] = {0}, driven[N];
-    inertia_of(x, own, mass);
-    answer(&x->at.s, rest, x->qd, 1, force);
-    if (own) {
-        add_passive(x->at.q, x->qd, rest, force);
-        add_friction(x->qd, force);
-    }
-    clear((size_t)m, driven);
+    links_at(x);
+    equations_of(&x->at.s, x->at.q, x->qd, own, mass, force);
+    reduce_inertia(x, mass, e->inertia);
     for (int i = 0; i < N; ++i) {
-        real left = force[i] = tau[i] - force[i];
+        e->bias[i] = x->bias[i];
+        e->rest[i] = force[i];
         for (int k = 0; k < N; ++k)
-            left -= mass[i * N + k] * x->bias[k];
-        for (int a = 0; a < m; ++a)
-            driven[a] += x->map[i * PITCH + a] * left;
+            e->rest[i] += mass[i * N + k] * x->bias[k];
+        copy((size_t)x->free, x->map + i * PITCH, e->map + i * x->free);
     }
-    reduce_inertia(x, mass, small, size);
-    struct pivot weakest = {0, 1};
-    if (eliminate(0, m, 1, size, small, driven, &weakest) || vague(&weakest))
+}
+
+/* 0, or why there is no acceleration. */
+static int accelerate_independent(int m, const struct tied_equations *e, const real *tau, real *qdd)
+{
+    ALIGNED real driven[N] = {0};
+    for (int i = 0; i < N; ++i)
+        for (int a = 0; a < m; ++a)
+            driven[a] += e->map[i * m + a] * (tau[i] - e->rest[i]);
+    if (solve_positive(m, e->inertia, driven))
         return HAS_NO_INERTIA;
     for (int i = 0; i < N; ++i) {
-        qdd[i] = x->bias[i];
+        qdd[i] = e->bias[i];
         for (int a = 0; a < m; ++a)
-            qdd[i] += x->map[i * PITCH + a] * driven[a];
+            qdd[i] += e->map[i * m + a] * driven[a];
     }
+    return 0;
+}
+
+/* With them A' lambda = M qdd + h - tau. */
+static int accelerate_tied(struct tied *x, const real *tau, int own, real *qdd, real *forces)
+{
+    struct tied_equations e;
+    ALIGNED real mass[N * N], force[N];
+    tied_equations_of(x, own, mass, force, &e);
+    const int why = accelerate_independent(x->free, &e, tau, qdd);
+    if (why)
+        return why;
     for (int i = 0; i < N; ++i) {
-        force[i] = -force[i];
+        force[i] -= tau[i];
         for (int k = 0; k < N; ++k)
             force[i] += mass[i * N + k] * qdd[k];
     }

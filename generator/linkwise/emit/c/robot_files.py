@@ -4,13 +4,15 @@ from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any
 
+from linkwise_runtime.native.library import MOST_CONTACTS
+
 from linkwise.dynamics.link_forms import parameter_names
 from linkwise.emit.c import header
 from linkwise.emit.c.calls import LinkFormFunctions, group_calls, link_calls, motions, total
 from linkwise.emit.c.prototypes import at_position, cost, functions, pointers, under_torque
 from linkwise.emit.c.quantity_table import causes, potential, quantity_lines
 from linkwise.emit.c.sizes import EntryCounts, Span, groups, most_counts, tile, waiting_counts, whole
-from linkwise.emit.c.tie_tables import MOST_CONTACTS, has_tied_functions
+from linkwise.emit.c.tie_tables import has_tied_functions, scratch
 from linkwise.escape import c_string
 from linkwise.symbolic.system import EnergySystem, RigidSystem, System
 
@@ -101,6 +103,7 @@ def header_view(system: System, links: Sequence[Span], name: str) -> dict[str, A
         "free": free(system),
         "constrained": has_tied_functions(system),
         "contacts": MOST_CONTACTS,
+        "scratch": scratch(system) if isinstance(system, RigidSystem) else 0,
         "varying": isinstance(system, EnergySystem) and any(link.degree > 2 for link in system.links),
         "passive": isinstance(system, RigidSystem) and bool(system.robot.passive),
         "frames": list(header.frame_lines(system)) if isinstance(system, RigidSystem) else [],

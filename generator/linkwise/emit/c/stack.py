@@ -7,10 +7,12 @@ bytes, 8 samples in double or 16 in float. Beside them a function keeps some kB 
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from linkwise_runtime.native.library import MOST_CONTACTS
+
 from linkwise.emit.c.robot_files import free
 from linkwise.emit.c.robot_tables import columns, path_spans
 from linkwise.emit.c.sizes import Span, most_counts, tile, waiting_counts, whole
-from linkwise.emit.c.tie_tables import MOST_CONTACTS, has_tied_functions, tied_rows
+from linkwise.emit.c.tie_tables import has_tied_functions, tied_rows
 from linkwise.symbolic.system import RigidSystem, System
 
 VALUE = 64

@@ -5,13 +5,11 @@ from itertools import accumulate
 from typing import Any
 
 from linkwise_runtime.constraints.held_frames import ROWS
-from linkwise_runtime.native.library import MOST_TIED
+from linkwise_runtime.native.library import MOST_TIED, scratch_numbers
 
 from linkwise.escape import c_comment
 from linkwise.symbolic.system import RigidSystem, System
 
-MOST_CONTACTS = 8
-"""Most contacts that functions of tied joints take at a time, as in ties.h."""
 KINDS = {"point": "POINT", "hinge": "HINGE", "frame": "FRAME", "distance": "DISTANCE"}
 """Names of the kinds of ties in tree.h, behind HELD_."""
 
@@ -32,7 +30,8 @@ def tie_view(system: RigidSystem) -> dict[str, Any]:
         f"/* {c_comment(tie.name)} */"
         for tie in system.robot.ties
     ]
-    return {"ties": ties, "couplings": _couplings(system), "tied_rows": tied_rows(system)}
+    rows = tied_rows(system)
+    return {"ties": ties, "couplings": _couplings(system), "tied_rows": rows, "scratch": scratch(system)}
 
 
 def has_tied_functions(system: System) -> bool:
@@ -43,6 +42,12 @@ def has_tied_functions(system: System) -> bool:
 def tied_rows(system: RigidSystem) -> int:
     """Return how many rows the robot's own ties and couplings have."""
     return sum(len(ROWS[tie.kind]) for tie in system.robot.ties) + len(system.robot.couplings)
+
+
+def scratch(system: RigidSystem) -> int:
+    """Return how many numbers of memory a simulation needs for each motion."""
+    kinds = (tie.kind for tie in system.robot.ties)
+    return scratch_numbers(len(system.coordinates), kinds, len(system.robot.couplings))
 
 
 def _couplings(system: RigidSystem) -> CouplingRows:

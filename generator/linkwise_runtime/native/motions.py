@@ -1,0 +1,124 @@
+"""Motions over time by the compiled C: steps of RK4 of many motions at once."""
+
+import ctypes
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from ..answers.packed import AskedMotion, ReachedMotion
+from ..interface import Numbers
+from ..motion.c_controller import CONTROLLER, CController
+from ..rule.joint_tree import JointTree
+from .calls import NativeCalls, plain
+from .constraints import NativeTies
+from .control import RealType
+from .library import MOST_TIED, scratch_numbers, symbol
+from .memory import NumberArray, NumberType, address
+
+if TYPE_CHECKING:
+    from ctypes import _NamedFuncPointer as CFunction
+
+REFUSED = -1
+"""Status of a controller of Python that raised an error."""
+
+
+def simulation_struct(real: RealType) -> type[ctypes.Structure]:
+    """Return the struct NAME_simulation of double or float.
+
+    Its last field is there in C only where joints have springs, damping, friction or armature.
+    """
+    fields: list[tuple[str, Any]] = [
+        ("instants", ctypes.c_size_t),
+        ("time", ctypes.c_void_p),
+        ("step", ctypes.c_double),
+        ("controller", ctypes.c_void_p),
+        ("context", ctypes.c_void_p),
+        ("tau", ctypes.c_void_p),
+        ("constraints", ctypes.c_void_p),
+        ("reached", ctypes.c_void_p),
+        ("of_links", ctypes.c_int),
+    ]
+    return type("SimulationStruct", (ctypes.Structure,), {"_fields_": fields})
+
+
+class CalledBack:
+    """Controller of Python that C calls, on memory in which C has the motion; keeps what it raised."""
+
+    def __init__(self, tau: Callable[[float, Numbers, Numbers], Numbers], memory: NumberArray) -> None:
+        """Read q and qd from memory (3, ..., n), and write torques behind them."""
+        self._tau, self._memory = tau, memory
+        self.error: BaseException | None = None
+        self.pointer = CONTROLLER(self._drive)
+
+    def _drive(self, context: int, time: float, count: int, q: int, qd: int, tau: int) -> int:
+        try:
+            at, moved = self._memory[:2].copy()
+            self._memory[2] = cast(NumberArray, self._tau(time, cast(Numbers, at), cast(Numbers, moved)))
+        except BaseException as error:
+            self.error = error
+            return REFUSED
+        return 0
+
+
+class NativeMotions:
+    """C function of a package for motions over time, for numbers that stay as they are."""
+
+    def __init__(self, calls: NativeCalls, tree: JointTree) -> None:
+        self._calls = calls
+        kinds = (tie.kind for tie in tree.ties)
+        self._scratch = scratch_numbers(calls.structure.n, kinds, len(tree.couplings))
+        self._functions: dict[NumberType, CFunction] = {}
+
+    def moved(self, asked: AskedMotion) -> ReachedMotion | None:
+        """Return a motion as far as C gets; None where C has no function for it.
+
+        Raises what a controller of Python raises, and ValueError for the status of one of C.
+        """
+        calls, n = self._calls, self._calls.structure.n
+        q, qd = (plain(cast(NumberArray, a)) for a in (asked.q, asked.qd))
+        ties = cast("NativeTies | None", asked.ties)
+        if calls.learned or n > MOST_TIED or not q.size:
+            return None
+        kind, batch, rows = q.dtype, q.shape[:-1], len(asked.times)
+        count = math.prod(batch)
+        scratch = np.empty((count, self._scratch), kind)
+        driven = scratch.reshape(-1)[: 3 * count * n].reshape(3, *batch, n)
+        times, reached = np.array(asked.times, float), ctypes.c_size_t(0)
+        given = asked.tau
+        back = CalledBack(given, driven) if callable(given) and not isinstance(given, CController) else None
+        torques = None if callable(given) else plain(cast(NumberArray, given))
+        settings = None if ties is None else ties.settings(kind)
+        wanted = simulation_struct(ctypes.c_double if kind.itemsize == 8 else ctypes.c_float)(
+            rows,
+            address(times),
+            asked.step or 0.0,
+            ctypes.cast(back.pointer, ctypes.c_void_p).value if back else getattr(given, "address", None),
+            getattr(given, "context", None),
+            None if torques is None else address(torques),
+            None if settings is None else ctypes.addressof(settings.struct),
+            ctypes.addressof(reached),
+            not asked.passive,
+        )
+        results = [np.empty((rows, *batch, n), kind) for _ in range(3)] + [np.empty((rows, *batch), kind)]
+        arrays = [q, qd, *([calls.constants(kind)] if calls.parameters else [])]
+        status = self._function(kind)(
+            ctypes.c_size_t(count),
+            *(ctypes.c_void_p(address(a)) for a in arrays),
+            ctypes.byref(wanted),
+            *(ctypes.c_void_p(address(a)) for a in (scratch, *results)),
+        )
+        if back is not None and back.error is not None:
+            error, back.error = back.error, None
+            raise error
+        if status < 0 and isinstance(given, CController):
+            raise given.refusal(status, f"after t = {asked.times[max(reached.value - 1, 0)]:g} s")
+        return ReachedMotion(*(cast(Numbers, a[: reached.value]) for a in results))
+
+    def _function(self, kind: NumberType) -> "CFunction":
+        """Return the C function for a dtype, compiled if it is not there yet."""
+        if kind not in self._functions:
+            found = self._functions[kind] = symbol(self._calls.sources, "simulate", kind.str[1:])
+            found.restype = ctypes.c_int
+        return self._functions[kind]
