@@ -295,7 +295,7 @@ def test_c_tells_which_contacts_keep(free: ModuleType) -> None:
         grips = (GripStruct * 2)(
             *(GripStruct(k, 0.5, (ctypes.c_double * 3)(*normal)) for k in (0, second)),
         )
-        struct = functions[of]._struct(np.dtype(float))
+        struct = functions[of].settings(np.dtype(float)).struct
         found: int = keep(
             ctypes.c_size_t(2), ctypes.byref(struct), grips, ctypes.c_void_p(forces.ctypes.data)
         )

@@ -17,7 +17,7 @@ from .memory import NumberArray, NumberType, address
 
 @dataclass(frozen=True)
 class TiedStance:
-    """What a controller's joints are tied by and driven by, as C is told of it."""
+    """Ties and drives of a controller's joints, as C is told of them."""
 
     constraints: Callable[[NumberType], ctypes.Structure]
     """Function that returns the struct NAME_constraints of a number type, which stays where it is."""
