@@ -153,6 +153,7 @@ static int tied_shares(size_t count, const struct numbers *numbers, const struct
             return why;
         const struct tied_results to = results_at(first, s, (size_t)x.free, (size_t)x.t.rows);
         move_tied(&x, qd + s * N, NULL);
+        turn_map(&x);
         tied_links(&x, qd + s * N, qdd ? qdd + s * N : NULL, &to);
     }
     return 0;

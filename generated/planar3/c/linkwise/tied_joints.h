@@ -368,27 +368,29 @@ static void follow_velocities(struct tied *x, const real *qd)
     set_motion(&x->at.s.m, x->qd, rest);
 }
 
-/* These, and what they change: dA/dt, dG/dt and the accelerations -A_d+ dA/dt qd; then accelerations that follow, where qdd is
-   given. */
+/* These, and what they change: dA/dt and the accelerations -A_d+ dA/dt qd; then accelerations that follow, where qdd is given. */
 static void move_tied(struct tied *x, const real *qd, const real *qdd)
 {
-    const int m = x->free, rows = x->t.rows;
-    ALIGNED real sides[ROWS * PITCH], acceleration[N];
+    ALIGNED real side[ROWS], acceleration[N];
     follow_velocities(x, qd);
     rates_at(x->c, &x->at, x->o, x->qd, &x->t);
-    times_map(x, rows, x->t.rate, sides);
-    follow(x, m, sides, x->map_rate);
-    for (int i = 0; i < N; ++i) { /* dG/dt yd = -A_d+ dA/dt qd */
-        x->bias[i] = 0;
-        for (int a = 0; a < m; ++a)
-            x->bias[i] += x->map_rate[i * PITCH + a] * qd[x->joint[x->bound + a]];
-    }
+    for (int r = 0; r < x->t.rows; ++r)
+        side[r] = dot(N, x->t.rate + r * N, x->qd);
+    follow_one_side(x, side, x->bias);
     if (!qdd)
         return;
     for (int i = 0; i < N; ++i) {
         acceleration[i] = x->bias[i];
-        for (int a = 0; a < m; ++a)
+        for (int a = 0; a < x->free; ++a)
             acceleration[i] += x->map[i * PITCH + a] * qdd[x->joint[x->bound + a]];
     }
     set_motion(&x->at.s.m, x->qd, acceleration);
+}
+
+/* dG/dt, -A_d+ dA/dt G, in a motion. */
+static void turn_map(struct tied *x)
+{
+    ALIGNED real sides[ROWS * PITCH];
+    times_map(x, x->t.rows, x->t.rate, sides);
+    follow(x, x->free, sides, x->map_rate);
 }
