@@ -37,8 +37,10 @@ from linkwise.check.compare import Entries, compare
 from linkwise.package.load import load_package, open_package
 from linkwise.package.manifest import LARGEST, Manifest, is_too_large
 from linkwise.package.write import check_target
+from linkwise_runtime.answers.packed import AskedMotion, ReachedMotion
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.native.library import TIED
+from linkwise_runtime.native.motions import NativeMotions
 from linkwise_runtime.version import VERSION
 
 
@@ -321,6 +323,26 @@ WRONG = {
     ),
     "index": ("c/planar2_index.h", "{2, 2, 2}", "{2, 2, 1}", "c: numbers, indices"),
 }
+
+
+@needs_compiler
+@pytest.mark.parametrize("case", ["stops short", "is wrong"])
+def test_a_simulation_in_c_that_stops_short_or_is_wrong_fails(
+    case: str, passing: Copy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package, whole = passing("native"), NativeMotions.moved
+
+    def moved(self: NativeMotions, asked: AskedMotion) -> ReachedMotion:
+        found = whole(self, asked)
+        assert found is not None
+        if case == "is wrong":
+            return found._replace(work=found.work * (1.0 + 1e-6))
+        return ReachedMotion(*(a[:2] for a in found))
+
+    monkeypatch.setattr(NativeMotions, "moved", moved)
+    (failed,) = (result for result in check_package(package, 3) if result.failed)
+    assert failed.name == "native: a simulated motion against Newton-Euler recursion"
+    assert (failed.detail == "C stops at instant 2 of 3") == (case == "stops short")
 
 
 FRAME = {
