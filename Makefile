@@ -40,6 +40,7 @@ pictures: $(READY)
 # The figure and the tables of docs/control.md: what is cancelled at the root, and what a loop at 1 kHz keeps.
 control: $(READY)
 	$(BIN)/python tests/tools/control_root.py --out docs
+	$(BIN)/python tests/tools/control_stance.py
 	$(BIN)/python tests/numeric/finite_rate_tables.py --out out/control
 
 # Panda pushed at its hand in MuJoCo: limp, soft and stiff.

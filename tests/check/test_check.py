@@ -37,8 +37,10 @@ from linkwise.check.compare import Entries, compare
 from linkwise.package.load import load_package, open_package
 from linkwise.package.manifest import LARGEST, Manifest, is_too_large
 from linkwise.package.write import check_target
+from linkwise_runtime.answers.packed import AskedMotion, ReachedMotion
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.native.library import TIED
+from linkwise_runtime.native.motions import NativeMotions
 from linkwise_runtime.version import VERSION
 
 
@@ -323,6 +325,26 @@ WRONG = {
 }
 
 
+@needs_compiler
+@pytest.mark.parametrize("case", ["stops short", "is wrong"])
+def test_a_simulation_in_c_that_stops_short_or_is_wrong_fails(
+    case: str, passing: Copy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package, whole = passing("native"), NativeMotions.moved
+
+    def moved(self: NativeMotions, asked: AskedMotion) -> ReachedMotion:
+        found = whole(self, asked)
+        assert found is not None
+        if case == "is wrong":
+            return found._replace(work=found.work * (1.0 + 1e-6))
+        return ReachedMotion(*(a[:2] for a in found))
+
+    monkeypatch.setattr(NativeMotions, "moved", moved)
+    (failed,) = (result for result in check_package(package, 3) if result.failed)
+    assert failed.name == "native: a simulated motion against Newton-Euler recursion"
+    assert (failed.detail == "C stops at instant 2 of 3") == (case == "stops short")
+
+
 FRAME = {
     "a continued formula": ("formulas.txt", "\ntau_2_2 =", "\n    + 5*q_2\ntau_2_2 =", 13),
     "a joint exchanged": ("formulas.txt", "q_1 is joint 'joint1'", "q_1 is joint 'joint2'", 4),
@@ -455,7 +477,7 @@ def test_all_that_a_package_has_is_held(passing: Copy) -> None:
     found = marks(package)
     assert set(found.values()) == {"ok"}
     headers = "".join(path.read_text() for path in (package / "c").glob("planar2*.h"))
-    functions = set(re.findall(r"\w+ (planar2_\w+)\(", headers))
+    functions = set(re.findall(r"^\w+ (planar2_\w+)\(", headers, re.MULTILINE))
     called = {name.removeprefix("c: ") for name in found if name.startswith("c: planar2_")}
     not_called = {"frame_partial_impedance", *(name for name in TIED if not name.endswith("_of_links"))}
     assert functions - called == {f"planar2_{name}{real}" for name in not_called for real in ("", "f")}

@@ -3,6 +3,7 @@
 import ctypes
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -24,6 +25,7 @@ REFUSED = -1
 """Status of a controller of Python that raised an error."""
 
 
+@cache
 def simulation_struct(real: RealType) -> type[ctypes.Structure]:
     """Return the struct NAME_simulation of double or float.
 
@@ -50,9 +52,9 @@ class CalledBack:
         """Read q and qd from memory (3, ..., n), and write torques behind them."""
         self._tau, self._memory = tau, memory
         self.error: BaseException | None = None
-        self.pointer = CONTROLLER(self._drive)
 
-    def _drive(self, context: int, time: float, count: int, q: int, qd: int, tau: int) -> int:
+    def __call__(self, context: int, time: float, count: int, q: int, qd: int, tau: int) -> int:
+        """Write the torques of an instant; return 0, or `REFUSED` where the controller raised an error."""
         try:
             at, moved = self._memory[:2].copy()
             self._memory[2] = cast(NumberArray, self._tau(time, cast(Numbers, at), cast(Numbers, moved)))
@@ -60,6 +62,16 @@ class CalledBack:
             self.error = error
             return REFUSED
         return 0
+
+    def check(self) -> None:
+        """Raise what the controller raised, unchanged."""
+        error, self.error = self.error, None
+        if error is None:
+            return
+        try:
+            raise error
+        finally:
+            del error
 
 
 class NativeMotions:
@@ -78,40 +90,26 @@ class NativeMotions:
         """
         calls, n = self._calls, self._calls.structure.n
         q, qd = (plain(cast(NumberArray, a)) for a in (asked.q, asked.qd))
-        ties = cast("NativeTies | None", asked.ties)
         if calls.learned or n > MOST_TIED or not q.size:
             return None
-        kind, batch, rows = q.dtype, q.shape[:-1], len(asked.times)
+        kind, batch, rows, given = q.dtype, q.shape[:-1], len(asked.times), asked.tau
         count = math.prod(batch)
-        scratch = np.empty((count, self._scratch), kind)
-        driven = scratch.reshape(-1)[: 3 * count * n].reshape(3, *batch, n)
-        times, reached = np.array(asked.times, float), ctypes.c_size_t(0)
-        given = asked.tau
-        back = CalledBack(given, driven) if callable(given) and not isinstance(given, CController) else None
-        torques = None if callable(given) else plain(cast(NumberArray, given))
-        settings = None if ties is None else ties.settings(kind)
-        wanted = simulation_struct(ctypes.c_double if kind.itemsize == 8 else ctypes.c_float)(
-            rows,
-            address(times),
-            asked.step or 0.0,
-            ctypes.cast(back.pointer, ctypes.c_void_p).value if back else getattr(given, "address", None),
-            getattr(given, "context", None),
-            None if torques is None else address(torques),
-            None if settings is None else ctypes.addressof(settings.struct),
-            ctypes.addressof(reached),
-            not asked.passive,
-        )
+        scratch, reached = np.empty(count * self._scratch, kind), ctypes.c_size_t(0)
+        back = None
+        if callable(given) and not isinstance(given, CController):
+            back = CalledBack(given, scratch[: 3 * count * n].reshape(3, *batch, n))
         results = [np.empty((rows, *batch, n), kind) for _ in range(3)] + [np.empty((rows, *batch), kind)]
+        told, kept = _told(asked, kind, back, reached)
         arrays = [q, qd, *([calls.constants(kind)] if calls.parameters else [])]
         status = self._function(kind)(
             ctypes.c_size_t(count),
             *(ctypes.c_void_p(address(a)) for a in arrays),
-            ctypes.byref(wanted),
+            ctypes.byref(told),
             *(ctypes.c_void_p(address(a)) for a in (scratch, *results)),
         )
-        if back is not None and back.error is not None:
-            error, back.error = back.error, None
-            raise error
+        del kept
+        if back is not None:
+            back.check()
         if status < 0 and isinstance(given, CController):
             raise given.refusal(status, f"after t = {asked.times[max(reached.value - 1, 0)]:g} s")
         return ReachedMotion(*(cast(Numbers, a[: reached.value]) for a in results))
@@ -122,3 +120,29 @@ class NativeMotions:
             found = self._functions[kind] = symbol(self._calls.sources, "simulate", kind.str[1:])
             found.restype = ctypes.c_int
         return self._functions[kind]
+
+
+def _told(
+    asked: AskedMotion, kind: NumberType, back: CalledBack | None, reached: ctypes.c_size_t
+) -> tuple[ctypes.Structure, object]:
+    """Return what C is told of a motion, and what has to stay where it is until C is done."""
+    given, times = asked.tau, np.array(asked.times, float)
+    settings = None if asked.ties is None else cast(NativeTies, asked.ties).settings(kind)
+    pointer = None if back is None else CONTROLLER(back)
+    torques = None if callable(given) else plain(cast(NumberArray, given))
+    driven = given if isinstance(given, CController) else None
+    controller = (
+        driven.address if driven else ctypes.cast(pointer, ctypes.c_void_p).value if pointer else None
+    )
+    struct = simulation_struct(ctypes.c_double if kind.itemsize == 8 else ctypes.c_float)(
+        len(times),
+        address(times),
+        asked.step or 0.0,
+        controller,
+        driven.context if driven else None,
+        None if torques is None else address(torques),
+        None if settings is None else ctypes.addressof(settings.struct),
+        ctypes.addressof(reached),
+        not asked.passive,
+    )
+    return struct, (times, settings, pointer, torques)
