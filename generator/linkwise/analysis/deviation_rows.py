@@ -29,7 +29,7 @@ from linkwise.analysis.settings import Convention
 from linkwise.analysis.stated_bodies import is_closed_form
 from linkwise.analysis.term_rows import TermArrays
 from linkwise.analysis.uncertain_inputs import UncertainInputs
-from linkwise.arrays import Array
+from linkwise.arrays import Array, Index
 
 AT_ONCE = 256
 """Samples perturbed at once, whose rows stay in the cache."""
@@ -47,7 +47,7 @@ class DeviationRows:
     sources: TermArrays
     """Places of the rows of τ_ij and its terms among packed values, in the order of rows."""
     known: KnownDeviations | None = None
-    """What finds deviations of rows by link; None where they are perturbed."""
+    """Deviations of rows by link that are known; None where all are perturbed."""
     few: tuple[int, ...] = ()
     """Rows that are perturbed beside those, and what these are made of."""
 
@@ -118,7 +118,7 @@ class DeviationRows:
             for name, found in find(out[:, some], plain, time[some], (q[some], qd[some], qdd[some])):
                 for beginning, variance in ((OF_MOTION, found.moved), (DEVIATION, found.every)):
                     if f"{beginning}{name}" in rows:
-                        out[rows[f"{beginning}{name}"].rows, some] = np.sqrt(np.maximum(variance, 0.0))
+                        _put_roots(variance, out, rows[f"{beginning}{name}"].rows, some)
 
     def _known(
         self, out: Array, plain: Perturbable, time: Array, motion: Motion
@@ -176,6 +176,15 @@ class DeviationRows:
             "c2": c2[:, sources.acceleration].T,
             "c1": twice * c1[:, sources.velocity].T,
         }
+
+
+def _put_roots(variance: Array, out: Array, at: slice | Index, some: slice) -> None:
+    """Fill rows with roots, in place where rows follow each other: fresh memory costs more than roots."""
+    if isinstance(at, slice):
+        found = out[at, some]
+        np.sqrt(np.maximum(variance, 0.0, out=found), out=found)
+    else:
+        out[at, some] = np.sqrt(np.maximum(variance, 0.0))
 
 
 def _names(rows: ResultRows) -> list[str]:

@@ -64,7 +64,7 @@ class Variances(NamedTuple):
 
 
 class KnownParts(NamedTuple):
-    """What variances of some samples are made of."""
+    """Parts of which the variances of some samples are made."""
 
     moved: Mapping[str, Array]
     """Packed variances by motion, (entries, S), by the names of `motion_variances`."""

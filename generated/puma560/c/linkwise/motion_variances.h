@@ -41,9 +41,9 @@ INLINE void multiply(lanes a, lanes b, lanes va, lanes vb, real *product)
 INLINE void multiply_causes(const real *const *given, const real *variance, int k, int at, const real *c2, const real *c1,
     const real *var_c2, const real *var_c1, real *acceleration, real *velocity)
 {
-    const int cause = k * BLOCK + at;
-    multiply(TAKE(c2), TAKE(given[2] + cause), TAKE(var_c2), TAKE(variance + N * BLOCK + cause), acceleration);
-    multiply(TAKE(c1), TAKE(given[1] + cause), TAKE(var_c1), TAKE(variance + cause), velocity);
+    const int moved = k * BLOCK + at;
+    multiply(TAKE(c2), TAKE(given[2] + moved), TAKE(var_c2), TAKE(variance + N * BLOCK + moved), acceleration);
+    multiply(TAKE(c1), TAKE(given[1] + moved), TAKE(var_c1), TAKE(variance + moved), velocity);
 }
 
 /* All products of link j, whose values are added to the sums over the links. */
@@ -97,10 +97,10 @@ static inline real *in_room(real *room, size_t c2, size_t c1, size_t g, struct s
 }
 
 /* All sums at zero. */
-static void begin(real *sums, real *variance, const struct varied *to)
+static void begin(real *rest, real *variance, const struct varied *to)
 {
     const size_t square = (size_t)N * N;
-    clear(4 * (square + N) * BLOCK, sums);
+    clear(4 * (square + N) * BLOCK, rest);
     clear((size_t)2 * N * BLOCK, variance);
     clear((size_t)C2 * BLOCK, to->links.c2);
     clear((size_t)C1 * BLOCK, to->links.c1);
@@ -139,9 +139,9 @@ void API(motion_variances_blocks)(size_t blocks, INPUTS, const real *factor, rea
         to.of_links = moved;
         to.of_joints = joints_moved;
         to.with_motion = joint_motion + s * MOVING;
-        real *const sums = in_room(room + s * all, C2, C1, G, &to.here);
-        in_room(in_room(sums, square, square, row, &to.step), square, square, row, &to.bend);
-        begin(sums, variance, &to);
+        real *const rest = in_room(room + s * all, C2, C1, G, &to.here);
+        in_room(in_room(rest, square, square, row, &to.step), square, square, row, &to.bend);
+        begin(rest, variance, &to);
         values_of_block(x, given, &to.here);
         for (size_t r = 0; r < MOVING; ++r) {
             const real *const by = factor + (s * MOVING + r * BLOCK) * MOVING;
