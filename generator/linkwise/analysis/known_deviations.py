@@ -149,9 +149,11 @@ class KnownDeviations:
         """Return the variances of a quantity of `BY_LINK`."""
         known = BY_LINK[name]
         doubled = 4.0 if self.convention == "gradient" and name == "tau_qd" else 1.0
-        own = np.zeros((len(self.rows[name].numbers), parts.squares[0].shape[1]))
         if known.name in parts.moved:
             own = taken(parts.moved[known.name], self._at(name, known.field), "by motion")
+        else:
+            own = np.zeros((len(self.rows[name].numbers), 1))
+        if doubled != 1.0:
             own *= doubled
         if parts.borne is None:
             return Variances(own, own)
@@ -160,7 +162,8 @@ class KnownDeviations:
         if known.cause:
             squares = np.ascontiguousarray(parts.squares[ORDERS.index(known.cause)])
             whole *= taken(squares, self.rows[name].at[:, known.axis], "causes")
-        whole *= doubled
+        if doubled != 1.0:
+            whole *= doubled
         whole += own
         return Variances(own, whole)
 
