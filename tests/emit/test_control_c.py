@@ -240,6 +240,7 @@ def in_python(package: ModuleType, robot: Any) -> dict[str, Callable[[], Any]]:
         "regressor": lambda: robot.regressor(q, q, q),
         "coefficient_regressors": lambda: robot.coefficient_regressors(q, q),
         "share_variances": lambda: robot.uncertainty(q, q, q, UncertainBodies(0.1)),
+        "motion_variances_blocks": lambda: robot.uncertainty(q, q, q, motion=np.eye(3 * robot.n)),
         "reactions": lambda: robot.reactions(q, q, q, constraints=False),
         "pose": lambda: robot.kinematics.pose(q, frame),
         "jacobian": lambda: robot.kinematics.jacobian(q, frame),

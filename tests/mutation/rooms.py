@@ -44,6 +44,7 @@ C = (
     "tests/robot/test_curves.py",
     "tests/check/test_check.py",
     "tests/numeric/test_regressors.py",
+    "tests/runtime/test_motion_variances.py",
     "tests/emit/test_embedded.py",
 )
 ROOMS: dict[str, Room] = {

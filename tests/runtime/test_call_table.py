@@ -438,6 +438,7 @@ def test_the_header_of_c_has_the_rows_and_nothing_else(which: str, package_at: L
         "partial_impedance": which != "tied",
         "cancel": which != "tied",
         "share_variances": rigid,
+        "motion_variances_blocks": rigid,
         "frame_partial_impedance": rigid and which != "tied",
         "constrained_response": rigid,
         "constrained_response_of_links": rigid and own,

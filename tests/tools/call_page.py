@@ -61,6 +61,8 @@ BESIDE_IN_C = {
     "reactions": "the wrenches of links, of which `reactions` are made; not of joints that are tied",
     "share_variances": "what bodies do to shares through one link, squared, of which "
     "[`uncertainty`](package.md#how-certain-a-share-is) is made",
+    "motion_variances_blocks": "what noise of the motion does to shares, their sums over links and powers, "
+    "squared, of which [`uncertainty`](package.md#how-certain-a-share-is) is made too",
     "constrained_response": "of which induced accelerations and reactions of tied joints are made",
     "constrained_response_of_links": "the same with `passive=False`",
     "constrained_dynamics_of_links": "`constraints.forward_dynamics(passive=False)`",

@@ -538,6 +538,7 @@ static void gradient_rows(size_t count, const real *q, const real *qd, const rea
 #endif
 #if PART(REGRESSORS)
 #include "linkwise/regressors.h"
+#include "linkwise/motion_variances.h"
 #include "linkwise/reactions.h"
 #endif
 #if PART(CONTROL) || CONSTRAINED

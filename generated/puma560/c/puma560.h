@@ -201,6 +201,23 @@ void puma560_coefficient_regressors(size_t count, const double *q, const double 
 void puma560_share_variances(size_t count, const double *q, const double *qd, const double *qdd, const double *factor,
     double *c2, double *c1, double *g, double *tau);
 
+/* Variances of shares where the motion is uncertain: of (q, qd, qdd), one after the other, the covariance is F' F with
+   F = factor(3 JOINTS, 3 JOINTS), whose rows of zeros cost nothing. They are of c2(i, j, k), c1(i, j, k), g(i, j) and tau(i, j); of
+   acceleration(i, j, k) = c2(i, j, k) qdd_k, velocity(i, j, k) = c1(i, j, k) qd_k and power(i, j) = tau(i, j) qd_i; and of the sums
+   of all of these over the links j, joint_c2(i, k) and so on; joint_motion(o, i) is the covariance of joint_tau(i) with q_i, qd_i
+   and qdd_i. By divided differences of second order along each row of F by itself; products are those of two normal
+   numbers. In blocks alone, which LINKWISE_SMALL leaves out.
+   Reads q, qd, qdd (blocks, JOINTS, BLOCK), and blocks of factor (3 JOINTS, 3 JOINTS);
+   writes blocks of c2 (C2), c1, acceleration, velocity (C1), g, tau, power (G), joint_c2, joint_c1, joint_acceleration,
+   joint_velocity (JOINTS, JOINTS), joint_g, joint_tau, joint_power (JOINTS), joint_motion (3, JOINTS) and, in between, of
+   room (C2 + C1 + 2 G + 4 JOINTS (JOINTS + 1)). */
+void puma560_motion_variances_blocks(size_t blocks, const double *q, const double *qd, const double *qdd, const double *factor,
+    double *c2, double *c1, double *g, double *tau,
+    double *acceleration, double *velocity, double *power,
+    double *joint_c2, double *joint_c1, double *joint_g, double *joint_tau,
+    double *joint_acceleration, double *joint_velocity, double *joint_power, double *joint_motion,
+    double *room);
+
 /* Reactions: the whole wrenches that joints carry of each link, by cause, of which c2(i, j, k), c1(i, j, k) and g(i, j) are the
    parts along the joints' axes. Where tau(k, j) stands in a row of tau, acceleration has six numbers, N_x, N_y, N_z, f_x, f_y
    and f_z, in the world's axes: the force that link j needs for each unit of qdd_k, and the moment about the origin p of the joint
@@ -555,6 +572,23 @@ void puma560_coefficient_regressorsf(size_t count, const float *q, const float *
    Reads q, qd, qdd (count, JOINTS), factor (LINKS, 10, 10); writes c2 (count, C2), c1 (count, C1), g, tau (count, G). */
 void puma560_share_variancesf(size_t count, const float *q, const float *qd, const float *qdd, const float *factor,
     float *c2, float *c1, float *g, float *tau);
+
+/* Variances of shares where the motion is uncertain: of (q, qd, qdd), one after the other, the covariance is F' F with
+   F = factor(3 JOINTS, 3 JOINTS), whose rows of zeros cost nothing. They are of c2(i, j, k), c1(i, j, k), g(i, j) and tau(i, j); of
+   acceleration(i, j, k) = c2(i, j, k) qdd_k, velocity(i, j, k) = c1(i, j, k) qd_k and power(i, j) = tau(i, j) qd_i; and of the sums
+   of all of these over the links j, joint_c2(i, k) and so on; joint_motion(o, i) is the covariance of joint_tau(i) with q_i, qd_i
+   and qdd_i. By divided differences of second order along each row of F by itself; products are those of two normal
+   numbers. In blocks alone, which LINKWISE_SMALL leaves out.
+   Reads q, qd, qdd (blocks, JOINTS, BLOCKF), and blocks of factor (3 JOINTS, 3 JOINTS);
+   writes blocks of c2 (C2), c1, acceleration, velocity (C1), g, tau, power (G), joint_c2, joint_c1, joint_acceleration,
+   joint_velocity (JOINTS, JOINTS), joint_g, joint_tau, joint_power (JOINTS), joint_motion (3, JOINTS) and, in between, of
+   room (C2 + C1 + 2 G + 4 JOINTS (JOINTS + 1)). */
+void puma560_motion_variances_blocksf(size_t blocks, const float *q, const float *qd, const float *qdd, const float *factor,
+    float *c2, float *c1, float *g, float *tau,
+    float *acceleration, float *velocity, float *power,
+    float *joint_c2, float *joint_c1, float *joint_g, float *joint_tau,
+    float *joint_acceleration, float *joint_velocity, float *joint_power, float *joint_motion,
+    float *room);
 
 /* Reactions: the whole wrenches that joints carry of each link, by cause, of which c2(i, j, k), c1(i, j, k) and g(i, j) are the
    parts along the joints' axes. Where tau(k, j) stands in a row of tau, acceleration has six numbers, N_x, N_y, N_z, f_x, f_y

@@ -121,7 +121,7 @@ class Decomposer:
         return cls(
             *(robot, tuple(loads), convention, rows, sources, parts, wholes),
             *(induced, power, forces, reactions),
-            *(deviations, times, terms, traced),
+            *(deviations.of_rows(rows), times, terms, traced),
             cls.of(robot, convention, loads, times) if left_out else None,
         )
 
@@ -143,6 +143,11 @@ class Decomposer:
             forces=replace(self.forces, robot=robot),
             reactions=replace(self.reactions, robot=robot),
         )
+
+    def with_rows(self, places: Sequence[Place]) -> Self:
+        """Return the decomposer of these rows alone, of which none is a share by link or cause."""
+        nothing = TermArrays(*(some[:0] for some in self.sources))
+        return replace(self, rows=replace(self.rows, places=tuple(places)), sources=nothing)
 
     def with_load_off(self, e: int, shift: LoadShift) -> Self:
         """Return the decomposer in which load e is off by a shift."""
@@ -228,7 +233,7 @@ class Decomposer:
         """True if compiled code computes nearly all, so that a call for few samples costs no more of each."""
         robot, asked = self.robot, (self.induced.points, self.power.is_asked, self.reactions.borne)
         slow = robot.constrained, robot.contacts, self.traced, self.loads, robot.is_written, *asked
-        return robot.backend == "native" and not any(slow) and self.deviations.uncertain.stated is None
+        return robot.backend == "native" and not any(slow) and self.deviations.is_quick
 
     def checked(self, some: Array, inputs: Array) -> Closure:
         """Return the errors of some samples (rows, S) against an independent recursion.

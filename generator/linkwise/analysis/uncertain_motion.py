@@ -20,6 +20,7 @@ above the cutoff makes it larger, noise that is slower than the cutoff smaller t
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -73,25 +74,44 @@ class MotionNoise:
         found: Array = np.sqrt(np.diag(self.covariance))
         return found
 
-    def directions(self, time: Array) -> list[tuple[Array, Array, Array]]:
-        """Return independent changes of q, qd and qdd (S, n) at samples, of one standard deviation each.
+    def roots(self, time: Array) -> Array:
+        """Return D (S or 1, 3 n, R) at samples, with D D^T the covariance of q, qd and qdd in that order.
 
-        With the root U of the covariance and the triangles L of G, they are the columns of L times those of
+        With the root U of the covariance and the triangles L of G, its columns are those of L times those of
         U; the last third changes accelerations alone.
         """
         samples = np.rint((time - self.first) * self.rate).astype(np.intp)
-        triangles = lower_triangles(self.passage.gram)[self.passage.alike(samples)]
+        alike = self.passage.alike(samples)
+        if (alike == alike[0]).all():
+            alike = alike[:1]
+        columns = np.einsum("sxc,rk->sxkcr", self._triangles[alike], self._root)
+        found: Array = columns.reshape(len(alike), 3 * len(self.joints), -1)
+        return found
+
+    @cached_property
+    def _triangles(self) -> Array:
+        """Triangles L of the passage, (L, 3, 3)."""
+        return lower_triangles(self.passage.gram)
+
+    @cached_property
+    def _root(self) -> Array:
+        """Rows of U^T with U U^T the covariance, (R, n)."""
+        if np.count_nonzero(self.covariance - np.diag(np.diag(self.covariance))) == 0:
+            own: Array = np.diag(self.deviations)[self.deviations > 0.0]
+            return own
         values, vectors = np.linalg.eigh(self.covariance)
         kept = values > np.finfo(float).eps * values.max(initial=0.0) * len(values)
-        roots = (vectors[:, kept] * np.sqrt(values[kept])).T
-        if np.count_nonzero(self.covariance - np.diag(np.diag(self.covariance))) == 0:
-            roots = np.diag(self.deviations)[self.deviations > 0.0]
-        found = []
-        for column in range(3):
-            for root in roots:
-                moved = triangles[:, :, column, None] * root
-                found.append((moved[:, 0], moved[:, 1], moved[:, 2]))
+        found: Array = (vectors[:, kept] * np.sqrt(values[kept])).T
         return found
+
+    def directions(self, time: Array) -> list[tuple[Array, Array, Array]]:
+        """Return independent changes of q, qd and qdd (S or 1, n) at samples, of one standard deviation each.
+
+        They are the columns of `roots`.
+        """
+        n = len(self.joints)
+        columns = np.moveaxis(self.roots(time), -1, 0)
+        return [(one[:, :n], one[:, n : 2 * n], one[:, 2 * n :]) for one in columns]
 
     def record(self) -> dict[str, Any]:
         """Return this as plain data: deviations in rad or m."""

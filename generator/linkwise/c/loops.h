@@ -262,6 +262,7 @@ static void gradient_rows(size_t count, INPUTS, int dense, real *c0)
 
 #if PART(REGRESSORS)
 #include "regressors.h"
+#include "motion_variances.h"
 #ifndef TIED
 #include "reactions.h"
 #endif

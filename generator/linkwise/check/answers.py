@@ -100,7 +100,7 @@ def in_turn(subject: Subject) -> Iterator[BackendAnswers]:
 
 def _begun(subject: Subject, functions: CFunctions) -> Callable[[], list[Result]]:
     """Begin to call each function of the C, and return a call that waits for the results."""
-    expected = subject.reference, subject.regressors, subject.link_wrenches, subject.frames
+    expected = subject.reference, subject.regressors, subject.link_wrenches, subject.frames, subject.uncertain
     return begun(lambda: list(functions.check(f"c{subject.label}", *expected)), long_enough())
 
 

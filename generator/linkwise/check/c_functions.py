@@ -23,6 +23,16 @@ from linkwise.check.control_functions import (
 from linkwise.check.frame_checks import FrameReference
 from linkwise.check.model_calls import FLOAT32
 from linkwise.check.tied_functions import OF_TIES, tied_constants, tied_prototypes
+from linkwise.check.variance_functions import (
+    BY_BODIES,
+    BY_MOTION,
+    FACTOR,
+    VARIED,
+    Uncertain,
+    body_variances,
+    motion_calls,
+)
+from linkwise.check.variance_functions import OUTPUTS as UNCERTAIN
 from linkwise.errors import LinkwiseError
 from linkwise.oracle.reference import Reference, dense_quantities
 from linkwise.oracle.states import NUMBERS
@@ -50,11 +60,6 @@ REGRESSORS = {
 }
 """Functions of robots of rigid links alone whose results include zeros: quantities, and names in the
 header."""
-
-VARIANCES = "share_variances"
-"""Function that takes a covariance of what links carry beside the motion."""
-VARIED = {"c2": "Y c2", "c1": "Y c1", "g": "Y g", "tau": "Y"}
-"""Outputs of it, and the rows by which they lean on what links carry."""
 
 REACTIONS = {
     "reactions": (("acceleration", "velocity", "gravity"), ("acceleration", "velocity", "gravity")),
@@ -98,6 +103,7 @@ class CFunctions:
         regressors: Reference | None,
         wrenches: Reference | None,
         frames: FrameReference | None,
+        moved: Uncertain | None,
     ) -> Iterator[Result]:
         """Yield one result per function; `label` stands before its name.
 
@@ -115,8 +121,10 @@ class CFunctions:
             try:
                 if function.short in REGRESSORS:
                     calls = self._of_bodies(function, regressors)
-                elif function.short == VARIANCES:
-                    calls = self._variances(function, regressors)
+                elif function.short == BY_BODIES:
+                    calls = body_variances(self._call, function, self.rows, regressors, ROWS[:-1])
+                elif function.short == BY_MOTION:
+                    calls = motion_calls(self._call, function, self._width(function), self.rows, moved)
                 elif function.short in REACTIONS:
                     calls = self._of_bodies(function, wrenches)
                 elif function.short.endswith("partial_impedance"):
@@ -140,9 +148,7 @@ class CFunctions:
         if function.short in DENSE:
             yield from self._dense(function, reference, dense_quantities(reference))
             return
-        width = 1
-        if function.short.endswith("_blocks"):
-            width = self.compiled.constants["BLOCKF" if function.real == "float" else "BLOCK"]
+        width = self._width(function)
         results = sum(len(self.rows.of(what)) for what in function.outputs)
         most = max(MOST, NUMBERS // max(results, 1))
         for count in BLOCKS if width > 1 else ROWS:
@@ -151,6 +157,12 @@ class CFunctions:
             at = np.arange(count * width) * 3 % max(len(reference.states.q), 1)
             for shift in (0, 1):
                 yield from self._rows(function, reference, at, width, shift)
+
+    def _width(self, function: Prototype) -> int:
+        """Return the number of samples that a function takes at a time."""
+        if not function.short.endswith("_blocks"):
+            return 1
+        return self.compiled.constants["BLOCKF" if function.real == "float" else "BLOCK"]
 
     def _rows(
         self, function: Prototype, reference: Reference, at: Index, width: int, shift: int
@@ -185,30 +197,6 @@ class CFunctions:
         if reference is not None:
             expected = {what: (value, reference.scales[what]) for what, value in reference.values.items()}
             yield from self._dense(function, reference, expected)
-
-    def _variances(self, function: Prototype, reference: Reference | None) -> Iterator[Entries]:
-        """Yield variances, |F' Y|^2, for factors F that differ in every entry."""
-        if reference is None:
-            return
-        links = len(self.manifest.links)
-        factor = np.cos(np.arange(100.0 * links)).reshape(links, 10, 10)
-        states, sizes = reference.states, {what: len(self.rows.of(what)) for what in VARIED}
-        for count, shift in product(ROWS[:-1], (0, 1)):
-            at = np.arange(count) * 3 % max(len(states.q), 1)
-            given = dict(zip(("q", "qd", "qdd"), states.at(at).motion, strict=True)) | {"factor": factor}
-            asked = {what: count * size for what, size in sizes.items()}
-            found = self._call(function, count, given, asked, shift)
-            for what, rows in VARIED.items():
-                places = self.rows.of(what)
-                own, scale = (
-                    of[rows][(at[:, None], *places.T)] for of in (reference.values, reference.scales)
-                )
-                of_links = factor[places[:, 1]]
-                along = np.einsum("spa,par->spr", own, of_links)
-                most = np.einsum("spa,par->spr", scale, np.abs(of_links))
-                yield Entries(
-                    what, found[what].reshape(count, sizes[what]), (along**2).sum(-1), (most**2).sum(-1)
-                )
 
     def _link(self, function: Prototype, reference: Reference, link: int) -> Iterator[Entries]:
         own = {what: self.rows.of(what)[self.rows.of(what)[:, 1] == link] for what in function.outputs}
@@ -248,7 +236,7 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
         ("torque", "count", ("tau",)),
         ("position_gradient", "count", ("c0",)),
         *((name, "count", outputs) for name, (_, outputs) in (DENSE | rigid).items()),
-        *([(VARIANCES, "count", tuple(VARIED))] if rigid else []),
+        *([(BY_BODIES, "count", tuple(VARIED)), (BY_MOTION, "blocks", UNCERTAIN)] if rigid else []),
     ]
     for j in range(len(manifest.links)):
         own = tuple(what for what in every if j in rows.of(what)[:, 1])
@@ -269,8 +257,7 @@ def prototypes(manifest: Manifest, rows: IndexRows) -> list[Prototype]:
 
 def _inputs(name: str, every: tuple[str, ...]) -> tuple[str, ...]:
     """Return the arrays that a function reads: coefficients do not depend on qdd."""
-    told = ("factor",) if name == VARIANCES else ()
-    return (*(what for what in every if name not in AT_REST or what != "qdd"), *told)
+    return (*(what for what in every if name not in AT_REST or what != "qdd"), *FACTOR.get(name, ()))
 
 
 def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[CompiledPackage | None, Result]:

@@ -25,6 +25,7 @@ from linkwise.check.regressor_checks import regressor_reference
 from linkwise.check.simulated_terms import simulated_terms
 from linkwise.check.simulation_checks import SimulatedMotion, simulated_motion
 from linkwise.check.sum_checks import regular
+from linkwise.check.variance_functions import Uncertain, motion_reference
 from linkwise.oracle.energies import TextTerms, energy_reference, states_of_energies
 from linkwise.oracle.loop_reference import LoopReference, loop_reference
 from linkwise.oracle.magnitudes import Magnitudes
@@ -168,6 +169,13 @@ class Subject:
         if self.tree is None or self.tied:
             return None
         return link_reference(self.manifest, self.tree, self.rows.tau, self.reference.states)
+
+    @cached_property
+    def uncertain(self) -> Uncertain | None:
+        """Reference where the motion is uncertain; None for energies."""
+        if self.tree is None:
+            return None
+        return motion_reference(self.manifest, self.tree, self.reference.states)
 
     @cached_property
     def frames(self) -> FrameReference | None:

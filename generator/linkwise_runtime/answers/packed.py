@@ -167,6 +167,18 @@ class PackedBackend(Library):
         """
         return None
 
+    def motion_variances(
+        self, motion: Sequence[Numbers], roots: ArrayLike, names: Sequence[str]
+    ) -> Mapping[str, Numbers] | None:
+        """Return variances where q, qd and qdd (S, n) are uncertain, by name, (entries, S) each.
+
+        None where a back end has no more than the shares that are perturbed.
+
+        roots: D (S or 1, 3 n, R), with D D^T the covariance of q, qd and qdd, one after the other
+        names: which are wanted, of those that `certainty.motion_variances` lists
+        """
+        return None
+
     def product(self, a: Numbers, b: Numbers) -> Numbers:
         """Return the matrix products (..., l, n) of arrays (..., l, m) and (..., m, n)."""
         return a @ b

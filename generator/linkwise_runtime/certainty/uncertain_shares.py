@@ -1,15 +1,17 @@
 """Standard deviations of shares, their sums and powers, by uncertain bodies and by uncertain motion."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from ..answers.packed import PackedTables
 from ..chosen_names import short
 from ..interface import side_by_side
 from ..share_uncertainty import Uncertainty
 from .divided_differences import Direction, variances
+from .motion_variances import VARIANCES
 from .parameter_moments import ROUNDING, Floats
 from .product_moments import Product, ProductMoments
 from .share_variances import root, share_variances
@@ -19,6 +21,8 @@ SHARES = ("c2", "c1", "gravity", "torque", "joint_torque", "joint_c2", "joint_c1
 BASES = (*SHARES, "qd", "qdd")
 """Shares and motion, of which products are made."""
 C2, C1, _, TAU, WHOLE, JOINT_C2, JOINT_C1, _, QD, QDD = range(len(BASES))
+FIELDS = {"c2": "acceleration", "gravity": "gravity", "torque": "torque", "power": "torque"}
+"""Fields of `Layout` in whose order packed variances are, of those that are not in that of velocities."""
 BY_PRODUCT = ("acceleration", "velocity", "joint_acceleration", "joint_velocity", "power", "joint_power")
 PRODUCTS = (
     Product(lambda a: a[C2], lambda a: a[QDD][:, None, None, :]),
@@ -38,26 +42,61 @@ def uncertainty(robot: Any, q: object, qd: object, qdd: object, bodies: object, 
     backend.answers.check_regresses()
     batch = tuple(read[0].shape[:-1])
     flat = [a.reshape(math.prod(batch), a.shape[-1]) for a in read]
-    here = _shares(robot, flat)
-    moments = ProductMoments(PRODUCTS, here)
-    found = [abs(0.0 * a) for a in here]
+    causes, found = flat[1:], dict[str, Any]()
+    spreads = [0.0 * a for a in causes]
     if motion is not None:
         roots = motion_roots(motion, batch, read[0].shape[-1])
-        found = variances(here, _directions(robot, flat, roots), moments.add)
+        found, spreads = _by_motion(robot, backend, flat, roots)
     if bodies is not None:
-        for number, borne in enumerate(_by_bodies(backend, flat, bodies)):
-            found[number] = found[number] + borne
-    by_name = dict(zip((*BASES, *BY_PRODUCT), [*found, *moments.variances(found)], strict=True))
-    deviations = (root(backend.xp, by_name[name]) for name in Uncertainty._fields)
+        borne = _by_bodies(backend, flat, bodies)
+        every = [a**2 + b for a, b in zip(causes, spreads, strict=True)]
+        borne |= zip(BY_PRODUCT, (first * part for first, part in _pairs(borne, every)), strict=True)
+        found = {name: found[name] + one if name in found else one for name, one in borne.items()}
+    deviations = (root(backend.xp, found[name]) for name in Uncertainty._fields)
     return Uncertainty(*(side_by_side(a.reshape(*batch, *a.shape[1:])) for a in deviations))
 
 
-def _by_bodies(backend: Any, flat: Sequence[Any], bodies: object) -> Sequence[Any]:
-    """Return the variances by bodies of the shares, in the order of `SHARES`."""
+def _pairs(shares: Mapping[str, Any], causes: Sequence[Any]) -> Iterator[tuple[Any, Any]]:
+    """Yield the factors of each product, in the order of `BY_PRODUCT`; causes: something of qd and of qdd."""
+    every = [shares[name] for name in SHARES] + list(causes)
+    yield from ((product.first(every), product.second(every)) for product in PRODUCTS)
+
+
+def _by_motion(
+    robot: Any, backend: Any, flat: Sequence[Any], roots: Floats
+) -> tuple[dict[str, Any], list[Any]]:
+    """Return variances by motion, by the names of shares and products, and those of qd and qdd."""
+    n = flat[0].shape[-1]
+    sizes = [(roots[:, at : at + n] ** 2).sum(-1) for at in (n, 2 * n)]
+    spreads = [backend.constant(a, flat[0]) + 0.0 * b for a, b in zip(sizes, flat[1:], strict=True)]
+    known = backend.motion_variances(flat, roots, VARIANCES)
+    if known is not None:
+        return _spread(backend, known), spreads
+    here = _shares(robot, flat)
+    moments = ProductMoments(PRODUCTS, here)
+    found = variances(here, _directions(robot, flat, roots), moments.add)
+    return dict(zip((*BASES, *BY_PRODUCT), [*found, *moments.variances(found)], strict=True)), spreads
+
+
+def _spread(backend: Any, known: Mapping[str, Any]) -> dict[str, Any]:
+    """Return variances (S, ...) with their zeros from packed ones with the samples last."""
+    tables, n, found = PackedTables(backend), backend.structure.n, {}
+    for name, rows in known.items():
+        values, share = np.ascontiguousarray(rows.T), name.removeprefix("joint_")
+        field = FIELDS.get(share, "velocity")
+        if share == name:
+            found[name] = tables.spread(values, field)
+        else:
+            found[name] = values if field in ("gravity", "torque") else values.reshape(-1, n, n)
+    return found
+
+
+def _by_bodies(backend: Any, flat: Sequence[Any], bodies: object) -> dict[str, Any]:
+    """Return the variances by bodies of the shares."""
     at = share_variances(backend, bodies)
     found = at.packed(flat)
     fields = ("acceleration", "velocity", "gravity", "torque")
-    return [*map(at.spread, found[:4], fields), *found[4:]]
+    return dict(zip(SHARES, [*map(at.spread, found[:4], fields), *found[4:]], strict=True))
 
 
 def _shares(robot: Any, motion: Sequence[Any]) -> list[Any]:

@@ -27,6 +27,7 @@ from .compiled_calls import QuickCalls
 from .constraints import NativeTies, has_functions
 from .control import ControlCalls, NativeTorque
 from .memory import NumberArray, NumberType, memory
+from .motion_variances import motion_variances
 from .motions import NativeMotions
 
 if TYPE_CHECKING:
@@ -233,6 +234,12 @@ class NativeBackend(NumpyBackend):
         motion = cast(Arrays, (q, qd, qdd))
         told = np.ascontiguousarray(factors, motion[0].dtype)
         return self.calls.run(SHARE_VARIANCES, motion, told=[told])
+
+    def motion_variances(
+        self, motion: Sequence[Numbers], roots: ArrayLike, names: Sequence[str]
+    ) -> Mapping[str, Numbers] | None:
+        """Return variances by uncertain motion by name, (entries, S) each."""
+        return motion_variances(self.calls, cast(Arrays, motion), np.asarray(roots), names)
 
     def _run(self, call: str, *motion: Numbers) -> Arrays:
         return self.calls.run(call, cast(Arrays, motion))

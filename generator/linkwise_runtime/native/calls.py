@@ -156,8 +156,8 @@ class NativeCalls:
         sizes = self.sizes[call]
         # A robot may lack entries of some kind; its functions then take no array for them.
         written = into if self._complete[call] else [a for a, size in zip(into, sizes, strict=True) if size]
-        parts = min(self.threads, count * self._widths[call] * kind.itemsize // PER_THREAD)
-        if parts <= 1:
+        parts = self.parts(count * self._widths[call] * kind.itemsize)
+        if parts == 1:
             compute(count, *[place(a) for a in read], *[place(a) for a in written])
             return into
         width = kind.itemsize
@@ -166,7 +166,7 @@ class NativeCalls:
             *((address(a), 0) for a in read[len(motion) :]),
             *((address(a), size * width) for a, size in zip(written, filter(None, sizes), strict=True)),
         ]
-        self._share(compute, count, arrays, parts, (read, into))
+        self.share(compute, count, arrays, parts, (read, into))
         return into
 
     def _one_sample(self, key: tuple[str, NumberType]) -> OneSampleCall:
@@ -194,7 +194,11 @@ class NativeCalls:
         found = self._functions[call, kind] = function(self.sources, FUNCTIONS[call], kind.str[1:], arrays)
         return found
 
-    def _share(
+    def parts(self, size: int) -> int:
+        """Return the number of threads that results of so many bytes are worth."""
+        return max(1, min(self.threads, size // PER_THREAD))
+
+    def share(
         self,
         compute: "CFunction",
         count: int,

@@ -100,9 +100,8 @@ def _library_of(call: str) -> str:
         return "control"
     if call.endswith("position_gradient"):
         return "gradient"
-    return (
-        "regressors" if "regressor" in call or call in ("reactions", "share_variances") else "decomposition"
-    )
+    own = "regressor" in call or "variances" in call or call == "reactions"
+    return "regressors" if own else "decomposition"
 
 
 def start_of(function: "CFunction") -> int:

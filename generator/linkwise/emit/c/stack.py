@@ -93,7 +93,15 @@ def loops_stack(system: RigidSystem) -> int:
         6 * (frames + 1) + square + cubes,
     )
     blocks = VALUE * (moved + wrenches + values) + 8 * _numbers(system) + OWN
-    return max(blocks, control_stack(system, ()))
+    return max(blocks, _varied_stack(system), control_stack(system, ()))
+
+
+def _varied_stack(system: System) -> int:
+    """Return the bytes that variances by motion take: a block that is ahead, and one that is behind."""
+    if not isinstance(system, RigidSystem):
+        return 0
+    values = 2 * (_moved(system) + 18 * _longest(system) + 34) + 5 * len(system.coordinates)
+    return VALUE * values + 8 * _numbers(system) + OWN
 
 
 def control_stack(system: System, links: tuple[Span, ...]) -> int:
@@ -138,7 +146,7 @@ def straight_stack(system: System, links: tuple[Span, ...]) -> int:
     largest = max(map(waiting.of, whole_robot.arrays))
     values = max(waiting.total * blocks + max(cubes, largest), max(link.size.c1 for link in links) + cubes)
     stack = VALUE * (5 * n * blocks + values) + OWN
-    return max(stack, control_stack(system, links))
+    return max(stack, _varied_stack(system), control_stack(system, links))
 
 
 def too_large_for_loops(system: System) -> str:
