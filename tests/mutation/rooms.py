@@ -38,6 +38,7 @@ C = (
     "tests/emit/test_control_c.py",
     "tests/emit/test_emitted_c.py",
     "tests/emit/test_loops.py",
+    "tests/emit/test_sines.py",
     "tests/runtime/test_native.py",
     "tests/emit/test_impedance_c.py",
     "tests/runtime/test_passive_torque.py",

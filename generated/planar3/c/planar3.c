@@ -250,6 +250,34 @@ static void links_1_to_3(size_t blocks, const struct inputs *m, const struct res
         link_3_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].c2 + 4 * W, r[t].c1 + 5 * W, r[t].g + 3 * W, r[t].tau + 3 * W);
 }
 
+/* The same past the cache, to where lines of it start: each link's go as soon as they are known, and memory is written while
+   the next ones are computed. */
+static void links_1_to_3_past(size_t blocks, const struct inputs *m, const struct results *r)
+{
+    ALIGNED real c2[6 * BLOCK], c1[9 * BLOCK], g[3 * BLOCK], tau[3 * BLOCK];
+    for (size_t t = 0; t < blocks; ++t) {
+        link_1_decomposition_block(m[t].qdd, m[t].cosine, c2, c1, g, tau);
+        stream(1 * BLOCK, c2, r[t].c2);
+        stream(1 * BLOCK, c1, r[t].c1);
+        stream(1 * BLOCK, g, r[t].g);
+        stream(1 * BLOCK, tau, r[t].tau);
+    }
+    for (size_t t = 0; t < blocks; ++t) {
+        link_2_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c2, c1, g, tau);
+        stream(3 * BLOCK, c2, r[t].c2 + 1 * W);
+        stream(4 * BLOCK, c1, r[t].c1 + 1 * W);
+        stream(2 * BLOCK, g, r[t].g + 1 * W);
+        stream(2 * BLOCK, tau, r[t].tau + 1 * W);
+    }
+    for (size_t t = 0; t < blocks; ++t) {
+        link_3_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c2, c1, g, tau);
+        stream(6 * BLOCK, c2, r[t].c2 + 4 * W);
+        stream(9 * BLOCK, c1, r[t].c1 + 5 * W);
+        stream(3 * BLOCK, g, r[t].g + 3 * W);
+        stream(3 * BLOCK, tau, r[t].tau + 3 * W);
+    }
+}
+
 /* Torques of these links alone. */
 static void links_1_to_3_torque(size_t blocks, const struct inputs *m, const struct results *r)
 {
@@ -274,7 +302,7 @@ void API(decomposition)(size_t count, const real *q, const real *qd, const real 
     struct waiting room;
     let_wait(&room, r);
     ALIGNED real scratch[14 * BLOCK];
-    const int large = count > LARGE / (36 * sizeof(real));
+    const int large = past_cache(count, 36);
     for (size_t s = 0; s < count; s += TILE * BLOCK) {
         const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
         links_1_to_3(blocks, m, r);
@@ -299,7 +327,7 @@ void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, con
     struct results r[TILE];
     struct waiting room;
     let_wait(&room, r);
-    const int large = blocks * BLOCK > LARGE / (36 * sizeof(real));
+    const int large = past_cache(blocks * BLOCK, 36), lines = large && starts_line(c2) && starts_line(c1) && starts_line(g) && starts_line(tau);
     for (size_t s = 0; s < blocks; s += TILE) {
         const size_t here = blocks_of((blocks - s) * BLOCK);
         for (size_t t = 0; t < here; ++t) {
@@ -318,8 +346,11 @@ void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, con
             };
             places[t] = there;
         }
-        links_1_to_3(here, m, large ? r : places);
-        for (size_t t = 0; large && t < here; ++t) {
+        if (lines)
+            links_1_to_3_past(here, m, places);
+        else
+            links_1_to_3(here, m, large ? r : places);
+        for (size_t t = 0; large && !lines && t < here; ++t) {
             const size_t at = s + t;
             stream(10 * BLOCK, r[t].c2, c2 + at * C2 * BLOCK);
             stream(14 * BLOCK, r[t].c1, c1 + at * C1 * BLOCK);
@@ -380,7 +411,7 @@ static void dense_rows(size_t count, const real *q, const real *qd, const real *
     struct waiting room;
     let_wait(&room, r);
     struct waiting_cubes wait;
-    begin_cubes(&wait, count, (2 * CUBE + SQUARE) * sizeof(real));
+    begin_cubes(&wait, count, 2 * CUBE + SQUARE);
     for (size_t s = 0; s < count; s += TILE * BLOCK) {
         const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
         clear(tile_of(count - s) * SQUARE, to->gravity + s * SQUARE);

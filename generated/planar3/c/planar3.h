@@ -6,7 +6,7 @@
    and link with -lm. The functions of planar3f.c end in f. The files are C99 and C++17 alike; as C++:
        c++ -x c++ -std=c++17 -O2 -ftree-vectorize -fno-tree-slp-vectorize -ffp-contract=fast -march=native -mprefer-vector-width=512 -c planar3.c
    On ARM, write -mcpu=native in place of -march=native -mprefer-vector-width=512.
-   As C, with gcc and glibc, sines are the fastest (see linkwise/sines.h).
+   Large batches in blocks are the fastest where c2, c1, g and tau each start on a cache line, as aligned_alloc(64, ...) gives them.
 
        tau(i, j) = sum over k of c2(i, j, k) qdd_k  +  sum over k of c1(i, j, k) qd_k  +  g(i, j)
 

@@ -304,6 +304,55 @@ static void links_1_to_6(size_t blocks, const struct inputs *m, const struct res
         link_6_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].c2 + 35 * W, r[t].c1 + 55 * W, r[t].g + 15 * W, r[t].tau + 15 * W);
 }
 
+/* The same past the cache, to where lines of it start: each link's go as soon as they are known, and memory is written while
+   the next ones are computed. */
+static void links_1_to_6_past(size_t blocks, const struct inputs *m, const struct results *r)
+{
+    ALIGNED real c2[21 * BLOCK], c1[36 * BLOCK], g[6 * BLOCK], tau[6 * BLOCK];
+    for (size_t t = 0; t < blocks; ++t) {
+        link_1_decomposition_block(m[t].qdd, c2, c1, g, tau);
+        stream(1 * BLOCK, c2, r[t].c2);
+        stream(1 * BLOCK, c1, r[t].c1);
+        stream(1 * BLOCK, g, r[t].g);
+        stream(1 * BLOCK, tau, r[t].tau);
+    }
+    for (size_t t = 0; t < blocks; ++t) {
+        link_2_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c2, c1, g, tau);
+        stream(3 * BLOCK, c2, r[t].c2 + 1 * W);
+        stream(4 * BLOCK, c1, r[t].c1 + 1 * W);
+        stream(2 * BLOCK, g, r[t].g + 1 * W);
+        stream(2 * BLOCK, tau, r[t].tau + 1 * W);
+    }
+    for (size_t t = 0; t < blocks; ++t) {
+        link_3_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c2, c1, g, tau);
+        stream(6 * BLOCK, c2, r[t].c2 + 4 * W);
+        stream(9 * BLOCK, c1, r[t].c1 + 5 * W);
+        stream(3 * BLOCK, g, r[t].g + 3 * W);
+        stream(3 * BLOCK, tau, r[t].tau + 3 * W);
+    }
+    for (size_t t = 0; t < blocks; ++t) {
+        link_4_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c2, c1, g, tau);
+        stream(10 * BLOCK, c2, r[t].c2 + 10 * W);
+        stream(16 * BLOCK, c1, r[t].c1 + 14 * W);
+        stream(4 * BLOCK, g, r[t].g + 6 * W);
+        stream(4 * BLOCK, tau, r[t].tau + 6 * W);
+    }
+    for (size_t t = 0; t < blocks; ++t) {
+        link_5_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c2, c1, g, tau);
+        stream(15 * BLOCK, c2, r[t].c2 + 20 * W);
+        stream(25 * BLOCK, c1, r[t].c1 + 30 * W);
+        stream(5 * BLOCK, g, r[t].g + 10 * W);
+        stream(5 * BLOCK, tau, r[t].tau + 10 * W);
+    }
+    for (size_t t = 0; t < blocks; ++t) {
+        link_6_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c2, c1, g, tau);
+        stream(21 * BLOCK, c2, r[t].c2 + 35 * W);
+        stream(36 * BLOCK, c1, r[t].c1 + 55 * W);
+        stream(6 * BLOCK, g, r[t].g + 15 * W);
+        stream(6 * BLOCK, tau, r[t].tau + 15 * W);
+    }
+}
+
 /* Torques of these links alone. */
 static void links_1_to_6_torque(size_t blocks, const struct inputs *m, const struct results *r)
 {
@@ -334,7 +383,7 @@ void API(decomposition)(size_t count, const real *q, const real *qd, const real 
     struct waiting room;
     let_wait(&room, r);
     ALIGNED real scratch[91 * BLOCK];
-    const int large = count > LARGE / (189 * sizeof(real));
+    const int large = past_cache(count, 189);
     for (size_t s = 0; s < count; s += TILE * BLOCK) {
         const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
         links_1_to_6(blocks, m, r);
@@ -359,7 +408,7 @@ void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, con
     struct results r[TILE];
     struct waiting room;
     let_wait(&room, r);
-    const int large = blocks * BLOCK > LARGE / (189 * sizeof(real));
+    const int large = past_cache(blocks * BLOCK, 189), lines = large && starts_line(c2) && starts_line(c1) && starts_line(g) && starts_line(tau);
     for (size_t s = 0; s < blocks; s += TILE) {
         const size_t here = blocks_of((blocks - s) * BLOCK);
         for (size_t t = 0; t < here; ++t) {
@@ -378,8 +427,11 @@ void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, con
             };
             places[t] = there;
         }
-        links_1_to_6(here, m, large ? r : places);
-        for (size_t t = 0; large && t < here; ++t) {
+        if (lines)
+            links_1_to_6_past(here, m, places);
+        else
+            links_1_to_6(here, m, large ? r : places);
+        for (size_t t = 0; large && !lines && t < here; ++t) {
             const size_t at = s + t;
             stream(56 * BLOCK, r[t].c2, c2 + at * C2 * BLOCK);
             stream(91 * BLOCK, r[t].c1, c1 + at * C1 * BLOCK);
@@ -440,7 +492,7 @@ static void dense_rows(size_t count, const real *q, const real *qd, const real *
     struct waiting room;
     let_wait(&room, r);
     struct waiting_cubes wait;
-    begin_cubes(&wait, count, (2 * CUBE + SQUARE) * sizeof(real));
+    begin_cubes(&wait, count, 2 * CUBE + SQUARE);
     for (size_t s = 0; s < count; s += TILE * BLOCK) {
         const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
         clear(tile_of(count - s) * SQUARE, to->gravity + s * SQUARE);

@@ -286,6 +286,48 @@ static void links_1_to_5(size_t blocks, const struct inputs *m, const struct res
         link_5_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, r[t].c2 + 41 * W, r[t].c1 + 66 * W, r[t].g + 16 * W, r[t].tau + 16 * W);
 }
 
+/* The same past the cache, to where lines of it start: each link's go as soon as they are known, and memory is written while
+   the next ones are computed. */
+static void links_1_to_5_past(size_t blocks, const struct inputs *m, const struct results *r)
+{
+    ALIGNED real c2[15 * BLOCK], c1[25 * BLOCK], g[5 * BLOCK], tau[5 * BLOCK];
+    for (size_t t = 0; t < blocks; ++t) {
+        link_1_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c2, c1, g, tau);
+        stream(6 * BLOCK, c2, r[t].c2);
+        stream(9 * BLOCK, c1, r[t].c1);
+        stream(3 * BLOCK, g, r[t].g);
+        stream(3 * BLOCK, tau, r[t].tau);
+    }
+    for (size_t t = 0; t < blocks; ++t) {
+        link_2_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c2, c1, g, tau);
+        stream(10 * BLOCK, c2, r[t].c2 + 6 * W);
+        stream(16 * BLOCK, c1, r[t].c1 + 9 * W);
+        stream(4 * BLOCK, g, r[t].g + 3 * W);
+        stream(4 * BLOCK, tau, r[t].tau + 3 * W);
+    }
+    for (size_t t = 0; t < blocks; ++t) {
+        link_3_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c2, c1, g, tau);
+        stream(15 * BLOCK, c2, r[t].c2 + 16 * W);
+        stream(25 * BLOCK, c1, r[t].c1 + 25 * W);
+        stream(5 * BLOCK, g, r[t].g + 7 * W);
+        stream(5 * BLOCK, tau, r[t].tau + 7 * W);
+    }
+    for (size_t t = 0; t < blocks; ++t) {
+        link_4_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c2, c1, g, tau);
+        stream(10 * BLOCK, c2, r[t].c2 + 31 * W);
+        stream(16 * BLOCK, c1, r[t].c1 + 50 * W);
+        stream(4 * BLOCK, g, r[t].g + 12 * W);
+        stream(4 * BLOCK, tau, r[t].tau + 12 * W);
+    }
+    for (size_t t = 0; t < blocks; ++t) {
+        link_5_decomposition_block(m[t].qd, m[t].qdd, m[t].sine, m[t].cosine, c2, c1, g, tau);
+        stream(15 * BLOCK, c2, r[t].c2 + 41 * W);
+        stream(25 * BLOCK, c1, r[t].c1 + 66 * W);
+        stream(5 * BLOCK, g, r[t].g + 16 * W);
+        stream(5 * BLOCK, tau, r[t].tau + 16 * W);
+    }
+}
+
 /* Torques of these links alone. */
 static void links_1_to_5_torque(size_t blocks, const struct inputs *m, const struct results *r)
 {
@@ -314,7 +356,7 @@ void API(decomposition)(size_t count, const real *q, const real *qd, const real 
     struct waiting room;
     let_wait(&room, r);
     ALIGNED real scratch[91 * BLOCK];
-    const int large = count > LARGE / (189 * sizeof(real));
+    const int large = past_cache(count, 189);
     for (size_t s = 0; s < count; s += TILE * BLOCK) {
         const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
         links_1_to_5(blocks, m, r);
@@ -339,7 +381,7 @@ void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, con
     struct results r[TILE];
     struct waiting room;
     let_wait(&room, r);
-    const int large = blocks * BLOCK > LARGE / (189 * sizeof(real));
+    const int large = past_cache(blocks * BLOCK, 189), lines = large && starts_line(c2) && starts_line(c1) && starts_line(g) && starts_line(tau);
     for (size_t s = 0; s < blocks; s += TILE) {
         const size_t here = blocks_of((blocks - s) * BLOCK);
         for (size_t t = 0; t < here; ++t) {
@@ -358,8 +400,11 @@ void API(decomposition_blocks)(size_t blocks, const real *q, const real *qd, con
             };
             places[t] = there;
         }
-        links_1_to_5(here, m, large ? r : places);
-        for (size_t t = 0; large && t < here; ++t) {
+        if (lines)
+            links_1_to_5_past(here, m, places);
+        else
+            links_1_to_5(here, m, large ? r : places);
+        for (size_t t = 0; large && !lines && t < here; ++t) {
             const size_t at = s + t;
             stream(56 * BLOCK, r[t].c2, c2 + at * C2 * BLOCK);
             stream(91 * BLOCK, r[t].c1, c1 + at * C1 * BLOCK);
@@ -420,7 +465,7 @@ static void dense_rows(size_t count, const real *q, const real *qd, const real *
     struct waiting room;
     let_wait(&room, r);
     struct waiting_cubes wait;
-    begin_cubes(&wait, count, (2 * CUBE + SQUARE) * sizeof(real));
+    begin_cubes(&wait, count, 2 * CUBE + SQUARE);
     for (size_t s = 0; s < count; s += TILE * BLOCK) {
         const size_t blocks = load(count - s, q + s * N, qd + s * N, qdd + s * N, x, m);
         clear(tile_of(count - s) * SQUARE, to->gravity + s * SQUARE);

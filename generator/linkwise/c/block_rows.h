@@ -1,14 +1,15 @@
 /* Rows of a link's c2 and c1 in a block of samples. The same in every package of linkwise. It needs blocks.h and stream.h.
 
-   They are most of what a long chain costs: 6 fused operations for each value. So one row is made at a time, coordinate i's
-   motion in registers and the wrenches read from the first-level cache, for as many samples as fill the cache line that the
-   value takes: lines are written whole, one after another, be it past the cache or to memory that was fetched meanwhile. */
+   They are most of what a long chain costs: 6 fused operations for each value. So one row is made at a time, or two where
+   there are registers for it, coordinate i's motion in registers and the wrenches read from the first-level cache, for as many
+   samples as fill the cache line that the value takes: lines are written whole, one after another, be it past the cache or to
+   memory that was fetched meanwhile. */
 
 /* Parts of a block that are worked on together: the motion in both takes 12 of 16 registers. */
 enum { TOGETHER = BLOCK_PARTS > 1 ? 2 : 1 };
 
-/* Lines from here to what is fetched to be written. */
-enum { SOON = 64 };
+/* Lines from here to what is fetched to be written: more push others out of the first-level cache. */
+enum { SOON = 16 };
 
 /* Whether a block's lanes may go past the cache from here on, and on their way. */
 static inline int may_pass(const real *at)
@@ -54,10 +55,36 @@ INLINE void row_of(const wrenches *w, int second, int i, int length, int past, r
     }
 }
 
+/* Rows i and i + 1, not past the cache, of a block that is one vector: each wrench is read once for both. */
+INLINE void two_rows_of(const wrenches *w, int second, int i, int length, real *to)
+{
+    const screw *f = second ? w->c2 : w->c1;
+    const screw moves = w->moves[i], next = w->moves[i + 1];
+    real *at = to, *below = to + (second ? length - i : length) * BLOCK;
+    if (second) {
+        PUT(at, along(&moves, &f[i]));
+        at += BLOCK;
+    }
+    for (int k = second ? i + 1 : 0; k < length; ++k) {
+        const screw wrench = f[k];
+        WRITTEN_SOON(at + SOON * BLOCK);
+        WRITTEN_SOON(below + SOON * BLOCK);
+        PUT(at, along(&moves, &wrench));
+        PUT(below, along(&next, &wrench));
+        at += BLOCK;
+        below += BLOCK;
+    }
+}
+
 /* All rows. */
 INLINE void rows_of(const wrenches *w, int second, int length, int past, real *to)
 {
-    for (int i = 0; i < length; ++i) {
+    int i = 0;
+    for (; BLOCK_PARTS == 1 && !past && i + 1 < length; i += 2) {
+        two_rows_of(w, second, i, length, to);
+        to += (second ? 2 * (length - i) - 1 : 2 * length) * BLOCK;
+    }
+    for (; i < length; ++i) {
         row_of(w, second, i, length, past, to);
         to += (second ? length - i : length) * BLOCK;
     }

@@ -76,8 +76,7 @@ void API(decomposition_blocks)(size_t blocks, INPUTS, real *c2, real *c1, real *
         return;
     NUMBERS(x);
     ALIGNED motion m[BLOCK_PARTS];
-    const size_t most = LARGE / ((C2 + C1 + 2 * G) * sizeof(real) * BLOCK);
-    const int large = blocks > most && may_pass(c2) && may_pass(c1);
+    const int large = past_cache(blocks * BLOCK, C2 + C1 + 2 * G) && may_pass(c2) && may_pass(c1);
     for (size_t s = 0; s < blocks * BLOCK; s += BLOCK) {
         moved_block(x, q + s * N, qd + s * N, qdd + s * N, m);
         for (int j = 0; j < LINKS; ++j) {

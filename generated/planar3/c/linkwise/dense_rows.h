@@ -18,12 +18,12 @@ struct waiting_cubes {
 };
 
 /* Zeros stay where no link has values, as long as all links come at once. Coefficients are theirs times one. */
-static inline void begin_cubes(struct waiting_cubes *wait, size_t count, size_t bytes)
+static inline void begin_cubes(struct waiting_cubes *wait, size_t count, size_t values)
 {
     clear(CUBES * BLOCK, wait->block);
     for (int e = 0; e < N * BLOCK; ++e)
         wait->ones[e] = 1;
-    wait->large = WHOLE && count > LARGE / bytes;
+    wait->large = WHOLE && past_cache(count, values);
 }
 
 /* c of link j, as `place` takes it, into cubes, which are in rows. Returns where the next link's begin. */

@@ -6,9 +6,9 @@ struct waiting_cubes {
     real ones[N];
 };
 
-static inline void begin_cubes(struct waiting_cubes *wait, size_t count, size_t bytes)
+static inline void begin_cubes(struct waiting_cubes *wait, size_t count, size_t values)
 {
-    (void)count, (void)bytes;
+    (void)count, (void)values;
     for (int k = 0; k < N; ++k)
         wait->ones[k] = 1;
 }

@@ -28,14 +28,7 @@ static inline void moved_one(const struct numbers *x, const real *q, const real 
     real angle[FRAMES], sine[FRAMES], cosine[FRAMES];
     DISPLACED(1, q);
     angles(x, 1, moved, angle);
-#ifdef VECTOR_SINES /* They are off by a few roundings more, which solving with an ill-conditioned M multiplies. */
-    for (int f = 0; f < FRAMES; ++f) {
-        sine[f] = F(sin)(angle[f]);
-        cosine[f] = F(cos)(angle[f]);
-    }
-#else
     API(sines)(FRAMES, angle, sine, cosine);
-#endif
     base_one(m);
     for (int f = 1; f <= FRAMES; ++f) {
         const int k = joints[f - 1].coordinate;

@@ -28,7 +28,7 @@ static void reactions_of_rows(size_t count, INPUTS, real *acceleration, real *ve
     ALIGNED motion m[BLOCK_PARTS];
     ALIGNED real c2[WAITING_ROOM * BLOCK], c1[WAITING_ROOM * BLOCK], g[WEIGHTS * BLOCK];
     ALIGNED real scratch[WHOLE_ROW ? (ROW > WEIGHTS ? ROW : WEIGHTS) * BLOCK : 1];
-    const int large = WHOLE_ROW && count > LARGE / ((2 * ROW + WEIGHTS) * sizeof(real));
+    const int large = WHOLE_ROW && past_cache(count, 2 * ROW + WEIGHTS);
     for (size_t s = 0; s < count; s += BLOCK) {
         const size_t samples = count - s < BLOCK ? count - s : BLOCK;
         size_t first = 0, waiting = 0;

@@ -29,6 +29,22 @@
 #define STREAM_END() __builtin_ia32_sfence()
 #endif
 
+/* Whether the results of so many samples, of so many values each, go past the cache. */
+static inline int past_cache(size_t samples, size_t values)
+{
+#if defined(STREAM)
+    return samples > LARGE / (values * sizeof(real));
+#else
+    return (void)samples, (void)values, 0;
+#endif
+}
+
+/* Whether a cache line starts here. */
+static inline int starts_line(const real *at)
+{
+    return (size_t)at % 64 == 0;
+}
+
 #if defined(STREAM)
 typedef long long stream_vector __attribute__((vector_size(STREAM_BYTES), may_alias));
 typedef long long stream_vector_anywhere __attribute__((vector_size(STREAM_BYTES), aligned(sizeof(real)), may_alias));

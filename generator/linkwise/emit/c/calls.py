@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from linkwise.emit.c.form_function import CFormFunction
 from linkwise.emit.c.prototypes import NUMBERS, pointers
-from linkwise.emit.c.sizes import EntryCounts, Span, whole
+from linkwise.emit.c.sizes import EntryCounts, Span, most_counts, whole
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,14 @@ class Moves:
 
 
 @dataclass(frozen=True)
+class PastCache:
+    """Call of a link's function into arrays of its own, and calls that write these past the cache."""
+
+    decomposition: str
+    streams: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class LinkCalls:
     """Calls of one link's functions for one sample, and for the position gradient of a block.
 
@@ -63,13 +71,15 @@ class GroupCalls:
     """Functions of a group of links for a tile of blocks: name and statements, and how results leave.
 
     `unread` stands before those that read no motion; `places` puts results into every array of the robot, for
-    block `at`.
+    block `at`; `past` has the links one by one, and `room` the arrays that hold results of any of them.
     """
 
     what: str
     name: str
     unread: tuple[str, ...]
     decomposition: tuple[str, ...]
+    past: tuple[PastCache, ...]
+    room: tuple[tuple[str, int], ...]
     moves: tuple[Moves, ...]
     places: tuple[str, ...]
     unread_torque: tuple[str, ...]
@@ -110,7 +120,7 @@ def group_calls(
     links: Sequence[Span], functions: Sequence[LinkFormFunctions], arrays: Sequence[str]
 ) -> GroupCalls:
     """Return the calls of the functions of `links`; `arrays` are those of the robot."""
-    group = whole(links)
+    group, most = whole(links), most_counts([link.size for link in links])
     into = {array: f"r[t].{array}" for array in arrays}
     mine = [(functions[link.first - 1], link.start - group.start) for link in links]
     one = group.first == group.last
@@ -121,6 +131,8 @@ def group_calls(
         f"link_{group.first}" if one else f"links_{group.first}_to_{group.last}",
         unread(decomposition),
         decomposition,
+        tuple(_past_cache(functions[link.first - 1], link, group) for link in links),
+        tuple((array, most.of(array)) for array in most.arrays),
         tuple(_moves(array, group) for array in group.size.arrays),
         tuple(_moves(array, group).place for array in arrays),
         unread(torque),
@@ -168,6 +180,16 @@ def _moves(array: str, links: Span) -> Moves:
         f"stream({count} * BLOCK, {waiting}, {place})",
         place,
     )
+
+
+def _past_cache(functions: LinkFormFunctions, link: Span, group: Span) -> PastCache:
+    start, arrays = link.start - group.start, link.size.arrays
+    streams = (
+        f"stream({link.size.of(array)} * BLOCK, {array}, {_at(f'r[t].{array}', start.of(array))})"
+        for array in arrays
+    )
+    own = {array: array for array in arrays}
+    return PastCache(call(functions.decomposition, "block", "m[t].", own), tuple(streams))
 
 
 def _counted_from_0(links: Span) -> str:

@@ -56,6 +56,7 @@ def robot_view(
         "room_of_one": [(array, one.of(array)) for array in arrays],
         "results_of_one": ", ".join(arrays),
         "waiting": ", ".join(f"room->{array}[t]" for array in arrays),
+        "lines": " && ".join(f"starts_line({array})" for array in arrays),
         "streams": len(parts) == 1,
         "slopes": "r->h1" if robot.size.h1 else "NULL",
         "largest": max(waiting.of(array) for array in arrays),

@@ -144,7 +144,8 @@ def straight_stack(system: System, links: tuple[Span, ...]) -> int:
     blocks, whole_robot = tile(waiting), whole(links).size
     cubes = _cubes(n, len(links), _longest(system))
     largest = max(map(waiting.of, whole_robot.arrays))
-    values = max(waiting.total * blocks + max(cubes, largest), max(link.size.c1 for link in links) + cubes)
+    beside = max(cubes, largest, most_counts([link.size for link in links]).total)
+    values = max(waiting.total * blocks + beside, max(link.size.c1 for link in links) + cubes)
     stack = VALUE * (5 * n * blocks + values) + OWN
     return max(stack, _varied_stack(system), control_stack(system, links))
 
