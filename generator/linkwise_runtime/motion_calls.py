@@ -31,7 +31,7 @@ class MotionCalls(RobotCalls):
 
         Raises ValueError for a robot without any, links given by energies without constraints included.
         """
-        return constraints_of(self, None, (), None, None)
+        return constraints_of(self, None, (), None, None, None)
 
     def constrained(
         self,
@@ -39,6 +39,7 @@ class MotionCalls(RobotCalls):
         contacts: Sequence[Contact] = (),
         at: Array | None = None,
         tolerance: float | None = None,
+        force_weight: Any = None,
     ) -> Constraints[Any]:
         """Return `constraints` with contacts or other independent joints, also of a robot without ties.
 
@@ -50,11 +51,13 @@ class MotionCalls(RobotCalls):
         tolerance: largest violation of a tie, in m or rad, that calls accept; unless given, 1e-6 (1e-4 in
         float32) of what joints could close, and 1e-4 of the rest: right angles of 1.5708 in files leave some
         micrometres that nothing closes
+        force_weight: weights of the squares of the forces of redundant rows, of which the least sum is taken:
+        numbers above 0, (C,), or by the name of a tie or contact, 1 for what is left out
 
         Raises ValueError for a joint or frame that does not exist, for independent joints that do not
         determine the others at `at`, and where nothing is left to move.
         """
-        return constraints_of(self, independent, contacts, at, tolerance)
+        return constraints_of(self, independent, contacts, at, tolerance, force_weight)
 
     def induced_accelerations(
         self,

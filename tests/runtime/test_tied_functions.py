@@ -13,6 +13,7 @@ from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise_runtime.native.library import symbol
 
+torch = pytest.importorskip("torch")
 pytestmark = needs_compiler
 
 ARM = """schema = 1
@@ -71,7 +72,7 @@ EXACT, SINGLE = 1e-12, 3e-4
 def package(folder: Path, text: str, kernel: str) -> ModuleType:
     (folder / "robot.toml").write_text(text)
     made = generate(
-        read_system(folder / "robot.toml", Options("symbolic")), ["numpy", "native"], kernel=kernel
+        read_system(folder / "robot.toml", Options("symbolic")), ["numpy", "torch", "native"], kernel=kernel
     )
     write_package(made, folder / "arm")
     return import_package(folder / "arm")
@@ -313,3 +314,47 @@ def test_c_tells_which_contacts_keep(free: ModuleType) -> None:
         assert told(np.concatenate([first, second])) == expected
     pressed = np.concatenate([unit, np.zeros(5)])
     assert told(pressed, 2) == told(pressed, -1) == told(pressed, of=1) == -2
+
+
+@pytest.mark.parametrize("backend", ["numpy", "torch", "native"])
+def test_redundant_rows_share_by_their_weights(backend: str, free: ModuleType) -> None:
+    """Of all forces lambda + N z of the same torques, A' N = 0, the least lambda' W lambda is taken."""
+    robot, at = free.load(backend), np.array([0.1, 0.3, 0.5, -0.7, 0.4, 0.05, 0.2])
+    held = [
+        free.Contact("d", kind="held", name="d"),
+        free.Contact("e", kind="hinged", axis=(0, 0, 1), name="e"),
+    ]
+    plain = robot.constrained(contacts=held, at=at)
+    weight = np.random.default_rng(1).uniform(0.2, 5.0, 11)
+    q, qd, qdd = (np.tile(a, (2, 1)) for a in (at, 0.1 + at, at - 0.2))
+    given = [torch.tensor(a) for a in (q, qd, qdd)] if backend == "torch" else [q, qd, qdd]
+    for asked, w in (
+        (weight, weight),
+        ({"e": 4.0}, np.array([1.0] * 6 + [4.0] * 5)),
+        ([1.0] * 11, np.ones(11)),
+    ):
+        weighed = robot.constrained(
+            independent=list(plain.independent), contacts=held, at=at, force_weight=asked
+        )
+        rows = np.asarray(plain.jacobian(given[0]))[0]
+        u, values, _ = np.linalg.svd(rows)
+        free_of = u[:, (values > 1e-9).sum() :]
+        known, found = (np.asarray(one.forces(*given))[0] for one in (plain, weighed))
+        z = np.linalg.solve(free_of.T * w @ free_of, free_of.T * w @ known)
+        np.testing.assert_allclose(found, known - free_of @ z, rtol=0, atol=1e-10)
+        moved = [one.forward_dynamics(*given) for one in (plain, weighed)]
+        np.testing.assert_allclose(*(np.asarray(one.qdd) for one in moved), rtol=0, atol=1e-10)
+        if backend == "native":
+            assert weighed.ties.rows(robot.backend).functions is not None
+            single = np.asarray(weighed.forces(*(a.astype(np.float32) for a in given)))[0]
+            np.testing.assert_allclose(single, found, rtol=0, atol=1e-3 * np.abs(found).max())
+
+
+def test_weights_of_forces_are_refused_in_words(free: ModuleType) -> None:
+    robot = free.load("numpy")
+    held = [free.Contact("d", kind="held", name="hand")]
+    for wrong in ([1.0], [0.0] * 6, "a", {"foot": 1.0}, {"hand": -1.0}, {"hand": "a"}, [np.nan] * 6):
+        with pytest.raises(
+            ValueError, match=r"force_weight is .*; give a number above 0 for each of the 6 rows"
+        ):
+            robot.constrained(contacts=held, force_weight=wrong)

@@ -349,6 +349,7 @@ typedef struct {
     int freedoms; /* how many joints are independent: JOINTS less the rank of A */
     const int *independent; /* (freedoms) their numbers, from 0, ascending */
     double tolerance; /* most that rows may be open, in m and rad; 0: 1e-4, and what joints could close 1e-6 */
+    const double *weight; /* (ROWS) weights of the squares of forces of redundant rows, above 0, or NULL: 1 each */
 } planar3_constraints;
 
 /* Rows stand in the order of the robot's ties, the contacts, and the robot's couplings: of a point or of what rolls 3, of a hinge 2
@@ -396,7 +397,7 @@ int planar3_constrained_torque(size_t count, const double *q, const double *qd, 
     const planar3_constraints *constraints, double *torque, double *forces);
 
 /* Accelerations of all joints under torques tau on all of them, and the forces of the rows, of which redundant ones share
-   by the least sum of squares: forward dynamics.
+   by the least sum of weighted squares: forward dynamics.
    Reads q, qd, tau (count, JOINTS); writes qdd (count, JOINTS), forces (count, ROWS). */
 int planar3_constrained_dynamics(size_t count, const double *q, const double *qd, const double *tau,
     const planar3_constraints *constraints, double *qdd, double *forces);
@@ -709,6 +710,7 @@ typedef struct {
     int freedoms; /* how many joints are independent: JOINTS less the rank of A */
     const int *independent; /* (freedoms) their numbers, from 0, ascending */
     float tolerance; /* most that rows may be open, in m and rad; 0: 1e-4 */
+    const float *weight; /* (ROWS) weights of the squares of forces of redundant rows, above 0, or NULL: 1 each */
 } planar3_constraintsf;
 
 /* Rows stand in the order of the robot's ties, the contacts, and the robot's couplings: of a point or of what rolls 3, of a hinge 2
@@ -756,7 +758,7 @@ int planar3_constrained_torquef(size_t count, const float *q, const float *qd, c
     const planar3_constraintsf *constraints, float *torque, float *forces);
 
 /* Accelerations of all joints under torques tau on all of them, and the forces of the rows, of which redundant ones share
-   by the least sum of squares: forward dynamics.
+   by the least sum of weighted squares: forward dynamics.
    Reads q, qd, tau (count, JOINTS); writes qdd (count, JOINTS), forces (count, ROWS). */
 int planar3_constrained_dynamicsf(size_t count, const float *q, const float *qd, const float *tau,
     const planar3_constraintsf *constraints, float *qdd, float *forces);

@@ -373,6 +373,7 @@ typedef struct {
     int freedoms; /* how many joints are independent: JOINTS less the rank of A */
     const int *independent; /* (freedoms) their numbers, from 0, ascending */
     double tolerance; /* most that rows may be open, in m and rad; 0: 1e-4, and what joints could close 1e-6 */
+    const double *weight; /* (ROWS) weights of the squares of forces of redundant rows, above 0, or NULL: 1 each */
 } puma560_constraints;
 
 /* Rows stand in the order of the robot's ties, the contacts, and the robot's couplings: of a point or of what rolls 3, of a hinge 2
@@ -420,7 +421,7 @@ int puma560_constrained_torque(size_t count, const double *q, const double *qd, 
     const puma560_constraints *constraints, double *torque, double *forces);
 
 /* Accelerations of all joints under torques tau on all of them, and the forces of the rows, of which redundant ones share
-   by the least sum of squares: forward dynamics.
+   by the least sum of weighted squares: forward dynamics.
    Reads q, qd, tau (count, JOINTS); writes qdd (count, JOINTS), forces (count, ROWS). */
 int puma560_constrained_dynamics(size_t count, const double *q, const double *qd, const double *tau,
     const puma560_constraints *constraints, double *qdd, double *forces);
@@ -745,6 +746,7 @@ typedef struct {
     int freedoms; /* how many joints are independent: JOINTS less the rank of A */
     const int *independent; /* (freedoms) their numbers, from 0, ascending */
     float tolerance; /* most that rows may be open, in m and rad; 0: 1e-4 */
+    const float *weight; /* (ROWS) weights of the squares of forces of redundant rows, above 0, or NULL: 1 each */
 } puma560_constraintsf;
 
 /* Rows stand in the order of the robot's ties, the contacts, and the robot's couplings: of a point or of what rolls 3, of a hinge 2
@@ -792,7 +794,7 @@ int puma560_constrained_torquef(size_t count, const float *q, const float *qd, c
     const puma560_constraintsf *constraints, float *torque, float *forces);
 
 /* Accelerations of all joints under torques tau on all of them, and the forces of the rows, of which redundant ones share
-   by the least sum of squares: forward dynamics.
+   by the least sum of weighted squares: forward dynamics.
    Reads q, qd, tau (count, JOINTS); writes qdd (count, JOINTS), forces (count, ROWS). */
 int puma560_constrained_dynamicsf(size_t count, const float *q, const float *qd, const float *tau,
     const puma560_constraintsf *constraints, float *qdd, float *forces);

@@ -371,6 +371,7 @@ typedef struct {
     int freedoms; /* how many joints are independent: JOINTS less the rank of A */
     const int *independent; /* (freedoms) their numbers, from 0, ascending */
     double tolerance; /* most that rows may be open, in m and rad; 0: 1e-4, and what joints could close 1e-6 */
+    const double *weight; /* (ROWS) weights of the squares of forces of redundant rows, above 0, or NULL: 1 each */
 } torso_constraints;
 
 /* Rows stand in the order of the robot's ties, the contacts, and the robot's couplings: of a point or of what rolls 3, of a hinge 2
@@ -418,7 +419,7 @@ int torso_constrained_torque(size_t count, const double *q, const double *qd, co
     const torso_constraints *constraints, double *torque, double *forces);
 
 /* Accelerations of all joints under torques tau on all of them, and the forces of the rows, of which redundant ones share
-   by the least sum of squares: forward dynamics.
+   by the least sum of weighted squares: forward dynamics.
    Reads q, qd, tau (count, JOINTS); writes qdd (count, JOINTS), forces (count, ROWS). */
 int torso_constrained_dynamics(size_t count, const double *q, const double *qd, const double *tau,
     const torso_constraints *constraints, double *qdd, double *forces);
@@ -739,6 +740,7 @@ typedef struct {
     int freedoms; /* how many joints are independent: JOINTS less the rank of A */
     const int *independent; /* (freedoms) their numbers, from 0, ascending */
     float tolerance; /* most that rows may be open, in m and rad; 0: 1e-4 */
+    const float *weight; /* (ROWS) weights of the squares of forces of redundant rows, above 0, or NULL: 1 each */
 } torso_constraintsf;
 
 /* Rows stand in the order of the robot's ties, the contacts, and the robot's couplings: of a point or of what rolls 3, of a hinge 2
@@ -786,7 +788,7 @@ int torso_constrained_torquef(size_t count, const float *q, const float *qd, con
     const torso_constraintsf *constraints, float *torque, float *forces);
 
 /* Accelerations of all joints under torques tau on all of them, and the forces of the rows, of which redundant ones share
-   by the least sum of squares: forward dynamics.
+   by the least sum of weighted squares: forward dynamics.
    Reads q, qd, tau (count, JOINTS); writes qdd (count, JOINTS), forces (count, ROWS). */
 int torso_constrained_dynamicsf(size_t count, const float *q, const float *qd, const float *tau,
     const torso_constraintsf *constraints, float *qdd, float *forces);

@@ -116,15 +116,16 @@ static real turn_column(int f, int rows, real *x, real *v, real *twice)
     return x[f * PITCH + f] = kept;
 }
 
-/* A_d = Q R, or 0 where A_d has lost its rank. */
-static int factor_rows(struct tied *x)
+/* A_d = Q R, or 0 where A_d has lost its rank; with weights W of the rows' forces that of W^-1/2 A_d, so that redundant rows
+   bear the least sum of weighted squares. */
+static int factor_rows(struct tied *x, const real *weight)
 {
     const int rows = x->t.rows, d = x->bound;
     for (int r = 0; r < rows; ++r) {
         real most = 0;
         for (int k = 0; r >= x->t.first_coupling && k < N; ++k)
             most = F(fabs)(x->t.jacobian[r * N + k]) > most ? F(fabs)(x->t.jacobian[r * N + k]) : most;
-        x->size[r] = most > 1 ? most : 1;
+        x->size[r] = (most > 1 ? most : 1) * (weight ? F(sqrt)(weight[r]) : 1);
         const real inverse = 1 / x->size[r];
         for (int k = 0; k < PITCH; ++k)
             x->factor[r * PITCH + k] = k < N ? x->t.jacobian[r * N + x->joint[k]] * inverse : R(0.0);
@@ -336,12 +337,19 @@ static int observe_tied(struct tied *x, const struct numbers *numbers, const str
         return IS_UNKNOWN;
     stand(numbers, q, &x->at);
     rows_at(c, &x->at, &x->at, o, &x->t);
-    if (!factor_rows(x))
+    if (!factor_rows(x, NULL))
         return IS_SINGULAR;
     if (is_open(x))
         return IS_OPEN;
     find_map(x);
-    return is_contradicted(x) ? IS_CONTRADICTED : 0;
+    if (is_contradicted(x))
+        return IS_CONTRADICTED;
+    if (c->weight && x->t.rows > x->bound) {
+        if (!factor_rows(x, c->weight))
+            return IS_SINGULAR;
+        find_map(x);
+    }
+    return 0;
 }
 
 /* A matrix (rows, N) times G. */

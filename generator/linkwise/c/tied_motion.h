@@ -41,7 +41,7 @@ static int close_ties(struct tied *x, const struct standing *held, real *q)
         real square = 0;
         stand(x->numbers, q, &x->at);
         rows_at(x->c, &x->at, held, x->o, &x->t);
-        if (!factor_rows(x))
+        if (!factor_rows(x, NULL))
             return IS_SINGULAR;
         copy((size_t)x->t.rows, x->t.violation, part);
         follow_one_side(x, part, step);

@@ -5,14 +5,14 @@ method with least-norm steps of all joints, q <- q - A^+ phi, from a few starts 
 itself, where loops are often stretched and A loses rank.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import as_array, check_numbers
+from ..arguments import as_array, check_numbers, kept_numbers
 from ..chosen_names import listed, short
 from ..interface import NUMPY, array_of
 from ..rule.joint_tree import JointTree
@@ -159,6 +159,25 @@ class ChosenConstraints:
     """Independent joints of the package; empty where it has none."""
     _own_position: tuple[float, ...]
     """Closed position of the package."""
+
+    force_weight: NDArray[np.float64] | None = None
+    """Weights of the squares of the forces of redundant rows, (C,); None where all weigh alike."""
+
+    def weigh(self, given: object) -> None:
+        """Read the weights of forces, by row or by name; raises ValueError for what are none."""
+        if given is None:
+            return
+        by_row, known = given, True
+        if isinstance(given, Mapping):
+            by_row = [given.get(name, 1.0) for name in self.row_names]
+            known = given.keys() <= {*self.row_names}
+        weight = kept_numbers("force_weight", by_row)
+        if not known or weight is None or weight.shape != (len(self.rows),) or not (weight > 0.0).all():
+            raise ValueError(
+                f"force_weight is {short(given)}; give a number above 0 for each of the {len(self.rows)} "
+                f"rows, or by name for some of {listed(list(dict.fromkeys(self.row_names)))}"
+            )
+        self.force_weight = weight
 
     def _choose(self, independent: object, at: object, loose: Sequence[int], contacts: bool = False) -> None:
         """Choose the independent joints; loose: those that rather follow others, as nothing drives them."""

@@ -121,9 +121,18 @@ def ties_at(
     return TiesAt(q, made, sizes, positions[..., 0], rows, factors, unit_rows=ties.unit_rows)
 
 
-def checked_place(at: TiesAt, columns: JointColumns, names: RowNames) -> ClosedPlace:
-    """Return how joints follow where ties close; raises ValueError where they do not stay closed."""
-    inverse = pseudoinverse(at.factors) if at.inverse is None else at.inverse
+def checked_place(
+    at: TiesAt, columns: JointColumns, names: RowNames, shares: Numbers | None = None
+) -> ClosedPlace:
+    """Return how joints follow where ties close; raises ValueError where they do not stay closed.
+
+    shares: W^(-1/2) (C,), where redundant rows bear the least lambda^T W lambda: A_d^+ is then
+    (W^(-1/2) A_d)^+ W^(-1/2)
+    """
+    if shares is not None:
+        inverse = pseudoinverse(factor_dependent(at.rows * shares[..., None], columns)) * shares
+    else:
+        inverse = pseudoinverse(at.factors) if at.inverse is None else at.inverse
     mapped = velocity_map(at.rows, columns, inverse)
     check_following(at.rows, columns, mapped, names.owners, names.joints)
     if at.sizes is not None:  # rates and forces are those of rows that are not scaled
@@ -133,7 +142,12 @@ def checked_place(at: TiesAt, columns: JointColumns, names: RowNames) -> ClosedP
 
 
 def closed_place(
-    ties: ConstraintRows, columns: JointColumns, q: Numbers, tolerance: float | None, names: RowNames
+    ties: ConstraintRows,
+    columns: JointColumns,
+    q: Numbers,
+    tolerance: float | None,
+    names: RowNames,
+    shares: Numbers | None = None,
 ) -> ClosedPlace:
     """Return how joints follow at q (..., n); raises ValueError where ties are open or joints do not."""
     at = ties_at(ties, columns, q)
@@ -141,7 +155,7 @@ def closed_place(
     check_factors(at.rows, at.factors[1], columns, names.joints, at.unit_rows)
     if tolerance is None:  # stricter for what joints could close than for what nothing can
         check_closed(at.closable, closable_tolerance(q), names.rows, names.owners)
-    return checked_place(at, columns, names)
+    return checked_place(at, columns, names, shares)
 
 
 def factor_dependent(rows: Numbers, columns: JointColumns) -> tuple[Numbers, Numbers]:

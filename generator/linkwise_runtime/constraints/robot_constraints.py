@@ -416,16 +416,22 @@ def made_again(robot: object, call: str, arguments: tuple[object, ...]) -> objec
 
 
 def constraints_of(
-    robot: "TiedRobot", independent: object, contacts: object, at: object, tolerance: object
+    robot: "TiedRobot",
+    independent: object,
+    contacts: object,
+    at: object,
+    tolerance: object,
+    force_weight: object,
 ) -> Constraints[Any]:
     """Return constraints as `Dynamics.constrained` makes them; raises as it says."""
     allowed = float(tolerance) if isinstance(tolerance, Real) and not isinstance(tolerance, bool) else None
     if tolerance is not None and (allowed is None or not 0.0 <= allowed < np.inf):
         raise ValueError(f"tolerance is {tolerance!r}; give a number of m and rad, 0 or more")
-    made = independent, contacts, at, allowed
+    made = independent, contacts, at, allowed, force_weight
     structure, tree = robot.structure, robot.backend.tree
     if tree is not None:
         chosen = TreeConstraints(structure, tree, independent, contacts, at)
+        chosen.weigh(force_weight)
         ties = TiedJoints(
             structure,
             chosen,
@@ -440,5 +446,6 @@ def constraints_of(
             "frame can be held; write constraints with the energies: energy_system(..., constraints=...)"
         )
     choice = WrittenChoice(structure, independent, at)
+    choice.weigh(force_weight)
     ties = TiedJoints(structure, choice, allowed, lambda backend: WrittenRows(backend, written))
     return Constraints(robot, ties, made)

@@ -69,7 +69,15 @@ class TiedJoints:
 
     def place(self, backend: ArrayBackend, q: Numbers) -> ClosedPlace:
         """Return how joints follow at q (..., n), in which all ties close; raises as `Constraints` says."""
-        return closed_place(self.rows(backend), self.columns(backend, q), q, self._tolerance, self._names)
+        shares = self._shares(backend, q)
+        return closed_place(
+            self.rows(backend), self.columns(backend, q), q, self._tolerance, self._names, shares
+        )
+
+    def _shares(self, backend: ArrayBackend, like: Numbers) -> Numbers | None:
+        """Return W^(-1/2) of the rows' forces; None where all weigh alike."""
+        weight = self.chosen.force_weight
+        return None if weight is None else backend.constant(weight**-0.5, like)
 
     def closed(
         self, backend: ArrayBackend, q: Numbers, held_at: Numbers, columns: JointColumns | None = None
@@ -87,7 +95,8 @@ class TiedJoints:
     ) -> ClosedPlace:
         """Return how joints follow once dependent joints close the ties; see `closed`."""
         at = self.closed(backend, q, held_at, columns)
-        return checked_place(at, columns or self.columns(backend, at.q), self._names)
+        columns = columns or self.columns(backend, at.q)
+        return checked_place(at, columns, self._names, self._shares(backend, at.q))
 
     def scaled_rows(self, backend: ArrayBackend, q: Numbers) -> Numbers:
         """Return A (..., C, n) at any q, with its rows divided by their sizes."""

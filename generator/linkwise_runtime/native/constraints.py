@@ -82,6 +82,7 @@ def constraints_struct(real: RealType) -> type[ctypes.Structure]:
         ("freedoms", ctypes.c_int),
         ("independent", ctypes.c_void_p),
         ("tolerance", real),
+        ("weight", ctypes.c_void_p),
     ]
     return type("ConstraintsStruct", (ctypes.Structure,), {"_fields_": fields})
 
@@ -95,7 +96,11 @@ class TiedSettings:
 
 
 def told(
-    contacts: Sequence[Held], independent: Sequence[int], tolerance: float | None, kind: NumberType
+    contacts: Sequence[Held],
+    independent: Sequence[int],
+    tolerance: float | None,
+    weight: NDArray[np.float64] | None,
+    kind: NumberType,
 ) -> TiedSettings:
     """Return constraints as C takes them."""
     real = ctypes.c_double if kind.itemsize == 8 else ctypes.c_float
@@ -110,9 +115,12 @@ def told(
     # 0 asks C for the tolerances that None stands for; a tolerance of 0 is as small as numbers go.
     allowed = 0.0 if tolerance is None else max(tolerance, float(np.finfo(kind).tiny))
     struct = constraints_struct(real)(
-        len(contacts), ctypes.addressof(listed), len(joints), address(joints), allowed
+        len(contacts), ctypes.addressof(listed), len(joints), address(joints), allowed, None
     )
-    return TiedSettings(struct, (listed, joints))
+    shares = None if weight is None else weight.astype(kind)
+    if shares is not None:
+        struct.weight = address(shares)
+    return TiedSettings(struct, (listed, joints, shares))
 
 
 class NativeTies:
@@ -121,7 +129,7 @@ class NativeTies:
     def __init__(self, calls: NativeCalls, chosen: TreeConstraints, tolerance: float | None) -> None:
         self._calls, structure = calls, calls.structure
         self._contacts = [one for one in chosen.held if one.second is None]
-        self._independent, self._tolerance = chosen.independent, tolerance
+        self._independent, self._chosen = chosen.independent, (tolerance, chosen.force_weight)
         self._sizes = {
             "n": structure.n,
             "N": structure.N,
@@ -181,7 +189,7 @@ class NativeTies:
     def settings(self, kind: NumberType) -> TiedSettings:
         """Return the constraints as C takes them in one number type, made once."""
         if kind not in self._told:
-            self._told[kind] = told(self._contacts, self._independent, self._tolerance, kind)
+            self._told[kind] = told(self._contacts, self._independent, *self._chosen, kind)
         return self._told[kind]
 
     def _function(self, name: str, kind: NumberType) -> "CFunction":

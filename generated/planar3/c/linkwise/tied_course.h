@@ -89,7 +89,7 @@ static real choose_joints(struct tied *x)
     }
     for (int k = 0, f = 0, own = x->bound; k < N; ++k)
         x->joint[taken[k] ? f++ : own++] = (short)k;
-    return factor_rows(x) ? least_left(x) : R(0.0);
+    return factor_rows(x, NULL) ? least_left(x) : R(0.0);
 }
 
 /* The same at a position. */
@@ -97,7 +97,7 @@ static real choose_joints_at(struct tied *x, const real *q)
 {
     stand(x->numbers, q, &x->at);
     rows_at(x->c, &x->at, &x->at, x->o, &x->t);
-    factor_rows(x);
+    factor_rows(x, NULL);
     return choose_joints(x);
 }
 
