@@ -257,6 +257,17 @@ def in_python(package: ModuleType, robot: Any) -> dict[str, Callable[[], Any]]:
     }
 
 
+def of_tied_frame(package: ModuleType, robot: Any, ties: Any, q: Any) -> Any:
+    """Return torques for the row of any frame along which ties let it move most."""
+    moved = {
+        name: np.abs(robot.kinematics.jacobian(q, name) @ ties.velocity_map(q)).max(1)
+        for name in robot.link_names
+    }
+    frame = max(moved, key=lambda name: float(moved[name].max()))
+    row = package.FrameImpedance(frame, rows=(ROWS[moved[frame].argmax()],))
+    return robot.partial_impedance(frame=row, constraints=ties)(q, q)
+
+
 def of_ties(package: ModuleType, robot: Any, q: Any) -> dict[str, Callable[[], Any]]:
     """Return the same of functions of tied joints; a robot without ties is held at a point.
 
@@ -285,6 +296,7 @@ def of_ties(package: ModuleType, robot: Any, q: Any) -> dict[str, Callable[[], A
         "constrained_dynamics": on("forward_dynamics", 3),
         "constrained_dynamics_of_links": on("forward_dynamics", 3, passive=False),
         "constrained_partial_impedance": lambda: ties and robot.partial_impedance(constraints=ties)(place, q),
+        "constrained_frame_partial_impedance": lambda: ties and of_tied_frame(package, robot, ties, place),
         "constrained_cancel": lambda: ties and robot.cancel(ANY, constraints=ties)(place, q, qdd=q),
         "contacts_keep": lambda: ties and robot.partial_impedance(constraints=ties).forces(place, q),
     }

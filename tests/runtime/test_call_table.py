@@ -25,6 +25,13 @@ from tools.call_page import BESIDE_IN_C, PAGE, page
 
 torch = pytest.importorskip("torch")
 
+OF_TIES = (
+    "constrained_partial_impedance",
+    "constrained_frame_partial_impedance",
+    "constrained_cancel",
+    "contacts_keep",
+)
+"""Functions of C of tied joints for which no row is."""
 TIED = """schema = 1
 name = "press"
 gravity = [0.5, -9.0, 0]
@@ -443,7 +450,7 @@ def test_the_header_of_c_has_the_rows_and_nothing_else(which: str, package_at: L
         "constrained_response": rigid,
         "constrained_response_of_links": rigid and own,
         "constrained_dynamics_of_links": rigid and own,
-        **dict.fromkeys(("constrained_partial_impedance", "constrained_cancel", "contacts_keep"), rigid),
+        **dict.fromkeys(OF_TIES, rigid),
         "simulate": rigid,
     }
     links = {f"link_{j + 1}" for j in range(load(which).N)}

@@ -270,6 +270,23 @@ def test_c_controls_what_numpy_controls(
             "qdd",
             "forces",
         }
+    known = ties[0]._robot.kinematics
+    rows = {name: known.jacobian(q[0], name) @ ties[0].velocity_map(q[0]) for name in known.frames}
+    moving = [name for name, mapped in rows.items() if np.abs(mapped).max() > 0.01]
+    for frame, natural in zip(moving[-2:], (1.0, 0.4), strict=False):
+        row = ("rx", "ry", "rz", "x", "y", "z")[np.abs(rows[frame]).max(1).argmax()]
+        part = module.Natural(natural, plus=0.5)
+        aimed = module.FrameImpedance(frame, part, part, 40.0, (row,), (0.01, 0.02, -0.03))
+        exact, compiled = (
+            one._robot.partial_impedance(stiffness=2.0, frame=aimed, constraints=one) for one in ties
+        )
+        pose = known.pose(q[7], frame)
+        aim = module.Target(q[0], None, other[2], pose, np.full(6, 0.2), np.full(6, -0.3))
+        for call in ("__call__", "acceleration", "forces"):
+            for s in range(3):
+                given = (q[s], qd[s], aim, other[3])
+                compare(getattr(compiled, call)(*given), getattr(exact, call)(*given), EXACT)
+        assert sum(len(of_one._of_one.free) for of_one in compiled._of_one.values()) == 3
     for driven in (None, few):
         exact, compiled = (
             one._robot.cancel({(None, "e", None, None)}, constraints=one, actuated=driven) for one in ties
@@ -318,7 +335,7 @@ def test_c_tells_which_contacts_keep(free: ModuleType) -> None:
 
 @pytest.mark.parametrize("backend", ["numpy", "torch", "native"])
 def test_redundant_rows_share_by_their_weights(backend: str, free: ModuleType) -> None:
-    """Of all forces lambda + N z of the same torques, A' N = 0, the least lambda' W lambda is taken."""
+    """Least lambda' W lambda of all forces lambda + N z of the same torques, A' N = 0."""
     robot, at = free.load(backend), np.array([0.1, 0.3, 0.5, -0.7, 0.4, 0.05, 0.2])
     held = [
         free.Contact("d", kind="held", name="d"),

@@ -71,6 +71,7 @@ BESIDE_IN_C = {
     "cancel": "what a [controller](control.md) cancels at a given acceleration",
     "frame_partial_impedance": "a [controller](control.md) of a frame",
     "constrained_partial_impedance": "a [controller](control.md) of tied joints, and what ties bear then",
+    "constrained_frame_partial_impedance": "a [controller](control.md) of a frame that tied joints move",
     "constrained_cancel": "what such a controller cancels at a given acceleration",
     "contacts_keep": "whether contacts that touch at one point keep within their cones of friction",
 }

@@ -126,7 +126,9 @@ enum {
     TORSO_TIES_LOST = 7,
     TORSO_NOT_POSITIVE = 8,
     TORSO_UNDRIVEN = 9,
-    TORSO_NOT_FINITE = 10
+    TORSO_NOT_FINITE = 10,
+    TORSO_FRAME_HELD = 11,
+    TORSO_HALF_A_TURN = 12
 };
 
 /* No two arrays that are given to a function may overlap. Shapes leave TORSO_ out of the names above; the last index
@@ -299,6 +301,24 @@ typedef struct {
     int regular; /* 0: M* must be positive; 1: it need only be regular, as where motions are cancelled */
 } torso_impedance;
 
+/* Partial impedance of a frame. `rows` of six count: turns about the world's x, y and z, 0 to 2, and moves of the point along
+   them, 3 to 5. With those of the Jacobian, J, and nu = J qd, the frame has L = (J H^-1 J')^-1 for inertia,
+   mu = L (J H^-1 C - dJ/dt) H^-1 J' L for velocity coefficients, and f is F = L J H^-1 f to it. Wanted is
+
+       M_e (dnu/dt - acceleration_d) + B_e (nu - velocity_d) + E' K_e x = F
+       M_e = keep_inertia L + inertia        B_e = keep_velocity mu + damping
+
+   x being the rotation vector that leads from pose_d to the frame, and the point's place from that of the same point there,
+   in the world's axes, and E, cut to these rows, what takes nu to the rates of x. */
+typedef struct {
+    int frame; /* one of the constants above */
+    const double *point; /* (3) in the frame's axes, or NULL: its origin */
+    int rows; /* how many count, 1 to 6 and no more than there are joints */
+    const int *row; /* (rows) which ones, each once */
+    double keep_inertia, keep_velocity; /* 1 for the natural ones, 0 for none of it */
+    const double *inertia, *damping, *stiffness; /* (rows, rows), or NULL: none */
+} torso_frame_impedance;
+
 /* `wanted` may be NULL for all natural; so may q_d without stiffness, and for zeros qd_d, qdd_d, `task`, what a task asks for
    beside (v), and `external` (f). To cancel motions alone, leave q_d, qd_d, qdd_d and stiffness NULL, have weights 0 for
    them and `regular` 1: tau is then v, what they ask for, and g.
@@ -317,24 +337,6 @@ int torso_partial_impedance(const double *q, const double *qd, const torso_imped
    has no part; `wanted` and task may be NULL. Returns 0, or the number of a joint, from 1, whose torque is not finite; tau is
    then as it was. Reads q, qd, qdd (JOINTS), task (JOINTS); writes tau (JOINTS). */
 int torso_cancel(const double *q, const double *qd, const double *qdd, const torso_impedance *wanted, const double *task, double *tau);
-
-/* Partial impedance of a frame. `rows` of six count: turns about the world's x, y and z, 0 to 2, and moves of the point along
-   them, 3 to 5. With those of the Jacobian, J, and nu = J qd, the frame has L = (J H^-1 J')^-1 for inertia,
-   mu = L (J H^-1 C - dJ/dt) H^-1 J' L for velocity coefficients, and f is F = L J H^-1 f to it. Wanted is
-
-       M_e (dnu/dt - acceleration_d) + B_e (nu - velocity_d) + E' K_e x = F
-       M_e = keep_inertia L + inertia        B_e = keep_velocity mu + damping
-
-   x being the rotation vector that leads from pose_d to the frame, and the point's place from that of the same point there,
-   in the world's axes, and E, cut to these rows, what takes nu to the rates of x. */
-typedef struct {
-    int frame; /* one of the constants above */
-    const double *point; /* (3) in the frame's axes, or NULL: its origin */
-    int rows; /* how many count, 1 to 6 and no more than there are joints */
-    const int *row; /* (rows) which ones, each once */
-    double keep_inertia, keep_velocity; /* 1 for the natural ones, 0 for none of it */
-    const double *inertia, *damping, *stiffness; /* (rows, rows), or NULL: none */
-} torso_frame_impedance;
 
 /* The frame comes first: of all accelerations that give what is wanted of it, the joints get those that are closest, in the
    sense of H, to what `posture` wants of them, see above. pose_d may be NULL without stiffness, and velocity_d, acceleration_d
@@ -455,6 +457,18 @@ int torso_constrained_partial_impedance(const double *q, const double *qd, const
     const torso_actuators *actuators, const torso_impedance *wanted, const double *q_d,
     const double *qd_d, const double *qdd_d, const double *task, const double *external, double *tau,
     double *qdd, double *forces);
+
+/* The same of a frame, which comes first: of all accelerations that ties allow and that give what is wanted of it, the joints get those
+   that are closest, in the sense of H, to what `posture` wants of them, NULL for all natural. Its L and mu are by what ties leave free:
+   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these TORSO_FRAME_HELD where the
+   frame cannot move along a row beside those before it, and TORSO_HALF_A_TURN as far from a pose_d to which it is to turn, or
+   that is no rotation. Nothing may be undriven. Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
+   velocity_d, acceleration_d (6); writes tau, qdd (JOINTS), forces (ROWS). */
+int torso_constrained_frame_partial_impedance(const double *q, const double *qd, const torso_constraints *constraints,
+    const torso_actuators *actuators, const torso_impedance *posture, const double *q_d,
+    const double *qd_d, const double *qdd_d, const torso_frame_impedance *wanted, const double *pose_d,
+    const double *velocity_d, const double *acceleration_d, const double *external, double *tau, double *qdd,
+    double *forces);
 
 /* What is not kept, at a given acceleration, measured or wanted, as cancel has it, given by driven joints alone. `wanted` and task may be
    NULL. Returns as constrained_partial_impedance does. Reads q, qd, qdd (JOINTS), task (JOINTS); writes tau (JOINTS). */
@@ -668,6 +682,24 @@ typedef struct {
     int regular; /* 0: M* must be positive; 1: it need only be regular, as where motions are cancelled */
 } torso_impedancef;
 
+/* Partial impedance of a frame. `rows` of six count: turns about the world's x, y and z, 0 to 2, and moves of the point along
+   them, 3 to 5. With those of the Jacobian, J, and nu = J qd, the frame has L = (J H^-1 J')^-1 for inertia,
+   mu = L (J H^-1 C - dJ/dt) H^-1 J' L for velocity coefficients, and f is F = L J H^-1 f to it. Wanted is
+
+       M_e (dnu/dt - acceleration_d) + B_e (nu - velocity_d) + E' K_e x = F
+       M_e = keep_inertia L + inertia        B_e = keep_velocity mu + damping
+
+   x being the rotation vector that leads from pose_d to the frame, and the point's place from that of the same point there,
+   in the world's axes, and E, cut to these rows, what takes nu to the rates of x. */
+typedef struct {
+    int frame; /* one of the constants above */
+    const float *point; /* (3) in the frame's axes, or NULL: its origin */
+    int rows; /* how many count, 1 to 6 and no more than there are joints */
+    const int *row; /* (rows) which ones, each once */
+    float keep_inertia, keep_velocity; /* 1 for the natural ones, 0 for none of it */
+    const float *inertia, *damping, *stiffness; /* (rows, rows), or NULL: none */
+} torso_frame_impedancef;
+
 /* `wanted` may be NULL for all natural; so may q_d without stiffness, and for zeros qd_d, qdd_d, `task`, what a task asks for
    beside (v), and `external` (f). To cancel motions alone, leave q_d, qd_d, qdd_d and stiffness NULL, have weights 0 for
    them and `regular` 1: tau is then v, what they ask for, and g.
@@ -686,24 +718,6 @@ int torso_partial_impedancef(const float *q, const float *qd, const torso_impeda
    has no part; `wanted` and task may be NULL. Returns 0, or the number of a joint, from 1, whose torque is not finite; tau is
    then as it was. Reads q, qd, qdd (JOINTS), task (JOINTS); writes tau (JOINTS). */
 int torso_cancelf(const float *q, const float *qd, const float *qdd, const torso_impedancef *wanted, const float *task, float *tau);
-
-/* Partial impedance of a frame. `rows` of six count: turns about the world's x, y and z, 0 to 2, and moves of the point along
-   them, 3 to 5. With those of the Jacobian, J, and nu = J qd, the frame has L = (J H^-1 J')^-1 for inertia,
-   mu = L (J H^-1 C - dJ/dt) H^-1 J' L for velocity coefficients, and f is F = L J H^-1 f to it. Wanted is
-
-       M_e (dnu/dt - acceleration_d) + B_e (nu - velocity_d) + E' K_e x = F
-       M_e = keep_inertia L + inertia        B_e = keep_velocity mu + damping
-
-   x being the rotation vector that leads from pose_d to the frame, and the point's place from that of the same point there,
-   in the world's axes, and E, cut to these rows, what takes nu to the rates of x. */
-typedef struct {
-    int frame; /* one of the constants above */
-    const float *point; /* (3) in the frame's axes, or NULL: its origin */
-    int rows; /* how many count, 1 to 6 and no more than there are joints */
-    const int *row; /* (rows) which ones, each once */
-    float keep_inertia, keep_velocity; /* 1 for the natural ones, 0 for none of it */
-    const float *inertia, *damping, *stiffness; /* (rows, rows), or NULL: none */
-} torso_frame_impedancef;
 
 /* The frame comes first: of all accelerations that give what is wanted of it, the joints get those that are closest, in the
    sense of H, to what `posture` wants of them, see above. pose_d may be NULL without stiffness, and velocity_d, acceleration_d
@@ -824,6 +838,18 @@ int torso_constrained_partial_impedancef(const float *q, const float *qd, const 
     const torso_actuatorsf *actuators, const torso_impedancef *wanted, const float *q_d,
     const float *qd_d, const float *qdd_d, const float *task, const float *external, float *tau,
     float *qdd, float *forces);
+
+/* The same of a frame, which comes first: of all accelerations that ties allow and that give what is wanted of it, the joints get those
+   that are closest, in the sense of H, to what `posture` wants of them, NULL for all natural. Its L and mu are by what ties leave free:
+   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these TORSO_FRAME_HELD where the
+   frame cannot move along a row beside those before it, and TORSO_HALF_A_TURN as far from a pose_d to which it is to turn, or
+   that is no rotation. Nothing may be undriven. Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
+   velocity_d, acceleration_d (6); writes tau, qdd (JOINTS), forces (ROWS). */
+int torso_constrained_frame_partial_impedancef(const float *q, const float *qd, const torso_constraintsf *constraints,
+    const torso_actuatorsf *actuators, const torso_impedancef *posture, const float *q_d,
+    const float *qd_d, const float *qdd_d, const torso_frame_impedancef *wanted, const float *pose_d,
+    const float *velocity_d, const float *acceleration_d, const float *external, float *tau, float *qdd,
+    float *forces);
 
 /* What is not kept, at a given acceleration, measured or wanted, as cancel has it, given by driven joints alone. `wanted` and task may be
    NULL. Returns as constrained_partial_impedance does. Reads q, qd, qdd (JOINTS), task (JOINTS); writes tau (JOINTS). */

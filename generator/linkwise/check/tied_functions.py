@@ -34,10 +34,17 @@ CONTROLLERS: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]]
         ("q_d", "qd_d", "qdd_d", "task", "external"),
         ("tau", "qdd", "forces"),
     ),
+    "constrained_frame_partial_impedance": (
+        ("q", "qd"),
+        ("q_d", "qd_d", "qdd_d", "wanted", "pose_d", "velocity_d", "acceleration_d", "external"),
+        ("tau", "qdd", "forces"),
+    ),
     "constrained_cancel": (("q", "qd", "qdd"), ("task",), ("tau",)),
 }
 """Controllers of tied joints, for one sample, likewise; what they take behind what is CONTROLLED."""
-CONTROLLED = ("constraints", "actuators", "wanted")
+CONTROLLED = ("constraints", "actuators")
+OF_FRAME = {"posture": "impedance", "wanted": "frame_impedance"}
+"""Structs of the controller of a frame beside these."""
 KEEP = "contacts_keep"
 """Function that says whether contacts keep."""
 OF_TIES = (*TIED, *CONTROLLERS, KEEP)
@@ -63,6 +70,8 @@ CONSTANTS = {
     "NOT_POSITIVE": 8,
     "UNDRIVEN": 9,
     "NOT_FINITE": 10,
+    "FRAME_HELD": 11,
+    "HALF_A_TURN": 12,
 }
 """Constants of the header, without the robot's name."""
 
@@ -97,11 +106,13 @@ def tied_prototypes(manifest: Manifest, real: str, suffix: str) -> list[Prototyp
         of, kind = OF_SIMULATION if name == "simulate" else ("constraints", "constraints")
         return declared(name, "count", (*motion, *parameters, of, *behind), outputs, {of: kind})
 
+    def controller(name: str) -> Prototype:
+        motion, behind, outputs = CONTROLLERS[name]
+        first, structs = ("posture", STRUCTS | OF_FRAME) if "frame" in name else ("wanted", STRUCTS)
+        return declared(name, "", (*motion, *parameters, *CONTROLLED, first, *behind), outputs, structs)
+
     return [
         *(of_samples(name) for name in TIED if manifest.passive or not name.endswith("_of_links")),
-        *(
-            declared(name, "", (*motion, *parameters, *CONTROLLED, *behind), outputs)
-            for name, (motion, behind, outputs) in CONTROLLERS.items()
-        ),
+        *(controller(name) for name in CONTROLLERS),
         declared(KEEP, "grips", ("constraints", "grip", "forces"), ()),
     ]

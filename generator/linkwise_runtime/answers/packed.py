@@ -54,9 +54,14 @@ class TiedFunctions(Protocol):
         """
 
     def controller(
-        self, targets: object, driven: Sequence[int], weight: NDArray[np.float64], undriven: int
+        self,
+        targets: object,
+        frame: object,
+        driven: Sequence[int],
+        weight: NDArray[np.float64],
+        undriven: int,
     ) -> TorqueOfOne:
-        """Return functions for one sample, for targets of joints and for joints that are driven."""
+        """Return functions for one sample, for targets of joints and of a frame, and for driven joints."""
 
 
 class AskedMotion(NamedTuple):

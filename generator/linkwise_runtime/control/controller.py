@@ -120,14 +120,14 @@ class Controller:
         return self._of_one[backend]
 
     def _made_for_one(self, backend: ArrayBackend) -> TorqueOfOne | None:
-        """Return the back end's functions; None without any, as of frames of tied joints and of limits."""
+        """Return the back end's functions; None without any, as where contacts have limits."""
         by, targets = self._actuators, self._joints.targets
         if self._constraints is None:
             return backend.controller(targets, self._frame) if by.drive_all else None
         functions = self._constraints.ties.rows(backend).functions
-        if functions is None or self._frame is not None or self._grips:
+        if functions is None or self._grips:
             return None
-        return functions.controller(targets, by.joints, by.weight, by.undriven)
+        return functions.controller(targets, self._frame, by.joints, by.weight, by.undriven)
 
     def _arrays(
         self, q: object, qd: object, motion: Mapping[str, object], beside: Mapping[str, Beside] = NOTHING

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..constraints.chosen_constraints import TreeConstraints
 from ..constraints.held_frames import Held
+from ..control.frame_impedance import FrameTargets
 from ..control.joint_impedance import JointTargets
 from ..interface import Numbers
 from .calls import NativeCalls, plain
@@ -179,12 +180,18 @@ class NativeTies:
         return [a.reshape(*batch, *shape) for a, shape in zip(found, shapes, strict=True)] if found else None
 
     def controller(
-        self, targets: object, driven: Sequence[int], weight: NDArray[np.float64], undriven: int
+        self,
+        targets: object,
+        frame: object,
+        driven: Sequence[int],
+        weight: NDArray[np.float64],
+        undriven: int,
     ) -> TiedTorque:
         """Return the object by which C computes a controller's torque for one sample."""
         rows = self._sizes["C"]
         stance = TiedStance(lambda kind: self.settings(kind).struct, rows, driven, weight, undriven)
-        return TiedTorque(self._calls, cast(JointTargets, targets), stance)
+        aimed = cast("FrameTargets | None", frame)
+        return TiedTorque(self._calls, cast(JointTargets, targets), aimed, stance)
 
     def settings(self, kind: NumberType) -> TiedSettings:
         """Return the constraints as C takes them in one number type, made once."""

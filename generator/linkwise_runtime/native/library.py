@@ -49,6 +49,7 @@ TIED = (
     "constrained_dynamics",
     "constrained_dynamics_of_links",
     "constrained_partial_impedance",
+    "constrained_frame_partial_impedance",
     "constrained_cancel",
     "contacts_keep",
     "simulate",

@@ -7,12 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..control.frame_impedance import FrameTargets
 from ..control.joint_impedance import JointTargets
 from ..interface import Numbers
 from .calls import NativeCalls
 from .control import NativeTorque
 from .library import OneSampleCall, one_sample_call, symbol
 from .memory import NumberArray, NumberType, address
+
+OF_FRAME = "constrained_frame_partial_impedance"
 
 
 @dataclass(frozen=True)
@@ -45,8 +48,10 @@ class ActuatorsStruct(ctypes.Structure):
 class TiedTorque(NativeTorque):
     """The torque of one controller of tied joints, and what follows from it."""
 
-    def __init__(self, calls: NativeCalls, targets: JointTargets, stance: TiedStance) -> None:
-        super().__init__(calls, True, targets, None)
+    def __init__(
+        self, calls: NativeCalls, targets: JointTargets, frame: FrameTargets | None, stance: TiedStance
+    ) -> None:
+        super().__init__(calls, True, targets, frame)
         self._stance = stance
 
     def forces(self, given: Mapping[str, Numbers]) -> NumberArray | None:
@@ -68,7 +73,11 @@ class TiedTorque(NativeTorque):
         if asked == "cancel":
             found = symbol(self._calls.sources, "constrained_cancel", kind.str[1:])
             return one_sample_call(found, True, [*given, placed.get("task")], memory, [answer])
-        found = symbol(self._calls.sources, "constrained_partial_impedance", kind.str[1:])
-        given += [placed.get(name) for name in self._beside]
+        beside: list[object] = [placed.get(name) for name in self._beside]
+        if settings.frame is not None:
+            beside.insert(3, ctypes.byref(settings.frame))
+        call = "constrained_partial_impedance" if settings.frame is None else OF_FRAME
+        found = symbol(self._calls.sources, call, kind.str[1:])
+        given += beside
         results = [answer if asked == one else None for one in ("tau", "qdd", "forces")]
         return one_sample_call(found, True, given, memory, results)

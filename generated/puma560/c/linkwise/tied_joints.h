@@ -35,7 +35,9 @@ enum {
     IS_LOST,
     IS_NOT_POSITIVE,
     IS_UNDRIVEN,
-    IS_NOT_FINITE
+    IS_NOT_FINITE,
+    IS_HELD,
+    IS_HALF_A_TURN
 };
 
 enum { PITCH = (N + 2 * LANES - 1) / LANES * LANES, BORNE = (ROWS + LANES - 1) / LANES * LANES };

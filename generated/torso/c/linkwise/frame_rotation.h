@@ -2,7 +2,7 @@
 
    The rotation vector v of R R_d' = exp [v] and the place make x; with E = 1 - [v] / 2 + c [v]^2, c = (1 - v/2 cot v/2) / v^2,
    E w is the rate of v under an angular velocity w, so that E' K x is what a spring of energy x' K x / 2 asks for. */
-#include "impedance.h"
+#include "wanted_impedance.h"
 
 /* The turn R R_d' that leads from a target to a frame, as a quaternion (w, x, y, z) with w >= 0: the largest of the four is
    found first (S. Shepperd, J. Guidance and Control 1(3), 1978). */

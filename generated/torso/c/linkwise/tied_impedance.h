@@ -8,6 +8,8 @@
    The file that includes this one says by AT_REST and INPUTS what functions are given. */
 #include "wanted_impedance.h"
 
+#include "frame_aim.h"
+
 #include "least_torques.h"
 
 /* What a motion needs of the joints. */
@@ -144,6 +146,79 @@ int API(constrained_partial_impedance)(AT_REST, const API(constraints) *constrai
     }
     add_own(&x, need.qdd, wanted, need.torque);
     return give_torques(&x, &need, -vague(&weakest), tau, follows, forces);
+}
+
+/* How ties let a frame move, with X by what they leave free, and dG/dt as it takes velocities of all joints. */
+static int tied_frame(struct tied *x, const struct need *need, const API(frame_impedance) *wanted, struct frame_motion *frame,
+    real *bend, struct pivot *weakest)
+{
+    const int m = x->free;
+    const vector at = place_of(&x->at.s.m, wanted->frame, x->o, wanted->point);
+    ALIGNED real every[6 * N], freely[6 * N], small[N * N], moved[N * 6];
+    frame_rows(&x->at.s, wanted, at, every, frame);
+    for (int r = 0; r < 6; ++r)
+        for (int a = 0; a < m; ++a) {
+            freely[r * m + a] = 0;
+            for (int i = 0; i < N; ++i)
+                freely[r * m + a] += every[r * N + i] * x->map[i * PITCH + a];
+        }
+    reduce_inertia(x, need->mass, small);
+    const int fault = show_inertia(m, wanted, at, freely, small, moved, frame->inertia, &weakest[0], &weakest[1]);
+    if (fault)
+        return fault < 0 ? IS_HELD : IS_NOT_POSITIVE;
+    turn_map(x);
+    clear((size_t)(N * N), bend);
+    for (int i = 0; i < N; ++i) {
+        for (int r = 0; r < 6; ++r) {
+            frame->moved[i * 6 + r] = 0;
+            for (int a = 0; a < m; ++a)
+                frame->moved[i * 6 + r] += x->map[i * PITCH + a] * moved[a * 6 + r];
+        }
+        for (int a = 0; a < m; ++a)
+            bend[i * N + x->joint[x->bound + a]] = x->map_rate[i * PITCH + a];
+    }
+    return 0;
+}
+
+int API(constrained_frame_partial_impedance)(AT_REST, const API(constraints) *constraints, const API(actuators) *actuators,
+    const API(impedance) *posture, const real *q_d, const real *qd_d, const real *qdd_d, const API(frame_impedance) *wanted,
+    const real *pose_d, const real *velocity_d, const real *acceleration_d, const real *external, real *tau, real *follows,
+    real *forces)
+{
+    const API(impedance) natural = all_natural();
+    const struct frame_target target = {wanted, pose_d, velocity_d, acceleration_d};
+    ALIGNED struct tied x;
+    ALIGNED struct need need;
+    ALIGNED struct frame_motion frame;
+    ALIGNED real bend[N * N];
+    struct pivot weakest[4] = {{0, 1}, {0, 1}, {0, 1}, {0, 1}};
+    NUMBERS(numbers);
+    OFFSETS(o);
+    int why = ready(&x, &need, numbers, o, q, qd, constraints, actuators, 1);
+    if (why)
+        return why;
+    if (need.by.rank < x.free)
+        return IS_UNDRIVEN;
+    if (!posture)
+        posture = &natural;
+    deviate(q, x.qd, q_d, qd_d, qdd_d, &need.from);
+    wish(&x.at.s, posture, &need.from, 1, need.mass, need.kept, need.pull);
+    why = wanted_motion(&x, posture, external, NULL, &need, &weakest[0]);
+    if (!why)
+        why = tied_frame(&x, &need, wanted, &frame, bend, weakest + 1);
+    if (why)
+        return why;
+    why = aim(&x.at.s, &target, o, q, x.qd, &frame, external, bend, need.mass, need.qdd, &weakest[3]);
+    if (why)
+        return why == -7 ? IS_HALF_A_TURN : IS_NOT_POSITIVE;
+    answer(&x.at.s, need.qdd, x.qd, 1, need.torque);
+    for (int i = 0; external && i < N; ++i)
+        need.torque[i] -= external[i];
+    add_own(&x, need.qdd, posture, need.torque);
+    int said = 0;
+    for (int k = 0; k < 4 && !said; ++k)
+        said = -vague(&weakest[k]);
+    return give_torques(&x, &need, said, tau, follows, forces);
 }
 
 int API(constrained_cancel)(INPUTS, const API(constraints) *constraints, const API(actuators) *actuators,

@@ -117,7 +117,7 @@ def _tied_values(system: RigidSystem) -> int:
     standing = _moved(system) + 34 * len(system.links) + n
     tied = standing + rows * (3 * n + pitch + 3) + n * (2 * pitch + 4)
     beside = rows * pitch + n * (borne + 4 * pitch + 5 * n + 40) + 49 * (frames + 1)
-    controlled = n * (3 * pitch + 9 * n + 60) + rows
+    controlled = n * (3 * pitch + 9 * n + 80) + rows * (pitch + 1) + 100
     offsets = 3 * len(system.robot.named_frames) if system.parameters else 0
     return tied + max(beside, standing, controlled) + 24 * _longest(system) + _numbers(system) + offsets
 
