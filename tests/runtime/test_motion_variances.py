@@ -67,7 +67,7 @@ def test_c_answers_as_perturbed_shares_do(batch: tuple[int, ...], package: Modul
     own, other = package.load("native"), package.load("numpy")
     samples = int(np.prod(batch))
     motion = [a.reshape(*batch, -1) for a in random_states(own.n, samples)]
-    for rank in (None, 2):
+    for rank in (None, 2, 0):
         given = covariances(own.n, samples, rank).reshape(*batch, 3 * own.n, 3 * own.n)
         agree(own.uncertainty(*motion, motion=given), other.uncertainty(*motion, motion=given))
     same = covariances(own.n, 2)[1]

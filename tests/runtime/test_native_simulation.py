@@ -2,7 +2,9 @@
 
 import ctypes
 import gc
+import signal
 import subprocess
+import sys
 import weakref
 from collections.abc import Callable
 from functools import cache
@@ -209,8 +211,82 @@ def test_a_controller_may_be_a_function_of_c(backend: str, real: str, made: Any,
     for bare in (hold, CONTROLLER(address)):
         early = robot.simulate(q, qd, TIME[:2], bare, **how)
         np.testing.assert_allclose(early.tau, TIME[:2, None, None] + 0.0 * early.q, rtol=1e-6)
-        with pytest.raises(ValueError, match=r"^the controller answered with status -7 "):
+        with pytest.raises(ValueError, match=r"^the controller answered with status 7 "):
             robot.simulate(q, qd, TIME, bare, **how)
+
+
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+def test_any_status_of_a_function_of_c_ends_the_motion(backend: str, made: Any) -> None:
+    """Statuses are the controller's, whatever C's own numbers mean: here of torques that are refused once."""
+    robot, q, qd, _ = made("four-bar", backend)
+    for status in (1, 7, 10, -3):
+        left = [3, status]
+
+        @CONTROLLER
+        def once(context: int, time: float, count: int, q: int, qd: int, tau: int, left: Any = left) -> int:
+            left[0] -= 1
+            return left[1] if left[0] == 0 else 0
+
+        with pytest.raises(ValueError, match=rf"^the controller answered with status {abs(status)} "):
+            robot.simulate(q, qd, TIME, once)
+    with pytest.raises(ValueError, match="tau is a function of C at address 0"):
+        robot.simulate(q, qd, TIME, CONTROLLER(0))
+
+
+def test_what_a_handler_of_signals_raises_comes_through(made: Any) -> None:
+    """Handlers run where a callback begins, before it could catch anything: ctypes drops what they raise."""
+    robot, q, qd, _ = made("four-bar", "native")
+
+    def handler(number: int, frame: Any) -> None:
+        raise KeyboardInterrupt
+
+    before, hook = signal.signal(signal.SIGALRM, handler), sys.unraisablehook
+    try:
+        for wait in np.linspace(0.02, 0.06, 5):
+            signal.setitimer(signal.ITIMER_REAL, float(wait))
+            with pytest.raises(KeyboardInterrupt):
+                robot.simulate(q, qd, np.linspace(0.0, 60.0, 601), lambda t, q, qd: -0.1 * qd, step=1e-3)
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert sys.unraisablehook is hook
+
+
+@pytest.mark.parametrize("backend", ["numpy", "native"])
+def test_a_controller_may_write_into_what_it_is_given(backend: str, made: Any) -> None:
+    robot, q, qd, how = made("four-bar", backend)
+
+    def rude(t: float, q: Any, qd: Any) -> Any:
+        found = pull(t, q, qd)
+        q[...] = qd[...] = 7.0
+        return found
+
+    expected = robot.simulate(q, qd, TIME, pull, step=5e-3, **how)
+    np.testing.assert_array_equal(robot.simulate(q, qd, TIME, rude, step=5e-3, **how).q, expected.q)
+
+
+def test_steps_that_are_far_too_long_end_where_those_in_arrays_do(made: Any) -> None:
+    """Ways of some 25 rad, joints that change within a step, and closings that take all steps of Newton's."""
+    exact, compiled = (made("four-bar", name)[0] for name in ("numpy", "native"))
+    found = 0
+    for far in (-0.2, 0.1, 0.25):
+        at = exact.constraints.closed(exact.constraints.closed_position + far * np.eye(3)[0])
+        for speed in (-30.0, -10.0, 20.0, 30.0):
+            qd = exact.constraints.velocity(at, np.array([speed]))
+            for end in (0.05, 0.1, 0.2):
+                told = []
+                for robot in (exact, compiled):
+                    try:
+                        told.append(robot.simulate(at, qd, [0.0, end]).q)
+                    except ValueError as error:
+                        told.append(str(error))
+                if isinstance(told[0], str):
+                    assert told[0] == told[1]
+                    continue
+                np.testing.assert_allclose(*told, rtol=0, atol=1e-6 * np.abs(told[0]).max())
+                found += 1
+    assert found > 9
 
 
 def test_tensors_are_not_for_functions_of_c(made: Any) -> None:

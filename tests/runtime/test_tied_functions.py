@@ -375,3 +375,20 @@ def test_weights_of_forces_are_refused_in_words(free: ModuleType) -> None:
             ValueError, match=r"force_weight is .*; give a number above 0 for each of the 6 rows"
         ):
             robot.constrained(contacts=held, force_weight=wrong)
+
+
+def test_c_refuses_a_wrong_number_of_undriven_motions(free: ModuleType) -> None:
+    at = np.array([0.1, 0.3, 0.5, -0.7, 0.4, 0.05, 0.2])
+    ties = both(free, ("point", "rolling"), at)[1]
+    targets = ties._robot.partial_impedance(constraints=ties)._joints.targets
+    functions, given = ties.ties.rows(ties._robot.backend).functions, {"q": at, "qd": 0.1 * at}
+    own = [ties._robot.joint_names.index(name) for name in ties.independent]
+    for driven, undriven, answers in (
+        (range(7), 0, True),
+        (range(7), 1, False),
+        (own, 0, True),
+        (own, 1, False),
+        ([], len(own), False),
+    ):
+        made = functions.controller(targets, None, driven, np.ones(len(driven)), undriven)
+        assert (made.torque(given) is not None) == answers, (driven, undriven)

@@ -439,7 +439,7 @@ typedef struct {
     int driven; /* how many */
     const int *joint; /* (driven) their numbers, from 0, ascending */
     const double *weight; /* (driven) weights of the squares of their torques, above 0, or NULL: 1 each */
-    int undriven; /* motions of the independent joints in which no driven joint takes part, as of who stands on two points: 0 or more */
+    int undriven; /* how many motions of the independent joints no driven joint takes part in: 0, or 1 of who stands on two points */
 } torso_actuators;
 
 /* Partial impedance of joints that are tied, of one sample: it holds along all motions that ties leave, of the independent joints
@@ -489,7 +489,7 @@ int torso_contacts_keep(size_t grips, const torso_constraints *constraints,
 
 /* Torques of a controller, or whatever else drives the joints: asked by simulate wherever it evaluates, also between steps and once
    more at each of the instants, for all motions at once. Reads q, qd (count, JOINTS), which ties keep; writes tau (count, JOINTS).
-   Returns 0, or a number with which simulate then returns: take negative ones, which are not its own. */
+   Returns 0, or a number with which simulate ends and which it then returns, negative, as numbers of its own are not. */
 typedef int torso_controller(void *context, double time, size_t count, const double *q, const double *qd, double *tau);
 
 /* What is to be simulated. */
@@ -820,7 +820,7 @@ typedef struct {
     int driven; /* how many */
     const int *joint; /* (driven) their numbers, from 0, ascending */
     const float *weight; /* (driven) weights of the squares of their torques, above 0, or NULL: 1 each */
-    int undriven; /* motions of the independent joints in which no driven joint takes part, as of who stands on two points: 0 or more */
+    int undriven; /* how many motions of the independent joints no driven joint takes part in: 0, or 1 of who stands on two points */
 } torso_actuatorsf;
 
 /* Partial impedance of joints that are tied, of one sample: it holds along all motions that ties leave, of the independent joints
@@ -870,7 +870,7 @@ int torso_contacts_keepf(size_t grips, const torso_constraintsf *constraints,
 
 /* Torques of a controller, or whatever else drives the joints: asked by simulate wherever it evaluates, also between steps and once
    more at each of the instants, for all motions at once. Reads q, qd (count, JOINTS), which ties keep; writes tau (count, JOINTS).
-   Returns 0, or a number with which simulate then returns: take negative ones, which are not its own. */
+   Returns 0, or a number with which simulate ends and which it then returns, negative, as numbers of its own are not. */
 typedef int torso_controllerf(void *context, double time, size_t count, const float *q, const float *qd, float *tau);
 
 /* What is to be simulated. */

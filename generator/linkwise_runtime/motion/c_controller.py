@@ -50,7 +50,7 @@ class CController:
 
     def refusal(self, status: int, when: str) -> ValueError:
         """Return the error for a status that is not 0."""
-        return ValueError(f"the controller answered with status {status} {when}; 0 is for torques")
+        return ValueError(f"the controller answered with status {abs(status)} {when}; 0 is for torques")
 
 
 def controller_of(tau: object) -> object:
@@ -66,5 +66,7 @@ def controller_of(tau: object) -> object:
     if not isinstance(function, FUNCTION):
         return tau
     start = ctypes.cast(cast(Any, function), ctypes.c_void_p).value or 0
+    if not start:
+        raise ValueError("tau is a function of C at address 0; give one that is there, or None for none")
     place = None if context is None else ctypes.cast(context, ctypes.c_void_p).value
     return CController(start, place, tau)

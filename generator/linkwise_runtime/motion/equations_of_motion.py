@@ -107,7 +107,10 @@ class EquationsOfMotion:
         """Return the torques of the actuators, (..., n)."""
         if not callable(self.tau):
             return self.tau
-        found = self.tau(t, q, qd)
+        given = (q, qd)
+        if isinstance(q, np.ndarray):  # what a function writes into its arguments is not the motion
+            given = (cast(Numbers, np.array(q)), cast(Numbers, np.array(qd)))
+        found = self.tau(t, *given)
         if type(found) is np.ndarray is type(q) and found.dtype == q.dtype and found.shape == q.shape:
             return cast(Numbers, found.copy())
         (tau,) = read_at(self.backend, q, {"tau": found})

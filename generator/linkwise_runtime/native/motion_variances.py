@@ -82,7 +82,8 @@ def _factors(roots: NDArray[np.floating], samples: int, width: int, kind: Number
     found = np.zeros((-(-samples // width), size, size, width), kind)
     every = np.broadcast_to(roots, (samples, size, count)).swapaxes(1, 2)
     whole = samples // width * width
-    found[: whole // width, :count] = np.moveaxis(every[:whole].reshape(-1, width, count, size), 1, 3)
+    full = every[:whole].reshape(whole // width, width, count, size)
+    found[: whole // width, :count] = np.moveaxis(full, 1, 3)
     found[whole // width :, :count, :, : samples - whole] = np.moveaxis(every[None, whole:], 1, 3)
     return found
 

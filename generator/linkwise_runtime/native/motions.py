@@ -2,7 +2,9 @@
 
 import ctypes
 import math
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from typing import TYPE_CHECKING, Any, cast
 
@@ -55,6 +57,8 @@ class CalledBack:
 
     def __call__(self, context: int, time: float, count: int, q: int, qd: int, tau: int) -> int:
         """Write the torques of an instant; return 0, or `REFUSED` where the controller raised an error."""
+        if self.error is not None:
+            return REFUSED
         try:
             at, moved = self._memory[:2].copy()
             self._memory[2] = cast(NumberArray, self._tau(time, cast(Numbers, at), cast(Numbers, moved)))
@@ -62,6 +66,23 @@ class CalledBack:
             self.error = error
             return REFUSED
         return 0
+
+    @contextmanager
+    def hearing(self) -> Iterator[None]:
+        """Keep what handlers of signals raise before or behind a call, which ctypes takes for not raised."""
+        before = sys.unraisablehook
+
+        def hear(told: Any) -> None:
+            if told.object is self:
+                self.error = told.exc_value
+            else:
+                before(told)
+
+        sys.unraisablehook = hear
+        try:
+            yield
+        finally:
+            sys.unraisablehook = before
 
     def check(self) -> None:
         """Raise what the controller raised, unchanged."""
@@ -101,12 +122,14 @@ class NativeMotions:
         results = [np.empty((rows, *batch, n), kind) for _ in range(3)] + [np.empty((rows, *batch), kind)]
         told, kept = _told(asked, kind, back, reached)
         arrays = [q, qd, *([calls.constants(kind)] if calls.parameters else [])]
-        status = self._function(kind)(
-            ctypes.c_size_t(count),
-            *(ctypes.c_void_p(address(a)) for a in arrays),
-            ctypes.byref(told),
-            *(ctypes.c_void_p(address(a)) for a in (scratch, *results)),
-        )
+        function = self._function(kind)
+        with nullcontext() if back is None else back.hearing():
+            status = function(
+                ctypes.c_size_t(count),
+                *(ctypes.c_void_p(address(a)) for a in arrays),
+                ctypes.byref(told),
+                *(ctypes.c_void_p(address(a)) for a in (scratch, *results)),
+            )
         del kept
         if back is not None:
             back.check()

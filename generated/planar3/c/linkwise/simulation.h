@@ -113,11 +113,14 @@ static int form(const struct simulated *all, struct held_sample *at, size_t s, e
     return 0;
 }
 
-/* Torques of all motions where they are; 0, or what the controller answers with. */
+/* Torques of all motions where they are; 0, or what the controller answers with, below 0, where no status of ours is. */
 static int drive(const struct simulated *all, double time)
 {
     const API(simulation) *const wanted = all->wanted;
-    return wanted->controller ? wanted->controller(wanted->context, time, all->count, all->q, all->qd, all->tau) : 0;
+    if (!wanted->controller)
+        return 0;
+    const int said = wanted->controller(wanted->context, time, all->count, all->q, all->qd, all->tau);
+    return said > 0 ? -said : said;
 }
 
 /* The slopes of motion s under its torques. */
@@ -210,6 +213,16 @@ static int tell(const struct simulated *all, double time, size_t row, const stru
     return 0;
 }
 
+/* Whether instants are finite and ascending, and the step is one. */
+static int can_be_taken(const API(simulation) *wanted)
+{
+    const double *const time = wanted->time;
+    for (size_t row = 0; row < wanted->instants; ++row)
+        if (!(time[row] - time[row] == 0) || (row && !(time[row] > time[row - 1])))
+            return 0;
+    return wanted->step >= 0 && wanted->step - wanted->step == 0;
+}
+
 /* All motions where they begin. */
 static int begin_motions(const struct simulated *all, struct held_sample *at, const real *q, const real *qd)
 {
@@ -220,7 +233,7 @@ static int begin_motions(const struct simulated *all, struct held_sample *at, co
     at->x.c = wanted->constraints;
     at->x.o = all->o;
     at->x.numbers = all->numbers;
-    if (wanted->constraints && (count_rows(wanted->constraints) < 0 || !read_joints(&at->x)))
+    if (!can_be_taken(wanted) || (wanted->constraints && (count_rows(wanted->constraints) < 0 || !read_joints(&at->x))))
         return IS_UNKNOWN;
     for (size_t s = 0; s < all->count; ++s) {
         ALIGNED real state[STATE];

@@ -11,7 +11,7 @@
 #define FAR R(0.1)
 
 /* A motion's own: which joints are dependent, then which are independent, what was left where they were chosen, and where contacts
-   took hold; then, where the last step ended, q, G in rows of m, the reflectors of A_d = Q R, and Q' A (d, N). */
+   took hold; then, where the last step ended, q, G by the numbers of the joints that were independent there, the reflectors of A_d = Q R, and Q' A (d, N). */
 struct course {
     real joint[N], left, weak, held[N], q[N], map[N * N], reflector[N * ROWS], twice[N], rows[N * N];
 };
@@ -122,10 +122,8 @@ static void lead(const struct tied *x, const struct course *c, real *q)
             return;
     for (int i = 0; i < N; ++i) {
         led[i] = c->q[i];
-        for (int a = 0; a < x->free; ++a) {
-            const int k = (int)c->joint[x->bound + a];
-            led[i] += c->map[i * x->free + a] * (q[k] - c->q[k]);
-        }
+        for (int k = 0; k < N; ++k)
+            led[i] += c->map[i * N + k] * (q[k] - c->q[k]);
         is_far |= F(fabs)(q[i] - led[i]) > FAR;
     }
     if (is_far)
@@ -195,7 +193,7 @@ static int has_turned(const struct tied *x, const struct course *c)
 static void remember(const struct tied *x, const real *q, struct course *c)
 {
     ALIGNED real now[ROWS * PITCH];
-    const size_t d = (size_t)x->bound, m = (size_t)x->free;
+    const size_t d = (size_t)x->bound;
     copy(N, q, c->q);
     copy(d * ROWS, x->reflector, c->reflector);
     copy(d, x->twice, c->twice);
@@ -204,8 +202,10 @@ static void remember(const struct tied *x, const real *q, struct course *c)
         reflect(f, x->t.rows, N, x->reflector + f * ROWS, x->twice[f], now);
     for (size_t f = 0; f < d; ++f)
         copy(N, now + f * PITCH, c->rows + f * N);
-    for (size_t i = 0; i < N; ++i)
-        copy(m, x->map + i * PITCH, c->map + i * m);
+    clear((size_t)(N * N), c->map);
+    for (int i = 0; i < N; ++i)
+        for (int a = 0; a < x->free; ++a)
+            c->map[i * N + x->joint[x->bound + a]] = x->map[i * PITCH + a];
 }
 
 /* Other independent joints at a closed place, where those of the course tell less than `weak`; the place is then that of these. */

@@ -59,7 +59,9 @@ static int close_ties(struct tied *x, const struct standing *held, real *q)
         for (int i = 0; i < N; ++i)
             q[i] += step[i] * shorter;
     }
-    return IS_UNCLOSED;
+    stand(x->numbers, q, &x->at);
+    rows_at(x->c, &x->at, held, x->o, &x->t);
+    return !factor_rows(x, NULL) ? IS_SINGULAR : is_open(x) ? IS_UNCLOSED : 0;
 }
 
 int API(closed)(size_t count, AT_POSITION, const API(constraints) *constraints, const real *held_at, real *closed)

@@ -21,7 +21,7 @@ static int read_driven(const struct tied *x, const API(actuators) *by, struct dr
     real most = 0, least_size = 0;
     d->count = by->driven;
     d->rank = x->free - by->undriven;
-    if (by->driven < 0 || by->driven > N || by->undriven < 0 || d->rank < 0 || d->rank > by->driven)
+    if (by->driven < 1 || by->driven > N || by->undriven < 0 || d->rank < 0 || d->rank > by->driven)
         return IS_UNKNOWN;
     clear((size_t)(N * PITCH), d->factor);
     for (int r = 0; r < by->driven; ++r) {
@@ -65,6 +65,10 @@ static int read_driven(const struct tied *x, const API(actuators) *by, struct dr
         for (int c = f + 1; c < x->free; ++c)
             d->factor[c * PITCH + f] = 0;
     }
+    for (int r = d->rank; r < d->count; ++r) /* of which nothing is left, if as few motions are driven */
+        for (int c = d->rank; c < x->free; ++c)
+            if (F(fabs)(d->factor[c * PITCH + r]) > HALF * most * least_size)
+                return IS_UNKNOWN;
     return 0;
 }
 
