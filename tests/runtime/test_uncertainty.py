@@ -210,6 +210,16 @@ def test_covariances_of_motion_that_cannot_be_are_refused(
         package_of("planar3").load("numpy").uncertainty(*random_states(3, 2), motion=given)
 
 
+def test_a_covariance_in_single_precision_has_its_rounding(package_of: Callable[[str], ModuleType]) -> None:
+    """Of one direction alone, its other eigenvalues are rounding, on either side of zero."""
+    robot, root = package_of("planar3").load("numpy"), np.random.default_rng(4).normal(size=(9, 1))
+    motion = random_states(3, 2)
+    exact, single = (
+        robot.uncertainty(*motion, motion=(root @ root.T).astype(k)) for k in (float, np.float32)
+    )
+    np.testing.assert_allclose(single.torque, exact.torque, rtol=1e-5)
+
+
 def test_lengths_count_by_slopes_of_robots_whose_joints_are_elsewhere(
     package_at: Callable[[str], ModuleType],
 ) -> None:

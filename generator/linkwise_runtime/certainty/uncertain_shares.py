@@ -125,7 +125,8 @@ def motion_roots(given: object, batch: Sequence[int], n: int) -> Floats:
     Raises ValueError for what is no covariance, or not of these joints and samples.
     """
     try:
-        matrices = np.asarray(given, dtype=float)
+        read = np.asarray(given)
+        matrices = read.astype(float)
     except (TypeError, ValueError):
         raise ValueError(f"motion is {short(given)}; give a covariance of q, qd and qdd") from None
     size = 3 * n
@@ -140,7 +141,8 @@ def motion_roots(given: object, batch: Sequence[int], n: int) -> Floats:
     scale[scale == 0.0] = 1.0
     own = flat / (scale[:, :, None] * scale[:, None])
     values, vectors = np.linalg.eigh(0.5 * (own + own.mT))
-    if np.abs(own - own.mT).max() > ROUNDING or values.min() < -ROUNDING * size:
+    rounding = max(ROUNDING, 8.0 * float(np.finfo(read.dtype).eps)) if read.dtype.kind == "f" else ROUNDING
+    if np.abs(own - own.mT).max() > rounding or values.min() < -rounding * size:
         raise ValueError("motion is no covariance: it is not symmetric, or has a negative eigenvalue")
     found: Floats = scale[:, :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None]
-    return found[:, :, (values > ROUNDING).any(0)]
+    return found[:, :, (values > rounding).any(0)]
