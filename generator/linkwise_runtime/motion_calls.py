@@ -52,7 +52,8 @@ class MotionCalls(RobotCalls):
         float32) of what joints could close, and 1e-4 of the rest: right angles of 1.5708 in files leave some
         micrometres that nothing closes
         force_weight: weights of the squares of the forces of redundant rows, of which the least sum is taken:
-        numbers above 0, (C,), or by the name of a tie or contact, 1 for what is left out
+        numbers above 0, (C,), or by the name of a tie or contact, 1 for what is left out, at most 1e6 times
+        apart; a coupling's force counts times its largest slope, where that is above 1
 
         Raises ValueError for a joint or frame that does not exist, for independent joints that do not
         determine the others at `at`, and where nothing is left to move.

@@ -210,6 +210,12 @@ def test_covariances_of_motion_that_cannot_be_are_refused(
         package_of("planar3").load("numpy").uncertainty(*random_states(3, 2), motion=given)
 
 
+def test_no_samples_have_no_deviations(package_of: Callable[[str], ModuleType]) -> None:
+    none = np.zeros((0, 3))
+    found = package_of("planar3").load("numpy").uncertainty(none, none, none, motion=np.zeros((0, 9, 9)))
+    assert found.torque.shape == (0, 3, 3)
+
+
 def test_a_covariance_in_single_precision_has_its_rounding(package_of: Callable[[str], ModuleType]) -> None:
     """Of one direction alone, its other eigenvalues are rounding, on either side of zero."""
     robot, root = package_of("planar3").load("numpy"), np.random.default_rng(4).normal(size=(9, 1))

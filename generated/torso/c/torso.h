@@ -373,7 +373,8 @@ typedef struct {
     int freedoms; /* how many joints are independent: JOINTS less the rank of A */
     const int *independent; /* (freedoms) their numbers, from 0, ascending */
     double tolerance; /* most that rows may be open, in m and rad; 0: 1e-4, and what joints could close 1e-6 */
-    const double *weight; /* (ROWS) weights of the squares of forces of redundant rows, above 0, or NULL: 1 each */
+    const double *weight; /* (ROWS) weights of the squares of forces of redundant rows, above 0 and not far apart, or NULL: 1 each;
+        a coupling's force counts times its largest slope, where that is above 1 */
 } torso_constraints;
 
 /* Rows stand in the order of the robot's ties, the contacts, and the robot's couplings: of a point or of what rolls 3, of a hinge 2
@@ -754,7 +755,8 @@ typedef struct {
     int freedoms; /* how many joints are independent: JOINTS less the rank of A */
     const int *independent; /* (freedoms) their numbers, from 0, ascending */
     float tolerance; /* most that rows may be open, in m and rad; 0: 1e-4 */
-    const float *weight; /* (ROWS) weights of the squares of forces of redundant rows, above 0, or NULL: 1 each */
+    const float *weight; /* (ROWS) weights of the squares of forces of redundant rows, above 0 and not far apart, or NULL: 1 each;
+        a coupling's force counts times its largest slope, where that is above 1 */
 } torso_constraintsf;
 
 /* Rows stand in the order of the robot's ties, the contacts, and the robot's couplings: of a point or of what rolls 3, of a hinge 2

@@ -136,6 +136,8 @@ def motion_roots(given: object, batch: Sequence[int], n: int) -> Floats:
     if not np.isfinite(matrices).all():
         raise ValueError("motion has NaN or infinity; give finite numbers")
     flat = matrices.reshape(-1, size, size)
+    if not flat.size:
+        return np.zeros((0, size, 0))
     # By correlations, as positions, velocities and accelerations differ in size and unit.
     scale = np.sqrt(np.abs(np.einsum("saa->sa", flat)))
     scale[scale == 0.0] = 1.0

@@ -32,6 +32,8 @@ STEPS = 60
 LONGEST = 0.5
 """Largest step of a joint, in rad and m."""
 SHORTEST = 1e-10
+APART = 1e6
+"""Largest ratio of weights of forces."""
 OPEN = 1e-4
 """Largest violation, in m and rad, that may stay where nothing closes it: files round their numbers."""
 Floats = NDArray[np.float64]
@@ -167,17 +169,28 @@ class ChosenConstraints:
         """Read the weights of forces, by row or by name; raises ValueError for what are none."""
         if given is None:
             return
-        by_row, known = given, True
-        if isinstance(given, Mapping):
-            by_row = [given.get(name, 1.0) for name in self.row_names]
-            known = given.keys() <= {*self.row_names}
-        weight = kept_numbers("force_weight", by_row)
-        if not known or weight is None or weight.shape != (len(self.rows),) or not (weight > 0.0).all():
+        weight = self._by_name(given) if isinstance(given, Mapping) else kept_numbers("force_weight", given)
+        if weight is None or weight.shape != (len(self.rows),) or not (weight > 0.0).all():
             raise ValueError(
                 f"force_weight is {short(given)}; give a number above 0 for each of the {len(self.rows)} "
                 f"rows, or by name for some of {listed(list(dict.fromkeys(self.row_names)))}"
             )
+        if not weight.max() <= APART * weight.min():
+            raise ValueError(
+                f"force_weight is {short(given)}, of which some are more than {APART:g} times others; "
+                "digits of forces would be lost"
+            )
         self.force_weight = weight
+
+    def _by_name(self, given: Mapping[str, object]) -> NDArray[np.float64] | None:
+        """Return weights by row of those by name; None where a name or a number is none."""
+        weights = dict.fromkeys(self.row_names, 1.0)
+        for name, value in given.items():
+            weight = kept_numbers(f"force_weight[{name!r}]", value)
+            if name not in weights or weight is None or weight.ndim:
+                return None
+            weights[name] = float(weight)
+        return np.array([weights[name] for name in self.row_names])
 
     def _choose(self, independent: object, at: object, loose: Sequence[int], contacts: bool = False) -> None:
         """Choose the independent joints; loose: those that rather follow others, as nothing drives them."""

@@ -31,6 +31,8 @@ class DependentMap(NamedTuple):
     """A_d^+, (..., d, C)."""
     map: Numbers
     """G, (..., n, m)."""
+    bearing: Numbers
+    """A_d^+, (..., d, C), or with weights of forces the one of which these are the least."""
 
 
 class RowNames(NamedTuple):
@@ -126,18 +128,18 @@ def checked_place(
 ) -> ClosedPlace:
     """Return how joints follow where ties close; raises ValueError where they do not stay closed.
 
-    shares: W^(-1/2) (C,), where redundant rows bear the least lambda^T W lambda: A_d^+ is then
+    shares: W^(-1/2) (C,), where redundant rows bear the least lambda^T W lambda: forces are then those of
     (W^(-1/2) A_d)^+ W^(-1/2)
     """
-    if shares is not None:
-        inverse = pseudoinverse(factor_dependent(at.rows * shares[..., None], columns)) * shares
-    else:
-        inverse = pseudoinverse(at.factors) if at.inverse is None else at.inverse
+    inverse = pseudoinverse(at.factors) if at.inverse is None else at.inverse
     mapped = velocity_map(at.rows, columns, inverse)
     check_following(at.rows, columns, mapped, names.owners, names.joints)
+    bearing = inverse
+    if shares is not None:
+        bearing = pseudoinverse(factor_dependent(at.rows * shares[..., None], columns)) * shares
     if at.sizes is not None:  # rates and forces are those of rows that are not scaled
-        inverse = inverse / at.sizes[..., None, :]
-    found = DependentMap(columns, inverse, mapped)
+        inverse, bearing = inverse / at.sizes[..., None, :], bearing / at.sizes[..., None, :]
+    found = DependentMap(columns, inverse, mapped, bearing)
     return ClosedPlace(at.q, found, at.made, at.rows, at.factors, at.unit_rows)
 
 
@@ -179,15 +181,16 @@ def pseudoinverse(factors: tuple[Numbers, Numbers]) -> Numbers:
 def velocity_map(rows: Numbers, columns: JointColumns, inverse: Numbers) -> Numbers:
     """Return the velocity map G (..., n, m), with zeros for joints that ties hold where they are.
 
-    Of such a joint only rounding is left, |G_ia| <= eps^(2/3) |A_d^+ row i| |A_y column a|, whose sign would
-    be that of its Coulomb friction. Zeros are made by what has no gradient: the joint may begin to move.
+    Of such a joint only rounding is left, |G_ia| <= 4 n eps |A_d^+ row i| |A_y column a|, whose sign would be
+    that of its Coulomb friction. Zeros are made by what has no gradient: the joint may begin to move.
     """
     xp = namespace(rows)
     own = columns.own(rows)
     moved = -inverse @ own
     m = columns.independent.shape[-1]
     reach = (inverse * inverse).sum(-1)[..., None] * (own * own).sum(-2)[..., None, :]
-    held = (moved * moved <= epsilon_of(rows) ** (4.0 / 3.0) * reach).all(-1)[..., None]
+    rounding = 4.0 * rows.shape[-1] * epsilon_of(rows)
+    held = (moved * moved <= rounding**2 * reach).all(-1)[..., None]
     left = moved if isinstance(moved, np.ndarray) else cast("Tensor", moved).detach()
     moved = moved - xp.where(held, left, xp.zeros_like(left))
     # Zeros made from the motion give a unit matrix of its kind, through which gradients can flow.
@@ -210,7 +213,7 @@ def closable(factors: tuple[Numbers, Numbers], violation: Numbers) -> Numbers:
 
 def tie_forces(found: DependentMap, torque: Numbers) -> Numbers:
     """Return lambda (..., C, X) for torques (..., n, X), of which those of dependent joints count."""
-    return found.inverse.mT @ found.columns.others(torque, -2)
+    return found.bearing.mT @ found.columns.others(torque, -2)
 
 
 def independent_torque(found: DependentMap, torque: Numbers) -> Numbers:

@@ -255,7 +255,7 @@ static real square_of_row(const struct tied *x, int f)
 }
 
 /* G, from the factors, which are then no more than R. Of joints that ties hold where they are only rounding is left,
-   |G_ia| <= LOST |A_d+ row i| |A_y column a|, whose sign would be that of their Coulomb friction: these get zeros. */
+   |G_ia| <= 4 N EPSILON |A_d+ row i| |A_y column a|, whose sign would be that of their Coulomb friction: these get zeros. */
 static void find_map(struct tied *x)
 {
     const int m = x->free, d = x->bound;
@@ -268,7 +268,7 @@ static void find_map(struct tied *x)
         real *const row = x->map + x->joint[i] * PITCH;
         for (int a = 0; a < PITCH; ++a)
             row[a] = a >= m ? R(0.0) : i < d ? -x->factor[i * PITCH + d + a] : (real)(i - d == a);
-        const real rounding = i < d ? LOST * LOST * square_of_row(x, i) : R(0.0);
+        const real rounding = i < d ? ROUNDING(N) * ROUNDING(N) * square_of_row(x, i) : R(0.0);
         int moves = i >= d;
         for (int a = 0; a < m; ++a)
             moves |= row[a] * row[a] > rounding * reach[a];
@@ -346,11 +346,8 @@ static int observe_tied(struct tied *x, const struct numbers *numbers, const str
     find_map(x);
     if (is_contradicted(x))
         return IS_CONTRADICTED;
-    if (c->weight && x->t.rows > x->bound) {
-        if (!factor_rows(x, c->weight))
-            return IS_SINGULAR;
-        find_map(x);
-    }
+    if (c->weight && x->t.rows > x->bound && !factor_rows(x, c->weight))
+        return IS_SINGULAR;
     return 0;
 }
 
