@@ -125,9 +125,9 @@ def test_threads_are_those_of_copies_and_where_gradients_are_recorded(
     for again in (copy(robot), deepcopy(robot), pickle.loads(pickle.dumps(robot))):
         assert again.backend.threads == 3
     parts = []
-    share = type(robot.backend.calls)._share
+    share = type(robot.backend.calls).share
     monkeypatch.setattr(
-        type(robot.backend.calls), "_share", lambda *given: (parts.append(given[4]), share(*given))
+        type(robot.backend.calls), "share", lambda *given: (parts.append(given[4]), share(*given))
     )
     q, qd, qdd = torch.from_numpy(np.tile(motion, (1, 4, 1)))
     robot.packed_torque(q.requires_grad_(), qd, qdd).sum().backward()

@@ -113,7 +113,7 @@ enum {
     PLANAR3_NOT_POSITIVE = 8,
     PLANAR3_UNDRIVEN = 9,
     PLANAR3_NOT_FINITE = 10,
-    PLANAR3_FRAME_HELD = 11,
+    PLANAR3_STUCK = 11,
     PLANAR3_HALF_A_TURN = 12
 };
 
@@ -439,7 +439,7 @@ int planar3_constrained_partial_impedance(const double *q, const double *qd, con
 
 /* The same of a frame, which comes first: of all accelerations that ties allow and that give what is wanted of it, the joints get those
    that are closest, in the sense of H, to what `posture` wants of them, NULL for all natural. Its L and mu are by what ties leave free:
-   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these PLANAR3_FRAME_HELD where the
+   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these PLANAR3_STUCK where the
    frame cannot move along a row beside those before it, and PLANAR3_HALF_A_TURN as far from a pose_d to which it is to turn, or
    that is no rotation. Nothing may be undriven. Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
    velocity_d, acceleration_d (6); writes tau, qdd (JOINTS), forces (ROWS). */
@@ -813,7 +813,7 @@ int planar3_constrained_partial_impedancef(const float *q, const float *qd, cons
 
 /* The same of a frame, which comes first: of all accelerations that ties allow and that give what is wanted of it, the joints get those
    that are closest, in the sense of H, to what `posture` wants of them, NULL for all natural. Its L and mu are by what ties leave free:
-   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these PLANAR3_FRAME_HELD where the
+   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these PLANAR3_STUCK where the
    frame cannot move along a row beside those before it, and PLANAR3_HALF_A_TURN as far from a pose_d to which it is to turn, or
    that is no rotation. Nothing may be undriven. Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
    velocity_d, acceleration_d (6); writes tau, qdd (JOINTS), forces (ROWS). */

@@ -125,7 +125,7 @@ enum {
     PUMA560_NOT_POSITIVE = 8,
     PUMA560_UNDRIVEN = 9,
     PUMA560_NOT_FINITE = 10,
-    PUMA560_FRAME_HELD = 11,
+    PUMA560_STUCK = 11,
     PUMA560_HALF_A_TURN = 12
 };
 
@@ -463,7 +463,7 @@ int puma560_constrained_partial_impedance(const double *q, const double *qd, con
 
 /* The same of a frame, which comes first: of all accelerations that ties allow and that give what is wanted of it, the joints get those
    that are closest, in the sense of H, to what `posture` wants of them, NULL for all natural. Its L and mu are by what ties leave free:
-   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these PUMA560_FRAME_HELD where the
+   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these PUMA560_STUCK where the
    frame cannot move along a row beside those before it, and PUMA560_HALF_A_TURN as far from a pose_d to which it is to turn, or
    that is no rotation. Nothing may be undriven. Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
    velocity_d, acceleration_d (6); writes tau, qdd (JOINTS), forces (ROWS). */
@@ -849,7 +849,7 @@ int puma560_constrained_partial_impedancef(const float *q, const float *qd, cons
 
 /* The same of a frame, which comes first: of all accelerations that ties allow and that give what is wanted of it, the joints get those
    that are closest, in the sense of H, to what `posture` wants of them, NULL for all natural. Its L and mu are by what ties leave free:
-   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these PUMA560_FRAME_HELD where the
+   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these PUMA560_STUCK where the
    frame cannot move along a row beside those before it, and PUMA560_HALF_A_TURN as far from a pose_d to which it is to turn, or
    that is no rotation. Nothing may be undriven. Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
    velocity_d, acceleration_d (6); writes tau, qdd (JOINTS), forces (ROWS). */

@@ -127,7 +127,7 @@ enum {
     TORSO_NOT_POSITIVE = 8,
     TORSO_UNDRIVEN = 9,
     TORSO_NOT_FINITE = 10,
-    TORSO_FRAME_HELD = 11,
+    TORSO_STUCK = 11,
     TORSO_HALF_A_TURN = 12
 };
 
@@ -461,7 +461,7 @@ int torso_constrained_partial_impedance(const double *q, const double *qd, const
 
 /* The same of a frame, which comes first: of all accelerations that ties allow and that give what is wanted of it, the joints get those
    that are closest, in the sense of H, to what `posture` wants of them, NULL for all natural. Its L and mu are by what ties leave free:
-   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these TORSO_FRAME_HELD where the
+   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these TORSO_STUCK where the
    frame cannot move along a row beside those before it, and TORSO_HALF_A_TURN as far from a pose_d to which it is to turn, or
    that is no rotation. Nothing may be undriven. Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
    velocity_d, acceleration_d (6); writes tau, qdd (JOINTS), forces (ROWS). */
@@ -843,7 +843,7 @@ int torso_constrained_partial_impedancef(const float *q, const float *qd, const 
 
 /* The same of a frame, which comes first: of all accelerations that ties allow and that give what is wanted of it, the joints get those
    that are closest, in the sense of H, to what `posture` wants of them, NULL for all natural. Its L and mu are by what ties leave free:
-   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these TORSO_FRAME_HELD where the
+   J G in the place of J, and G' H G. Returns as constrained_partial_impedance does, and beside these TORSO_STUCK where the
    frame cannot move along a row beside those before it, and TORSO_HALF_A_TURN as far from a pose_d to which it is to turn, or
    that is no rotation. Nothing may be undriven. Reads q, qd (JOINTS), q_d, qd_d, qdd_d, external (JOINTS), pose_d (4, 4),
    velocity_d, acceleration_d (6); writes tau, qdd (JOINTS), forces (ROWS). */

@@ -70,7 +70,7 @@ CONSTANTS = {
     "NOT_POSITIVE": 8,
     "UNDRIVEN": 9,
     "NOT_FINITE": 10,
-    "FRAME_HELD": 11,
+    "STUCK": 11,
     "HALF_A_TURN": 12,
 }
 """Constants of the header, without the robot's name."""

@@ -165,7 +165,7 @@ static int tied_frame(struct tied *x, const struct need *need, const API(frame_i
     reduce_inertia(x, need->mass, small);
     const int fault = show_inertia(m, wanted, at, freely, small, moved, frame->inertia, &weakest[0], &weakest[1]);
     if (fault)
-        return fault < 0 ? IS_HELD : IS_NOT_POSITIVE;
+        return fault < 0 ? IS_STUCK : IS_NOT_POSITIVE;
     turn_map(x);
     clear((size_t)(N * N), bend);
     for (int i = 0; i < N; ++i) {

@@ -36,7 +36,7 @@ enum {
     IS_NOT_POSITIVE,
     IS_UNDRIVEN,
     IS_NOT_FINITE,
-    IS_HELD,
+    IS_STUCK,
     IS_HALF_A_TURN
 };
 
