@@ -117,12 +117,13 @@ static inline int frame_acceleration(const struct sample *s, const API(frame_imp
     if (wanted->stiffness && pull(s, wanted, target, at, out))
         return -7;
     if (wanted->keep_velocity != 0) {
-        real moment[6], change[6], joint[N], torque[N], turned_by[N];
+        real moment[6], change[6], joint[N], torque[N];
         times(6, 6, frame->inertia, velocity, moment);
         times(N, 6, frame->moved, moment, joint);
         answer(s, still, joint, 0, torque);
         times(6, N, frame->rate, joint, change);
         if (bend) {
+            real turned_by[N];
             times(N, N, bend, joint, turned_by);
             for (int i = 0; i < N; ++i)
                 torque[i] += dot(N, mass + i * N, turned_by);

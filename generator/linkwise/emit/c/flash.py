@@ -45,7 +45,8 @@ def code_size(name: str, files: Mapping[str, str]) -> CodeSize | None:
     tables = SHORTS.findall(tree) + SHORTS.findall(COMMENT.sub("", files[f"c/{name}.c"]))
     above = sum(len(table.split(",")) - 1 for table in tables)
     base = ENERGIES if not tree else STRAIGHT if links_code else LOOPS
-    free = (FREE_STRAIGHT if links_code else FREE_LOOPS) if "frame_partial_impedance(" in header else (0, 0)
+    is_free = f" {name}_frame_partial_impedance(" in header
+    free = (FREE_STRAIGHT if links_code else FREE_LOOPS) if is_free else (0, 0)
     double, single = (
         base[at]
         + free[at]
