@@ -217,7 +217,7 @@ def test_no_samples_have_no_deviations(package_of: Callable[[str], ModuleType]) 
 
 
 def test_a_covariance_in_single_precision_has_its_rounding(package_of: Callable[[str], ModuleType]) -> None:
-    """Of one direction alone, its other eigenvalues are rounding, on either side of zero."""
+    """Eigenvalues but that of its one direction are rounding, on either side of zero."""
     robot, root = package_of("planar3").load("numpy"), np.random.default_rng(4).normal(size=(9, 1))
     motion = random_states(3, 2)
     exact, single = (
