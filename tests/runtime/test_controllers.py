@@ -329,6 +329,7 @@ def test_targets_that_cannot_be_are_refused_in_one_line(package_of: Packages) ->
         ({"frame": frame("base", rows=("x",))}, "'base' cannot move along 1 rows, each by itself: 0 joints"),
         ({"frame": frame("link3")}, "'link3' cannot move along 6 rows, each by itself: 3 joints move it"),
         ({"frame": frame("link3", rows=("x",), point=(0, np.nan, 0))}, "frame.point is"),
+        ({"frame": frame("link3", rows=("x",), point="abc")}, "frame.point is 'abc'"),
         ({"frame": frame("hand")}, "frame is 'hand'"),
         ({"frame": frame("link3", rows=("x", "x"))}, "choose some of rx, ry, rz, x, y, z"),
         ({"frame": frame("link3", stiffness=-1.0, rows=("x",))}, "frame.stiffness is not positive"),

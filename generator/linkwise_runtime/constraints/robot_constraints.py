@@ -317,7 +317,7 @@ class Constraints(Generic[Array]):
 
     @cached_property
     def _functions(self) -> TiedFunctions | None:
-        return self.ties.rows(self._robot.backend).functions
+        return self.ties.functions(self._robot.backend)
 
     @cached_property
     def _closed_position(self) -> NDArray[np.float64]:

@@ -124,7 +124,7 @@ class Controller:
         by, targets = self._actuators, self._joints.targets
         if self._constraints is None:
             return backend.controller(targets, self._frame) if by.drive_all else None
-        functions = self._constraints.ties.rows(backend).functions
+        functions = self._constraints.ties.functions(backend)
         if functions is None or self._grips:
             return None
         return functions.controller(targets, self._frame, by.joints, by.weight, by.undriven)

@@ -14,13 +14,13 @@ Khatib, A unified approach for motion and force control of robot manipulators, 1
 """
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..answers.inertia_solve import Told
-from ..arguments import refuse_gradient
+from ..arguments import kept_numbers
 from ..arrays.backend import ArrayBackend
 from ..chosen_names import known_kind, short
 from ..constraints.closed_places import times
@@ -253,9 +253,8 @@ def _point(given: object) -> NDArray[np.float64]:
 
     Raises ValueError for what is not three finite numbers, TypeError for a gradient.
     """
-    refuse_gradient("frame.point", given)
-    point = np.array(cast(ArrayLike, given), float)
-    if point.shape != (3,) or not np.isfinite(point).all():
+    point = kept_numbers("frame.point", given)
+    if point is None or point.shape != (3,):
         raise ValueError(f"frame.point is {short(given)}; give x, y, z in the frame, in m")
     return point
 

@@ -256,7 +256,7 @@ def _by_functions(
     constraints: Constraints[Any], asked: Driven, backend: ArrayBackend, q: Numbers, qd: Numbers
 ) -> Sequence[Numbers] | None:
     """Return velocities that follow, and the response, of the back end's own functions; None without any."""
-    functions = constraints.ties.rows(backend).functions
+    functions = constraints.ties.functions(backend)
     call = "response" if asked.passive else "response_of_links"
     return None if functions is None else functions.answer(call, [q, qd])
 
