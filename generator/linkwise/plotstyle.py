@@ -1,9 +1,12 @@
 """Style of every plot: legible on paper, in grey and to the colour-blind; the same on each run."""
 
 import io
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal, get_args
+
+import numpy as np
 
 from linkwise.escape import printable, short
 from linkwise.extras import extra
@@ -84,16 +87,39 @@ def styled() -> Iterator[Any]:
         yield matplotlib
 
 
-def saved(figure: Any, kind: str, dpi: int = 200) -> bytes:
-    """Return the bytes of a figure as "svg", "pdf" or "png".
+FigureFormat = Literal["svg", "pdf", "eps", "png"]
+FORMATS: tuple[FigureFormat, ...] = get_args(FigureFormat)
 
-    They have no date or program, which would make runs differ.
+
+def saved(figure: Any, kind: FigureFormat, dpi: int = 200) -> bytes:
+    """Return the bytes of a figure.
+
+    They have no date or program, which would make runs differ. EPS has no transparency, so that in it what is
+    pale is made opaque, and hides what is behind.
     """
     out = io.BytesIO()
-    nameless = {
+    nameless: dict[str, dict[str, str | None]] = {
         "svg": {"Date": None, "Creator": None},
         "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+        "eps": {"Creator": "linkwise"},
         "png": {"Software": None},
-    }[kind]
-    figure.savefig(out, format=kind, dpi=dpi, metadata=nameless)
-    return out.getvalue()
+    }
+    if kind == "eps":
+        _make_opaque(figure)
+    figure.savefig(out, format=kind, dpi=dpi, metadata=nameless[kind])
+    return re.sub(rb"(?m)^%%CreationDate:.*\n", b"", out.getvalue()) if kind == "eps" else out.getvalue()
+
+
+def _make_opaque(figure: Any) -> None:
+    """Mix the colours of what is transparent with white."""
+    colors = extra("matplotlib.colors")
+    for artist in figure.findobj(lambda one: one.get_alpha() not in (None, 1.0)):
+        alpha = artist.get_alpha()
+        artist.set_alpha(None)
+        for part in ("color", "facecolor"):
+            if hasattr(artist, f"get_{part}"):
+                drawn_in = colors.to_rgba_array(getattr(artist, f"get_{part}")())
+                visible = drawn_in[:, 3:] > 0.0
+                pale = 1.0 - alpha * (1.0 - drawn_in[:, :3])
+                getattr(artist, f"set_{part}")(np.hstack([pale, visible]))
+                break

@@ -105,6 +105,18 @@ def test_a_trial_is_done_again_for_whatever_it_is_made_of(done: Path, what: str)
             path.write_bytes(content)
 
 
+@pytest.mark.parametrize(("column", "fresh"), [("tau/joint1", 0), ("q/joint1", 2)])
+def test_trials_are_done_again_for_a_curve_that_they_have_not_kept(
+    done: Path, tmp_path: Path, column: str, fresh: int
+) -> None:
+    folder = Path(shutil.copytree(done, tmp_path / "study"))
+    with (folder / "study.toml").open("a") as file:
+        file.write(f'\n[[figure]]\ncolumns = ["{column}"]\n')
+    found = run_study(folder / "study.toml", folder / "out", Here())
+    assert (found.fresh, found.broken, found.warnings) == (fresh, (), ())
+    assert (folder / f"out/{column.replace('/', '-')}.svg").is_file()
+
+
 def test_a_trial_of_another_built_in_robot_is_done_again(tmp_path: Path) -> None:
     time = np.arange(0, 1.0, 0.01)
     write_csv(tmp_path / "a.csv", np.column_stack([time, *np.sin([3 * time, time])]), ["joint1", "joint2"])

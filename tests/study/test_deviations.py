@@ -212,7 +212,7 @@ def test_a_group_with_a_trial_without_deviations_has_none(tmp_path: Path) -> Non
     one = TRIALS.replace("{condition}_{trial}", "slow_{trial}").replace("{condition}-{trial}", "slow-{trial}")
     slow, fast = (one.replace("slow", name) + f'condition = "{name}"\n' for name in ("slow", "fast"))
     file = write_study(
-        tmp_path, HEAD, KEPT.replace(', "sd/**"', ""), CHOICES, CYCLES, slow, fast, FIGURE, subjects=2
+        tmp_path, HEAD, KEPT.replace('"sd/**"', '"q/*"'), CHOICES, CYCLES, slow, fast, FIGURE, subjects=2
     )
     text = file.read_text().replace('condition = "slow"\n', 'condition = "slow"\nuncertain = "bodies.toml"\n')
     file.write_text(text)

@@ -1,10 +1,14 @@
 """A study's figures for papers: whose curves, which band, and the tests that are about them."""
 
+import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from linkwise.analysis.motion_words import MotionWords
+from linkwise.errors import LinkwiseError
 from linkwise.study.band_figure import band_figures
 from linkwise.study.comparisons import Cluster, Compared
 from linkwise.study.plan import Comparison, PaperFigure
@@ -24,7 +28,7 @@ def trials(points: int = 3) -> list[TrialSummary]:
             of_mean = {"tau/hip": np.full(len(STATISTICS), np.mean(curve))}
             of_cycle = {"tau/hip": np.array(curve)} if points > 1 else {}
             found.append(
-                TrialSummary(f"{level}-{subject}", labels, {"tau/hip": "N m"}, of_mean, of_cycle, points > 1)
+                TrialSummary(f"{level}-{subject}", labels, {"tau/hip": "N·m"}, of_mean, of_cycle, points > 1)
             )
     return found
 
@@ -34,7 +38,7 @@ def about(factor: str, column: str, start: float) -> Compared:
     asked = Comparison(factor, ("slow", "fast"), (column,))
     sides = (Spread((), np.empty((0, 3)), np.empty((0, 3))),) * 2
     parts = (Cluster(start, start + 10, 0.01),)
-    return Compared(asked, column, "N m", sides, np.zeros(3), 2.0, float("nan"), parts)
+    return Compared(asked, column, "N·m", sides, np.zeros(3), 2.0, float("nan"), parts)
 
 
 @pytest.fixture
@@ -68,7 +72,7 @@ def band_of(axis: Any, number: int) -> np.ndarray:
 )
 def test_each_level_has_its_subjects_mean_and_band(drawn_of: Any, band: Any, of_slow: Any) -> None:
     axis, names = drawn_of(PaperFigure(("tau/hip",), "condition", band=band), trials())
-    assert names == ["tau%2Fhip.svg", "tau%2Fhip.pdf"]
+    assert names == ["tau-hip.svg", "tau-hip.pdf"]
     assert [line.get_label() for line in axis.lines] == ["slow", "fast"]
     for line, curves in zip(axis.lines, LEVELS.values(), strict=True):
         np.testing.assert_allclose(line.get_xdata(), [0, 50, 100])
@@ -77,7 +81,67 @@ def test_each_level_has_its_subjects_mean_and_band(drawn_of: Any, band: Any, of_
         assert not axis.collections
     else:
         np.testing.assert_allclose(band_of(axis, 0), of_slow)
-    assert axis.get_ylabel() == "N m"
+    assert axis.get_ylabel() == "N·m"
+
+
+def test_a_figure_has_its_own_words_order_unit_and_size(drawn_of: Any) -> None:
+    names = {"tau/hip": "Load of the hip", "fast": "quickly", "condition": "pace"}
+    asked = PaperFigure(
+        ("tau/hip",),
+        "condition",
+        title="Two paces",
+        names=names,
+        order=("fast",),
+        size="120 mm",
+        unit="kN·m",
+        formats=("eps",),
+    )
+    axis, files = drawn_of(asked, trials())
+    assert files == ["tau-hip.eps"]
+    assert axis.figure.get_suptitle() == "Two paces"
+    assert axis.figure.get_figwidth() == pytest.approx(120 / 25.4)
+    assert (axis.get_title("left"), axis.get_ylabel()) == ("Load of the hip", "kN·m")
+    assert axis.get_legend().get_title().get_text() == "pace"
+    assert [line.get_label() for line in axis.lines] == ["quickly", "slow"]
+    np.testing.assert_allclose(axis.lines[0].get_ydata(), np.mean(LEVELS["fast"], axis=0) / 1000)
+
+
+def test_labels_are_words_with_signs_where_all_models_agree(drawn_of: Any) -> None:
+    words = MotionWords("right hip", "flexion", "extension")
+    told = [replace(trial, words={"hip": words}) for trial in trials()]
+    axis, _ = drawn_of(PaperFigure(("tau/hip",), "condition"), told)
+    assert axis.get_title("left") == "right hip torque"
+    assert axis.get_ylabel() == "N·m\nflexion +, extension −"
+    other = replace(told[0], words={"hip": MotionWords("right hip", "extension", "flexion")})
+    axis, _ = drawn_of(PaperFigure(("tau/hip",), "condition"), [other, *told[1:]])
+    assert (axis.get_title("left"), axis.get_ylabel()) == ("hip torque", "N·m")
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"unit": "deg"}, "what is in N·m cannot become it; it may be 'kN·m'"),
+        ({"order": ("quick",)}, "'order' has 'quick', which no trial is; there are 'slow', 'fast'"),
+    ],
+)
+def test_what_a_figure_cannot_have_is_refused(keys: dict[str, Any], told: str) -> None:
+    with pytest.raises(LinkwiseError, match=re.escape(told)):
+        list(band_figures([PaperFigure(("tau/hip",), "condition", **keys)], trials(), ()))
+
+
+@pytest.mark.parametrize("size", ["wide", "30 mm", "nan", "-90 mm"])
+def test_a_size_is_a_width(size: str) -> None:
+    with pytest.raises(LinkwiseError, match="give single or double, or a width of 40 to 500 mm"):
+        PaperFigure(("tau/hip",), size=size)
+
+
+def test_eps_has_opaque_bands_and_no_date() -> None:
+    asked = PaperFigure(("tau/hip",), "condition", formats=("eps", "svg"))
+    first, again = (dict(band_figures([asked], trials(), ())) for _ in range(2))
+    assert list(first) == ["tau-hip.svg", "tau-hip.eps"]
+    assert first == again
+    assert b"CreationDate" not in first["tau-hip.eps"]
+    assert b"fill-opacity: 0.2" in first["tau-hip.svg"]  # drawn before all is made opaque
 
 
 def test_bars_are_the_tests_of_its_own_factor_and_column(drawn_of: Any) -> None:

@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from linkwise_runtime.chosen_names import known_as, nearest_first
 from linkwise_runtime.dynamics import Dynamics
@@ -17,6 +18,7 @@ from linkwise_runtime.structure import PassiveJoint, Structure
 
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.contacts.ground import GroundContacts
+from linkwise.analysis.motion_words import MotionWords, words_of
 from linkwise.analysis.samples import FollowingJoint
 from linkwise.analysis.settings import Payload
 from linkwise.arrays import Array
@@ -187,6 +189,11 @@ class OpenedRobot:
     def plot_joints(self) -> tuple[str, ...]:
         """Names of all joints for figures and the page: without the "_joint" that all may end in."""
         return without_ending(self.joints)
+
+    @cached_property
+    def words(self) -> tuple[MotionWords | None, ...]:
+        """Words of each joint of a person and of its directions; None for other joints."""
+        return words_of(self.joints, self.package.manifest.tree, self.up)
 
     @property
     def plot_links(self) -> tuple[str, ...]:

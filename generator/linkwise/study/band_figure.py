@@ -3,29 +3,34 @@
 A filled band is of the spread between subjects, a hatched one of what is uncertain.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.column_titles import column_title
+from linkwise.analysis.motion_words import MotionWords
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.escape import file_name, file_names
+from linkwise.escape import file_name, file_names, listed
 from linkwise.extras import extra
 from linkwise.plotstyle import INK, colour, dash, drawn, saved, styled
 from linkwise.study.comparisons import Compared
 from linkwise.study.deviation_columns import fitting_values
 from linkwise.study.deviations import Deviations, deviations
+from linkwise.study.figure_units import in_unit
 from linkwise.study.plan import PaperFigure
 from linkwise.study.spread import Spread, columns_of_trials, spread, values_of
-from linkwise.study.summary import TrialSummary
+from linkwise.study.summary import TrialSummary, words_of_trials
 
 MOST = 12
 """Most panels of a figure."""
-FORMATS = ("svg", "pdf")
 WIDE, HIGH = 3.4, 2.3
 """Width and height of a panel in inches; two stand side by side."""
+MM = 1 / 25.4
+NARROW = 120.0
+"""Width in mm below which panels stand below each other."""
 FILLED = {"deviation": "filled: ± sd between subjects", "range": "filled: range of subjects"}
 HATCHED = {
     "within": "hatched: ± sd within a trial,\nby what is uncertain",
@@ -54,20 +59,23 @@ class BandPanel:
 def band_figures(
     figures: Sequence[PaperFigure], trials: Sequence[TrialSummary], tests: Sequence[Compared]
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield the name and content of all figures, each as SVG and as PDF.
+    """Yield the name and content of all figures, in each of their formats.
 
-    Raises LinkwiseError for unknown columns, and for deviations that are asked for and are not there.
+    Raises LinkwiseError for unknown columns, levels and units, and for deviations that are asked for and are
+    not there.
     """
+    words = words_of_trials(trials)
     drawn_of = [panels_of(figure, trials, tests) for figure in figures]
     names = [
         figure.name or (panels[0].column if len(panels) == 1 else f"figure{number}")
         for number, (figure, panels) in enumerate(zip(figures, drawn_of, strict=True), 1)
     ]
-    for figure, panels, name in zip(figures, drawn_of, file_names(map(file_name, names)), strict=True):
+    files = file_names(file_name(name.replace("/", "-")) for name in names)
+    for figure, panels, name in zip(figures, drawn_of, files, strict=True):
         with styled() as matplotlib:
             matplotlib.rcParams["hatch.linewidth"] = EDGE
-            drawing = _drawn(figure, panels)
-            for kind in FORMATS:
+            drawing = _drawn(figure, panels, words)
+            for kind in sorted(figure.formats, key="eps".__eq__):  # which makes all opaque
                 yield f"{name}.{kind}", saved(drawing, kind)
 
 
@@ -76,10 +84,11 @@ def panels_of(
 ) -> list[BandPanel]:
     """Return a panel for each column of a figure."""
     known = columns_of_trials(trials)
-    panels = [
-        BandPanel(name, known[name], *_levels(figure, trials, name, tests))
-        for name in figure_columns(figure, known)
-    ]
+    asked = figure_columns(figure, known)
+    if figure.unit:
+        trials = in_unit(trials, asked, figure.unit)
+        known = columns_of_trials(trials)
+    panels = [BandPanel(name, known[name], *_levels(figure, trials, name, tests)) for name in asked]
     if figure.hatched in ("mean", "new") and not any(panel.uncertain for panel in panels):
         raise LinkwiseError(
             f"[[figure]]: 'hatched' is {figure.hatched!r}, and no curve has deviations; give all trials the"
@@ -89,11 +98,13 @@ def panels_of(
 
 
 def figure_columns(figure: PaperFigure, names: Iterable[str]) -> list[str]:
-    """Return those of the columns `names` that a figure shows.
+    """Return those of the columns `names` that a figure shows, in the order in which it names them.
 
     Raises LinkwiseError for unknown columns, for deviations as columns of their own, and for too many.
     """
-    found = fitting_values("[[figure]]", names, figure.columns)
+    names = list(names)
+    parts = (fitting_values("[[figure]]", names, [pattern]) for pattern in figure.columns)
+    found = list(dict.fromkeys(name for part in parts for name in part))
     if len(found) > MOST:
         raise LinkwiseError(f"[[figure]]: {len(found)} columns; {MOST} are legible, so give fewer")
     return found
@@ -106,10 +117,13 @@ def _levels(
     found: dict[str, list[TrialSummary]] = {}
     for trial in trials:
         found.setdefault(trial.labels[figure.by] if figure.by else "", []).append(trial)
+    if odd := [level for level in figure.order if level not in found]:
+        there = listed(map(repr, found))
+        raise LinkwiseError(f"[[figure]]: 'order' has {odd[0]!r}, which no trial is; there are {there}")
     levels = {
-        level: spread(members, values)
-        for level, members in found.items()
-        if (values := values_of(members, name))
+        level: spread(found[level], values)
+        for level in dict.fromkeys((*figure.order, *found))
+        if (values := values_of(found[level], name))
     }
     uncertain = {level: deviations(found[level], name, one) for level, one in levels.items()}
     return levels, _about(figure, name, tests), {k: one for k, one in uncertain.items() if one is not None}
@@ -119,20 +133,29 @@ def _about(figure: PaperFigure, name: str, tests: Sequence[Compared]) -> tuple[C
     return tuple(test for test in tests if test.column == name and test.comparison.factor == figure.by)
 
 
-def _drawn(figure: PaperFigure, panels: Sequence[BandPanel]) -> Any:
-    across = min(2, len(panels))
+def _drawn(figure: PaperFigure, panels: Sequence[BandPanel], words: Mapping[str, MotionWords]) -> Any:
+    across = 1 if figure.width is not None and figure.width < NARROW else min(2, len(panels))
+    wide = WIDE if figure.width is None else figure.width * MM / across
     down = -(-len(panels) // across)
-    drawing = extra("matplotlib.figure").Figure(figsize=(WIDE * across, HIGH * down), layout="constrained")
+    size = wide * across, HIGH * min(1.2, max(0.7, wide / WIDE)) * down + (0.3 if figure.title else 0.0)
+    drawing = extra("matplotlib.figure").Figure(figsize=size, layout="constrained")
     axes = drawing.subplots(down, across, squeeze=False).ravel()
     for axis, panel in zip(axes, panels, strict=False):
-        _panel(axis, panel, figure)
+        _panel(axis, panel, figure, words)
     for axis in axes[len(panels) :]:
         axis.set_axis_off()
     if len(panels[0].levels) > 1:
-        axes[0].legend(title=drawn(figure.by), fontsize=8, handlelength=2.5)
+        axes[0].legend(title=drawn(_named(figure, figure.by)), fontsize=8, handlelength=2.5)
+    if figure.title:
+        drawing.suptitle(drawn(figure.title, 120), x=0.01, ha="left", fontsize=11)
     if figure.hatched != "none" and any(panel.uncertain for panel in panels):
         _legend_of_bands(drawing, figure, across)
     return drawing
+
+
+def _named(figure: PaperFigure, text: str) -> str:
+    """Return what a column or level is called in a figure."""
+    return figure.names.get(text, text)
 
 
 def _legend_of_bands(drawing: Any, figure: PaperFigure, across: int) -> None:
@@ -148,18 +171,20 @@ def _legend_of_bands(drawing: Any, figure: PaperFigure, across: int) -> None:
     drawing.legend(handles, texts, loc="outside lower left", ncols=across, fontsize=8, handlelength=2.5)
 
 
-def _panel(axis: Any, panel: BandPanel, figure: PaperFigure) -> None:
-    for number, (level, found) in enumerate(panel.levels.items()):
+def _panel(axis: Any, panel: BandPanel, figure: PaperFigure, words: Mapping[str, MotionWords]) -> None:
+    for number, (key, found) in enumerate(panel.levels.items()):
+        level = _named(figure, key)
         if found.each.shape[1] == 1:
             _dots(axis, number, level, found)
         else:
             _curve(axis, number, level, found, figure.band)
-            if level in panel.uncertain and figure.hatched != "none":
-                _hatched(axis, number, found, getattr(panel.uncertain[level], figure.hatched))
-    axis.set_title(drawn(panel.column, 48), fontsize=9)
-    axis.set_ylabel(panel.unit)
+            if key in panel.uncertain and figure.hatched != "none":
+                _hatched(axis, number, found, getattr(panel.uncertain[key], figure.hatched))
+    told = column_title(panel.column, words)
+    axis.set_title(drawn(figure.names.get(panel.column, told.title), 58), fontsize=9)
+    axis.set_ylabel(told.unit(panel.unit))
     if next(iter(panel.levels.values())).each.shape[1] == 1:
-        axis.set_xticks(range(len(panel.levels)), [drawn(level) for level in panel.levels])
+        axis.set_xticks(range(len(panel.levels)), [drawn(_named(figure, one)) for one in panel.levels])
         return
     axis.set_xlabel("% of the cycle")
     axis.set_xlim(0, 100)

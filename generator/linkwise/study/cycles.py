@@ -19,6 +19,7 @@ from linkwise.arrays import Array, Index, Mask
 from linkwise.errors import LinkwiseError, within
 from linkwise.extras import extra
 from linkwise.study.deviation_columns import RANDOM, WHOLE, is_deviation
+from linkwise.study.kept_curves import kept_curves
 from linkwise.study.ledger import CURVES
 from linkwise.study.paths import opened_here
 from linkwise.study.plan import Cycles, StudyPlan
@@ -175,7 +176,8 @@ class TrialCycles:
         self._names = [column.name for column in job.columns]
         self._of_motion_alone = job.uncertain.is_of_motion_alone
         self._points = 0 if plan.cycles is None else plan.cycles.points
-        self._moments = RunningMoments(len(self._names) * self._points)
+        self._kept = kept_curves(plan, self._names)
+        self._moments = RunningMoments(len(self._kept) * self._points)
         with within(job.source):
             spans = [] if plan.cycles is None else cycle_spans(plan.cycles, job, plan.trials[0].name)
         squared = [at for at, name in enumerate(self._names) if is_deviation(name)]
@@ -189,7 +191,7 @@ class TrialCycles:
     def _take(self, number: int, rows: Array, samples: Array) -> None:
         self._write(rows, np.full(self._points, number, np.intp), np.linspace(0, 100, self._points))
         self._integrals(samples)
-        shifted = rows.copy()
+        shifted = rows[self._kept]
         shifted[0] -= rows[0, 0]  # time, from the beginning of the cycle
         self._moments(shifted.reshape(-1, 1))
 
@@ -198,8 +200,8 @@ class TrialCycles:
         if not self._points:
             return
         self.sink.finish()
-        curves = self._moments.table.reshape(-1, len(self._names), self._points)[:2]
-        names = list(self._names)
+        names = [self._names[at] for at in self._kept]
+        curves = self._moments.table.reshape(-1, len(names), self._points)[:2]
         if self._of_motion_alone:
             whole = [at for at, name in enumerate(names) if name.startswith(WHOLE)]
             curves = np.concatenate([curves, curves[:, whole]], axis=1)

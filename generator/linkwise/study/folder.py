@@ -17,7 +17,7 @@ from linkwise.output import sweep
 from linkwise.output.workplace import locked
 from linkwise.package.decode import decode, parse_json, require
 from linkwise.package.manifest import is_inside
-from linkwise.study.band_figure import FORMATS
+from linkwise.plotstyle import FORMATS
 from linkwise.study.ledger import MARK, is_trial
 from linkwise.study.paths import read_back, removed, require_own
 from linkwise.study.plan import StudyPlan

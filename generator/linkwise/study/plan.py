@@ -1,6 +1,7 @@
 """Content of a study, as its file describes it."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -9,12 +10,15 @@ from linkwise.analysis.choices import AnalysisChoices
 from linkwise.analysis.phases import Phase
 from linkwise.errors import LinkwiseError
 from linkwise.option import written
+from linkwise.plotstyle import FigureFormat
 from linkwise.robot import Options
 
 SUBJECT = "subject"
 """Factor that every study has, and the first."""
 OF_FILES = tuple(one.key for one in written(AnalysisChoices) if one.option.is_file)
 """Choices that are paths of files."""
+WIDTHS = {"single": "90 mm", "double": "180 mm"}
+"""Widths of figures over one and over two columns of a journal."""
 POINTS = 101
 """Number of points of a cycle, 0 to 100 %."""
 
@@ -77,7 +81,10 @@ class PaperFigure:
     """A figure of mean curves with bands, one for each level of a factor.
 
     `band` is what is filled, between subjects; `hatched` the deviation by what is uncertain, where there is
-    one: within a trial, of the mean, or of the truth of a new subject.
+    one: within a trial, of the mean, or of the truth of a new subject. `title` stands above all panels,
+    `names` has other words for columns and levels, `order` the levels that come first. `size` is the width,
+    as 120 mm, or that of one or two columns of a journal, single or double; `unit` the unit of all panels,
+    where theirs can become it.
     """
 
     columns: tuple[str, ...]
@@ -85,10 +92,31 @@ class PaperFigure:
     name: str = ""
     band: Literal["deviation", "range", "none"] = "deviation"
     hatched: Literal["within", "mean", "new", "none"] = "within"
+    title: str = ""
+    names: Mapping[str, str] = field(default_factory=dict)
+    order: tuple[str, ...] = ()
+    size: str = ""
+    unit: str = ""
+    formats: tuple[FigureFormat, ...] = ("svg", "pdf")
 
     def __post_init__(self) -> None:
         if not self.columns:
             raise LinkwiseError("[[figure]]: 'columns' is empty; name one or more")
+        if not self.formats:
+            raise LinkwiseError("[[figure]]: 'formats' is empty; name one or more")
+        if self.order and not self.by:
+            raise LinkwiseError("[[figure]]: 'order' is of levels, and goes with 'by'; add it")
+        if self.size and not 40 <= (self.width or 0.0) <= 500:
+            raise LinkwiseError(
+                f"[[figure]]: 'size' is {self.size!r}; give single or double, or a width of 40 to 500 mm, as"
+                " 120 mm"
+            )
+
+    @property
+    def width(self) -> float | None:
+        """Width in mm; None where it follows from the panels, or `size` has none."""
+        number = WIDTHS.get(self.size, self.size).removesuffix("mm").strip()
+        return float(number) if number.replace(".", "", 1).isdecimal() else None
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from linkwise.study.file import read_study
 from linkwise.study.folder import StudyMark, held_study, refuse_unless_study, sweep_trials, trial_folders
 from linkwise.study.inputs import trial_here
 from linkwise.study.integrals import integral_columns
+from linkwise.study.kept_curves import lacks_curves
 from linkwise.study.ledger import MARK, TrialRecord, done_before, is_trial
 from linkwise.study.paths import removed
 from linkwise.study.plan import StudyPlan
@@ -73,7 +74,9 @@ def run_study(
     require_writable(out)
     out = out.absolute()  # workers may run in other folders
     warnings = check_robots(plan, progress)
-    before = done_before(plan, trial_folders(out, plan))
+    folders = trial_folders(out, plan)
+    done = done_before(plan, folders)
+    before = {name: record for name, record in done.items() if not lacks_curves(plan, folders[name])}
     check_columns(plan, before)
     with held_study(out):
         return _done(plan, out, before, engine or ProcessPool(), progress, warnings)

@@ -1,13 +1,14 @@
 """Summary of each trial, kept for the combined results of a study; its numbers are running statistics."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from linkwise.analysis.logs.checks import read_as
+from linkwise.analysis.motion_words import MotionWords
 from linkwise.arrays import Array
 from linkwise.study.deviation_columns import is_deviation
 from linkwise.study.ledger import CURVES, SUMMARY
@@ -30,27 +31,30 @@ class TrialSummary:
     curves: dict[str, Array]
     """Mean curve of each column, (points,), of deviations the root mean square; empty without cycles."""
     cycles: int
+    words: Mapping[str, MotionWords] = field(default_factory=dict)
+    """Words of the coordinates of a person's joints, by name."""
 
     @classmethod
     def read(cls, name: str, labels: Mapping[str, str], folder: Path) -> "TrialSummary":
         """Return the summary that a trial left in its folder; raise LinkwiseError if it was damaged."""
-        with _arrays(folder / SUMMARY) as data:
+        with trial_arrays(folder / SUMMARY) as data:
             names = data["names"].tolist()
             units = dict(zip(names, data["units"].tolist(), strict=True))
             statistics = dict(zip(names, data["statistics"].T, strict=True))
+            words = {name: MotionWords(*some) for name, *some in data["words"].tolist()}
         curves: dict[str, Array] = {}
         cycles = 0
         if (folder / CURVES).exists():
-            with _arrays(folder / CURVES) as data:
+            with trial_arrays(folder / CURVES) as data:
                 names, (mean, std) = data["names"].tolist(), data["curves"]
                 squared = np.array([is_deviation(name) for name in names])[:, None]
                 curves = dict(zip(names, np.where(squared, np.hypot(mean, std), mean), strict=True))
                 cycles = int(data["cycles"])
-        return cls(name, dict(labels), units, statistics, curves, cycles)
+        return cls(name, dict(labels), units, statistics, curves, cycles, words)
 
 
 @contextmanager
-def _arrays(path: Path) -> Iterator[Mapping[str, Array]]:
+def trial_arrays(path: Path) -> Iterator[Mapping[str, Array]]:
     """Open the arrays of a trial's own file; raise LinkwiseError where they cannot be read."""
     require_own(path)
     with read_as("a trial's file of arrays", path, "remove its folder"), np.load(path) as data:
@@ -64,6 +68,14 @@ def summaries(plan: StudyPlan, folders: Mapping[str, Path]) -> list[TrialSummary
         for trial in plan.trials
         if trial.name in folders
     ]
+
+
+def words_of_trials(trials: Sequence[TrialSummary]) -> dict[str, MotionWords]:
+    """Return the words of coordinates by name, those of which all trials' models say the same."""
+    every = [(name, words) for trial in trials for name, words in trial.words.items()]
+    return {
+        name: words for name, words in every if all(one.words.get(name, words) == words for one in trials)
+    }
 
 
 class RunningMoments:

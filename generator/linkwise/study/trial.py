@@ -112,11 +112,14 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         cycles.finish(draft)
         analysis = job.analysis(done, every.values)
     every_column = (*columns, *integrals.columns)
+    robot = job.decomposer.robot
+    named = [(name, words) for name, words in zip(robot.joints, robot.words, strict=True)]
     np.savez(
         draft / SUMMARY,
         statistics=np.concatenate([moments.table, integrals.statistics], axis=1),
         names=[c.name for c in every_column],
         units=[c.unit for c in every_column],
+        words=np.array([(name, *words) for name, words in named if words is not None]).reshape(-1, 4),
     )
     if plan.pages:
         (draft / PAGE).write_bytes(report(analysis).encode())

@@ -11,6 +11,7 @@ from linkwise.analysis.show.bands import Bands, draw_band
 from linkwise.analysis.show.drawn_curves import (
     drawn_curves,
     foot,
+    largest_few,
     new_figure,
     time_axis,
     write_note,
@@ -22,24 +23,31 @@ from linkwise.plotstyle import colour, dash, drawn
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+MANY, MOST = 12, 7
+"""Joints, or links and loads, above which only the largest, so many, have looks of their own."""
+OTHERS: dict[str, Any] = {"color": "#B4BAC4", "linewidth": 0.7, "zorder": 1.5}
 PANEL, LINE = 1.75, 0.22
 """Heights in inches of a panel and of a legend's line."""
 
 
 @dataclass(frozen=True)
 class _Panel:
-    """A panel, and which rows of the result it draws, each with the number of its colour."""
+    """A panel, and which rows of the result it draws, each by the number of its joint, or link or load."""
 
     title: str
     symbol: str
     lines: list[tuple[int, int]]
+    named: tuple[int, ...]
+    """Numbers of those with a look of their own, in the order of their looks; others are thin and grey."""
 
 
 def paper(result: AnalysisResult, i: int) -> "Figure":
     """Draw coordinates, τ_i, and for joint i τ_ij, τp_ij(q̇_j) and τp_ij(q̈_j), by j's own coordinate."""
     robot, panels = result.robot, _panels(result, i)
     carried = (*robot.plot_links, *result.load_labels)
-    named = (("Joints", robot.plot_joints), ("Links and loads" if result.loads else "Links", carried))
+    some = _legend_of("Joints", robot.plot_joints, panels[0])
+    others = _legend_of("Links and loads" if result.loads else "Links", carried, panels[2])
+    named = (some, others)
     legends = [_legend_rows(names) for _, names in named]
     heights = [PANEL] * len(panels) + [LINE * (rows + 1) for rows in legends]
     figure = new_figure(7.6, sum(heights) + 0.9)
@@ -73,25 +81,48 @@ def _panels(result: AnalysisResult, i: int) -> tuple[_Panel, ...]:
         every = enumerate(own_joints(result))
         return [line for j, k in every for line in lines(name, "link", joint=i, link=j, cause=k)]
 
+    through = lines("tau_link", "link", joint=i) + lines("tau_load", "load", len(robot.links), joint=i)
+    joints, carried = _named_joints(result, i), _named_links(result, through)
     return (
-        _Panel(f"Joint coordinates ({units})", "$q_i$", lines("q", "joint")),
-        _Panel(f"Joint torques ({loads})", r"$\tau_i$", lines("tau", "joint")),
+        _Panel(f"Joint coordinates ({units})", "$q_i$", lines("q", "joint"), joints),
+        _Panel(f"Joint torques ({loads})", r"$\tau_i$", lines("tau", "joint"), joints),
         _Panel(
             f"Partial torques {on}, through each link{' and by each load' if result.loads else ''}",
             rf"$\tau_{{{number}j}}$",
-            lines("tau_link", "link", joint=i) + lines("tau_load", "load", len(robot.links), joint=i),
+            through,
+            carried,
         ),
         _Panel(
             f"Propagation torques {on}: each link's own joint only, velocity",
             rf"$\tau^p_{{{number}j}}(\dot q_j)$",
             own_terms("tau_qd"),
+            carried,
         ),
         _Panel(
             f"Propagation torques {on}: each link's own joint only, acceleration",
             rf"$\tau^p_{{{number}j}}(\ddot q_j)$",
             own_terms("tau_qdd"),
+            carried,
         ),
     )
+
+
+def _named_joints(result: AnalysisResult, i: int) -> tuple[int, ...]:
+    """Return the joints that are told apart: all if there are few, else joint i and the most loaded ones."""
+    driven = list(result.robot.driven)
+    if len(driven) <= MANY:
+        return tuple(range(len(result.robot.joints)))
+    largest, _ = largest_few(result.totals.mean[result.rows["tau"].rows], MOST)
+    return tuple(sorted({i, *(driven[at] for at in largest)}))
+
+
+def _named_links(result: AnalysisResult, through: Sequence[tuple[int, int]]) -> tuple[int, ...]:
+    """Return the links and loads that are told apart: all if there are few, else those that load most."""
+    count = len(result.robot.links) + len(result.load_labels)
+    if count <= MANY:
+        return tuple(range(count))
+    largest, _ = largest_few([result.totals.mean[row] for row, _ in through], MOST)
+    return tuple(through[at][1] for at in largest)
 
 
 def own_joints(result: AnalysisResult) -> tuple[int, ...]:
@@ -114,9 +145,13 @@ def _draw(axis: Any, result: AnalysisResult, panel: _Panel) -> None:
     rows = [row for row, _ in panel.lines]
     found = drawn_curves(result, lambda part: part.values[rows])
     bands = Bands(result, [np.array([row]) for row in rows])
-    for number, ((_, at), time, values) in enumerate(zip(panel.lines, found.time, found.values, strict=True)):
-        axis.plot(time, values, **_style(at))
-        draw_band(axis, bands[number], colour(at))
+    looks = {number: place for place, number in enumerate(panel.named)}
+    for at, ((_, number), time, values) in enumerate(zip(panel.lines, found.time, found.values, strict=True)):
+        if number not in looks:
+            axis.plot(time, values, **OTHERS)
+            continue
+        axis.plot(time, values, **_style(looks[number]))
+        draw_band(axis, bands[at], colour(looks[number]))
     zero_line(axis)
     axis.set_title(panel.title)
     axis.set_ylabel(panel.symbol, fontsize=11, parse_math=True)
@@ -124,6 +159,13 @@ def _draw(axis: Any, result: AnalysisResult, panel: _Panel) -> None:
 
 def _style(at: int) -> dict[str, Any]:
     return {"color": colour(at), "linestyle": dash(at), "linewidth": 1.5}
+
+
+def _legend_of(title: str, names: Sequence[str], panel: _Panel) -> tuple[str, list[str]]:
+    """Return the title of a legend, and names; of many, how many others there are stands in the title."""
+    named = [names[number] for number in panel.named]
+    others = len({number for _, number in panel.lines}.difference(panel.named))
+    return f"{title}, thin: {others} others" if others else title, named
 
 
 def _legend_columns(names: Sequence[str]) -> int:
