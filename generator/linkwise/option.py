@@ -97,8 +97,9 @@ def chosen(kind: type[T], given: Mapping[str, Any]) -> T:
         found = given.get(_key(flag))
         is_met = not flag or (found == value if value else found is not None)
         if not is_met and given.get(one.key) is not None:
-            several = " and ".join(each.flag for each in options if each.option.needs == needed)
-            raise LinkwiseError(f"{several} go with {needed}; add it")
+            several = [each.flag for each in options if each.option.needs == needed]
+            verb = "go" if len(several) > 1 else "goes"
+            raise LinkwiseError(f"{' and '.join(several)} {verb} with {needed}; add it")
     return _chosen(kind, given)
 
 

@@ -128,6 +128,7 @@ def test_a_former_result_is_replaced_and_nothing_else(call, log, tmp_path):
         (("--map", "joint1"), "--map joint1: write it as COLUMN=JOINT"),
         (("--backend", "abacus"), "no back end"),
         (("--window", "9"), "--window and --degree go with --derivative savitzky-golay"),
+        (("--figure-format", "svg"), "--figure-format goes with --figure; add it"),
         (("--padding", "even"), "--filter-order and --padding go with --cutoff"),
     ],
 )

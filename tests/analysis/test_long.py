@@ -15,7 +15,7 @@ from helpers.motion_logs import LEG, smooth, write_csv
 from linkwise import generate, read_system, write_package
 from linkwise.analysis import Analysis, Contact, Contacts, Reading, WhileColumn, analyze
 from linkwise.analysis.disk_rows import EverySample
-from linkwise.analysis.show import figure_png
+from linkwise.analysis.show import figure_bytes
 from linkwise.analysis.show.drawn_curves import PIECES
 from linkwise.analysis.show.page_curves import stride_for
 
@@ -64,7 +64,7 @@ def table(place: Path) -> dict[str, Any]:
 @pytest.mark.parametrize("name", FIGURES)
 def test_the_commands_figure_is_pythons(place: Path, analysis: Analysis, name: str) -> None:
     file = place / "out" / f"{name.replace(':', '-')}.png"
-    assert file.read_bytes() == figure_png(analysis, name)
+    assert file.read_bytes() == figure_bytes(analysis, name)
 
 
 def test_numbers_of_causes_are_of_all_samples(analysis: Analysis, table: dict[str, Any]) -> None:

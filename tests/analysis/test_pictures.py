@@ -14,7 +14,7 @@ from linkwise import generate, read_system, write_package
 from linkwise.analysis import Load, Reading, analyze
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.result_rows import ResultRows
-from linkwise.analysis.show import figure_png
+from linkwise.analysis.show import figure_bytes
 from linkwise.analysis.show.drawn_curves import largest_few
 from linkwise.analysis.show.page import page_data, stick_figure
 from linkwise.errors import LinkwiseError
@@ -183,9 +183,9 @@ def test_a_panel_says_what_it_shows_and_in_which_unit(analysis):
 
 
 def test_the_users_own_settings_of_matplotlib_change_no_figure(analysis):
-    expected = figure_png(analysis, "paper")
+    expected = figure_bytes(analysis, "paper")
     with matplotlib.rc_context({"axes.facecolor": "red", "lines.marker": "o"}):
-        assert figure_png(analysis, "paper") == expected
+        assert figure_bytes(analysis, "paper") == expected
 
 
 def test_the_figure_of_causes_has_room_for_every_cause(analysis):

@@ -21,7 +21,7 @@ from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.run import analyze_to
-from linkwise.analysis.show import figure_png
+from linkwise.analysis.show import figure_bytes
 from linkwise.analysis.show.page import report
 from linkwise.analysis.whole_movement import Totals, Work
 from linkwise.progress import silent
@@ -152,7 +152,7 @@ def test_the_figure_has_mean_sizes_of_net_torques(place: Path, analysis: Analysi
         sizes = columns.sizes(BOTH, gravity=panel == 0)
         assert_same(bars(figure, panel), percent(sizes))
         assert figure.axes[panel].get_xlabel() == "mean size of the net torque, % of all"
-    assert (place / "out" / "shares.png").read_bytes() == figure_png(analysis, "shares")
+    assert (place / "out" / "shares.png").read_bytes() == figure_bytes(analysis, "shares")
 
 
 def notebook(result: Analysis) -> list[tuple[str, str]]:

@@ -23,7 +23,7 @@ from linkwise import Options, generate, read_system, write_package
 from linkwise import escape as to
 from linkwise.analysis import analyze
 from linkwise.analysis.result_rows import ResultRows, torque_places
-from linkwise.analysis.show import figure_png
+from linkwise.analysis.show import figure_bytes
 from linkwise.analysis.show.page import report
 from linkwise.analysis.term_rows import term_rows
 from linkwise.package.load import import_package
@@ -208,8 +208,8 @@ def test_plots_draw_names_literally_and_without_a_warning(analysis) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # of a character without a picture, of a legend that hides a name
         for names in (("_a\x1b", "$x^", "日本"), ("$\\frac{$ ^^M", "\u202eb", "\n")):
-            assert figure_png(renamed(analysis, names, names[0]), "shares")
-            assert figure_png(renamed(analysis, names, names[0]), "causes")
+            assert figure_bytes(renamed(analysis, names, names[0]), "shares")
+            assert figure_bytes(renamed(analysis, names, names[0]), "causes")
 
 
 def test_a_templates_name_reaches_no_hover_template() -> None:

@@ -12,6 +12,7 @@ from linkwise.analysis.phases import Phase
 from linkwise.analysis.settings import Processing, Reading, Units
 from linkwise.errors import LinkwiseError
 from linkwise.option import option
+from linkwise.plotstyle import FigureFormat
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,9 @@ class Outputs:
         " reaction or trace, alone or with :JOINT, contacts, or cutoff; may be repeated",
         "--figure",
         is_key=False,
+    )
+    figure_format: FigureFormat = option(
+        "png", "Format of the figures; png if not given", needs="--figure", is_key=False
     )
     page: bool = option(True, "Write report.html", is_key=False)
     phases: tuple[Phase, ...] = option(

@@ -24,7 +24,7 @@ from linkwise.analysis.phases import Phase
 from linkwise.analysis.preparation import prepared
 from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.settings import Payload, Processing, Reading
-from linkwise.analysis.show import check_figure, figure_names, figure_png
+from linkwise.analysis.show import check_figure, figure_bytes, figure_names
 from linkwise.analysis.show.page import report
 from linkwise.analysis.sweep_table import NAME as SWEEP_TABLE
 from linkwise.analysis.sweep_table import write_sweep
@@ -169,7 +169,8 @@ def _write_beside_table(draft: Path, analysis: Analysis, outputs: Outputs) -> No
     """Write the record, the figures and the page."""
     files = file_names("-".join(map(file_name, name.split(":", 1))) for name in outputs.figures)
     for file, name in zip(files, outputs.figures, strict=True):
-        (draft / f"{file}.png").write_bytes(figure_png(analysis, name))
+        kind = outputs.figure_format
+        (draft / f"{file}.{kind}").write_bytes(figure_bytes(analysis, name, kind))
     if outputs.page:
         (draft / "report.html").write_bytes(report(analysis).encode())
     files = sorted([RECORD, *(file.name for file in draft.iterdir())])

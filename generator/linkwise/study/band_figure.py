@@ -74,9 +74,8 @@ def band_figures(
     for figure, panels, name in zip(figures, drawn_of, files, strict=True):
         with styled() as matplotlib:
             matplotlib.rcParams["hatch.linewidth"] = EDGE
-            drawing = _drawn(figure, panels, words)
-            for kind in sorted(figure.formats, key="eps".__eq__):  # which makes all opaque
-                yield f"{name}.{kind}", saved(drawing, kind)
+            for kind in figure.formats:
+                yield f"{name}.{kind}", saved(_drawn(figure, panels, words), kind)
 
 
 def panels_of(

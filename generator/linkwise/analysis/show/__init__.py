@@ -20,7 +20,7 @@ from linkwise.analysis.show.sourced_panels import figure_of
 from linkwise.analysis.show.trace_figure import trace_panels
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
-from linkwise.plotstyle import saved, styled
+from linkwise.plotstyle import FigureFormat, saved, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,10 +58,10 @@ def draw(result: AnalysisResult, name: str) -> "Figure":
         return FIGURES[kind](result, names.index(chosen) if chosen else first)
 
 
-def figure_png(result: AnalysisResult, name: str) -> bytes:
-    """Return the bytes of a figure's PNG, the same on each run; raise as `draw` does."""
+def figure_bytes(result: AnalysisResult, name: str, kind: FigureFormat = "png") -> bytes:
+    """Return the bytes of a figure in a format, the same on each run; raise as `draw` does."""
     with styled():
-        return saved(draw(result, name), "png", dpi=160)
+        return saved(draw(result, name), kind, dpi=160)
 
 
 FigureNames = Mapping[str, Sequence[str]]
