@@ -96,7 +96,7 @@ def read_setup(path: Path) -> InducedSetup:
         log, robot, loads = _files(path, tool)
         added = _forces(path, tool)
     with within(str(robot)):
-        model, _ = read_document(robot)
+        model = read_document(robot).model
     with within(str(path)):
         (threshold,) = numbers_of(analysis, "force_threshold", THRESHOLD, f"<{ANALYSIS}>", 1)
         contacts = as_contacts(analysis, model, loads, threshold)

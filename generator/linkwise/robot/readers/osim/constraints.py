@@ -63,6 +63,24 @@ def coordinate_rules(
     return {name: _resolved(name, own) for name in own}, tuple(notes)
 
 
+def with_idle_held(
+    rules: Mapping[str, Rule], idle: Iterable[Element]
+) -> tuple[dict[str, Rule], tuple[Note, ...]]:
+    """Return the rules where coordinates that move nothing stay at their default values, and notes on them.
+
+    idle: coordinates that move no axis of their joint; one that others follow moves those, and stays free
+    """
+    leading = {rule.free for name, rule in rules.items() if rule.free != name}
+    held, notes = dict(rules), []
+    for coordinate in idle:
+        name = name_of(coordinate)
+        if held[name].free == name and name not in leading:
+            (value,) = numbers_of(coordinate, "default_value", "0", f"coordinate {name!r}", 1)
+            held[name] = Rule("", Curve.straight(value))
+            notes.append(Note("locked", name, f"at {value:g}, as it moves no axis"))
+    return held, tuple(notes)
+
+
 def is_enforced(constraint: Element) -> bool:
     """Return whether a constraint holds, that is, is switched on."""
     return yes(constraint, "isEnforced", True) and not yes(constraint, "isDisabled")
