@@ -54,13 +54,14 @@ class Outputs:
     )
     storage: str = option(
         "",
-        "Also write what --induced tells as OpenSim's storage files, NAME_POINT.sto",
-        "--induced-sto",
+        "Also write OpenSim's storage files: NAME_InverseDynamics.sto, the shares of each coordinate, and what"
+        " --induced tells",
+        "--sto",
         metavar="NAME",
         is_key=False,
     )
     storage_units: Units = option(
-        "rad", "Unit of their angles; rad if not given", "--sto-units", needs="--induced-sto", is_key=False
+        "rad", "Unit of their angles; rad if not given", "--sto-units", needs="--sto", is_key=False
     )
     induced_power: bool = option(
         False, "Tell by its sources the power that each link gets, and that which flows through each joint"
@@ -81,12 +82,8 @@ class Outputs:
         return any(figures)
 
     def __post_init__(self) -> None:
-        for flag, given, needed, there in (
-            ("--induced-sto", self.storage, "--induced", self.induced),
-            ("--induced-whole", self.induced_whole, "--induced", self.induced),
-        ):
-            if given and not there:
-                raise LinkwiseError(f"{flag} goes with {needed}; add it")
+        if self.induced_whole and not self.induced:
+            raise LinkwiseError("--induced-whole goes with --induced; add it")
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from linkwise.robot.readers.osim.frames import Frames, Placed, offset_of
 from linkwise.robot.readers.osim.functions import IDENTITY, function_of
 from linkwise.robot.robot import UNLIMITED, Limits, TieKind
 
-COUPLER = "CoordinateCouplerConstraint"
+COUPLER, POINT_ON_LINE = "CoordinateCouplerConstraint", "PointOnLineConstraint"
 
 KINDS: dict[str, TieKind] = {
     "PointConstraint": "point",
@@ -135,7 +135,7 @@ def ties(model: Element, frames: Frames) -> Iterator[AnchoredTie]:
 def unmodelled(model: Element) -> Iterator[Loop]:
     """Yield the constraints of other kinds, which are not modelled."""
     for constraint in members(model, "ConstraintSet"):
-        if constraint.tag not in (COUPLER, *KINDS) and is_enforced(constraint):
+        if constraint.tag not in (COUPLER, POINT_ON_LINE, *KINDS) and is_enforced(constraint):
             yield Loop(
                 f"the model has the {constraint.tag} {name_of(constraint)!r}",
                 "remove it, or switch it off there",

@@ -58,6 +58,10 @@ OF_TAG = {
     "Model": names("gravity length_units BodySet JointSet ConstraintSet ForceSet"),
     "Coordinate": names("default_value range clamped locked prescribed prescribed_function motion_type"),
     "PhysicalOffsetFrame": names("translation orientation socket_parent"),
+    "StationDefinedFrame": names(
+        "socket_point_a socket_point_b socket_point_c socket_origin_point ab_axis ab_x_ac_axis"
+    ),
+    "Station": names("socket_parent_frame location"),
     "SpatialTransform": names("TransformAxis"),
     "TransformAxis": names("axis coordinates function"),
     "LinearFunction": names("coefficients"),
@@ -82,7 +86,8 @@ OF_END = {
     "Constraint": OF_TIE
     | names(
         "independent_coordinate_names dependent_coordinate_name scale_factor coupled_coordinates_function "
-        "constant_distance"
+        "constant_distance line_body follower_body socket_line_body socket_follower_body line_direction_vec "
+        "point_on_line point_on_follower"
     ),
 }
 """Children that are read, and others near one of them, by the end of the component's tag."""

@@ -24,6 +24,7 @@ from linkwise.robot.readers.osim.document import (
 from linkwise.robot.readers.osim.frames import GROUND, Frames, Placed, offset_of
 from linkwise.robot.readers.osim.joints import OsimJoint, from_ground
 from linkwise.robot.readers.osim.parted_bodies import with_parted_bodies
+from linkwise.robot.readers.osim.point_on_line import sliders
 from linkwise.robot.readers.xml_names import Known, ignored, names
 from linkwise.robot.robot import Mat3, Vec3
 
@@ -68,11 +69,12 @@ def read_osim(path: Path) -> Description:
     parted = with_parted_bodies(from_ground(written), {name_of(body) for body in elements})
     joints = parted.joints
     rules, notes = coordinate_rules((c for joint in joints for c in joint.coordinates), model)
+    sliding = tuple(sliders(model, frames))
     rules, held = with_idle_held(rules, (one for joint in joints for one in joint.idle()))
     return Description(
         name_of(model) or path.stem,
-        (Body(GROUND), *parted.bodies(_bodies(elements, joints))),
-        tuple(joint.connection(rules) for joint in joints),
+        (Body(GROUND), *parted.bodies(_bodies(elements, joints)), *(one.body for one in sliding)),
+        (*(joint.connection(rules) for joint in joints), *(one.joint for one in sliding)),
         _vector(numbers_of(model, "gravity", EARTH, "the model", 3)),
         notes=(
             *document.notes,
@@ -84,7 +86,7 @@ def read_osim(path: Path) -> Description:
             *others,
         ),
         loops=tuple(unmodelled(model)),
-        ties=(*ties(model, frames), *parted.welds()),
+        ties=(*ties(model, frames), *parted.welds(), *(one.tie for one in sliding)),
         omissions=tuple(_forces(model)),
         ground=GROUND,
         takes_impossible=True,
