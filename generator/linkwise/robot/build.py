@@ -64,7 +64,10 @@ def build(description: Description, options: Options) -> Robot:
     if numbers and all(link.massless for link in numbers):
         which = "moving link" if any(body.mass for body in plain.bodies) else "link"
         raise LinkwiseError(f"no {which} has mass, so no torque is to be had; give one mass and inertia")
-    singular = check_mass_matrix(numbers, moving.coordinates, named, takes or options.allow_unphysical)
+    made = description.massless
+    singular = check_mass_matrix(
+        numbers, moving.coordinates, named, options.allow_unphysical, takes, made
+    )
     notes = (
         *description.notes,
         *unphysical,
@@ -88,7 +91,7 @@ def build(description: Description, options: Options) -> Robot:
         description.gravity,
         parameters,
         (*notes, *naming.notes()) if naming else notes,
-        options.request() | ({"allow_unphysical": True} if singular else {}),
+        options.request() | ({"allow_unphysical": True} if singular or made else {}),
         _with_known(assembly.frames, parameters, dict(description.parameters)),
         passive,
         held.ties,

@@ -90,6 +90,7 @@ def read_osim(path: Path) -> Description:
         omissions=tuple(_forces(model)),
         ground=GROUND,
         takes_impossible=True,
+        massless=tuple(one.joint.name for one in sliding),
     )
 
 
