@@ -228,8 +228,11 @@ def test_a_setup_and_its_command_line_write_the_same(tmp_path: Path) -> None:
     changed(setup, "<in_degrees>false", "<in_degrees>true")
     analyze(tmp_path, "--opensim-setup", "setup.xml", "--format", "none")
     files = {file.name: file.read_bytes() for file in (tmp_path / "out").glob("*.sto")}
+    units = {f"joint0_t{axis}": "force" for axis in "xyz"}
+    torques = (f"{name}_{units.get(name, 'moment')}" for name in COORDINATES)
     assert sorted(files) == sorted(
-        f"walk_InducedAccelerations_{name}.sto" for name in (*COORDINATES, "center_of_mass")
+        f"walk_InducedAccelerations_{name}.sto"
+        for name in (*COORDINATES, "center_of_mass", "InverseDynamics", *torques)
     )
     assert json.loads((tmp_path / "out" / "analysis.json").read_text())["files"] == [
         "analysis.json",
@@ -282,5 +285,5 @@ def test_what_a_setup_says_is_not_given_again(tmp_path: Path) -> None:
     assert told.startswith("linkwise: error: LOG: setup.xml says that")
     told = analyze(tmp_path, "walk.sto", code=2)
     assert told == "linkwise: error: Missing option '--robot'. See linkwise analyze --help\n"
-    told = analyze(tmp_path, "walk.sto", "--robot", "leg.osim", "--sto", "a", code=2)
-    assert told == "linkwise: error: --sto goes with --induced; add it\n"
+    told = analyze(tmp_path, "walk.sto", "--robot", "leg.osim", "--sto-units", "deg", code=2)
+    assert told == "linkwise: error: --sto-units goes with --sto; add it\n"

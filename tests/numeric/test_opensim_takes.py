@@ -1,4 +1,4 @@
-"""Models that OpenSim takes although they are odd, beside OpenSim itself: what is read of them is what it reads."""
+"""Odd models that OpenSim takes, beside OpenSim itself."""
 
 import re
 from pathlib import Path
@@ -107,7 +107,7 @@ def test_torques_of_a_point_on_a_line_move_opensims_model_as_it_moved(tmp_path: 
     draw = np.random.default_rng(3)
     (q,) = robot.constraints.closed(robot.constraints.closed_position + draw.uniform(-0.05, 0.05, (1, 4)))
     own = [robot.joint_names.index(name) for name in robot.constraints.independent]
-    y, yd, ydd = q[own], *draw.uniform(-1.0, 1.0, (2, len(own)))
+    yd, ydd = draw.uniform(-1.0, 1.0, (2, len(own)))
     ways = np.asarray(robot.constraints.velocity_map(q[None]))[0]
     qd = ways @ yd
     step = 1e-5
@@ -138,7 +138,9 @@ def test_a_frame_by_stations_stands_where_opensims_does(axes: tuple[str, str], t
         f"<socket_{socket}>/bodyset/b0/{name}</socket_{socket}>"
         for name, socket in zip(places, ("point_a", "point_b", "point_c", "origin_point"), strict=True)
     )
-    given = "".join(f"<{tag}>{a}</{tag}>" for tag, a in zip(("ab_axis", "ab_x_ac_axis"), axes, strict=True) if a)
+    given = "".join(
+        f"<{tag}>{a}</{tag}>" for tag, a in zip(("ab_axis", "ab_x_ac_axis"), axes, strict=True) if a
+    )
     frame = f'<StationDefinedFrame name="by_stations">{sockets}{given}</StationDefinedFrame>'
     bodies = body("b0", 1.0, f"<components>{stations}{frame}</components>") + body("b1", 2.0)
     joints = TREE[0] + pin("j1", "/bodyset/b0/by_stations", "1 0 0", "/bodyset/b1", "0 0.1 0")
@@ -156,7 +158,9 @@ def test_a_frame_by_stations_stands_where_opensims_does(axes: tuple[str, str], t
         ('name="body1"', 'name="body0"'),
     ],
 )
-def test_names_that_are_empty_or_anothers_become_opensims(was: str, now: str, old: bool, tmp_path: Path) -> None:
+def test_names_that_are_empty_or_anothers_become_opensims(
+    was: str, now: str, old: bool, tmp_path: Path
+) -> None:
     text = re.sub(was, now, chain(["PinJoint"] * 3, old=old))
     if "body" in was:  # joints then lead to the first of the two
         text = text.replace(">/bodyset/body1<", ">/bodyset/body0_0<").replace(">body1<", ">body0_0<")

@@ -82,8 +82,12 @@ class Outputs:
         return any(figures)
 
     def __post_init__(self) -> None:
-        if self.induced_whole and not self.induced:
-            raise LinkwiseError("--induced-whole goes with --induced; add it")
+        for flag, given, needed, there in (
+            ("--sto-units", self.storage_units != "rad", "--sto", self.storage),
+            ("--induced-whole", self.induced_whole, "--induced", self.induced),
+        ):
+            if given and not there:
+                raise LinkwiseError(f"{flag} goes with {needed}; add it")
 
 
 @dataclass(frozen=True)

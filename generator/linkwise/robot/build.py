@@ -65,9 +65,7 @@ def build(description: Description, options: Options) -> Robot:
         which = "moving link" if any(body.mass for body in plain.bodies) else "link"
         raise LinkwiseError(f"no {which} has mass, so no torque is to be had; give one mass and inertia")
     made = description.massless
-    singular = check_mass_matrix(
-        numbers, moving.coordinates, named, options.allow_unphysical, takes, made
-    )
+    singular = check_mass_matrix(numbers, moving.coordinates, named, options.allow_unphysical, takes, made)
     notes = (
         *description.notes,
         *unphysical,

@@ -80,10 +80,7 @@ def check_bodies(bodies: Iterable[Body], allow: bool, allow_triangle: bool = Fal
         raise LinkwiseError(
             f"{len(refused)} links cannot exist; correct them, or pass --allow-unphysical: {told}"
         )
-    return [
-        Note("unphysical", body.name, body.unphysical or fault, IMPOSSIBLE)
-        for body, fault in faults
-    ]
+    return [Note("unphysical", body.name, body.unphysical or fault, IMPOSSIBLE) for body, fault in faults]
 
 
 def principal(mass: float, inertia: Array) -> tuple[Array, Array]:
