@@ -31,7 +31,7 @@ continue far enough: there it is further off from an even, endless log.
 
 
 def write_trial(folder: Path, rate: float, samples: int, digits: int) -> None:
-    """Write a model, a motion with much at its ends and a plate, at that rate and with noise that needs a filter."""
+    """Write a model, a motion with much at its ends and noise, at that rate, and a plate."""
     (folder / "leg.osim").write_text(MODEL)
     draw, n = np.random.default_rng(samples), len(COORDINATES)
     time = np.round(np.arange(samples) / rate, digits)
@@ -81,8 +81,8 @@ def test_whole_trials_are_the_tools(name: str, trial: tuple[float, int, float], 
     last = (samples - 1) / rate
     expected = columns(by_opensim(tmp_path, cutoff, 0.0, last))
     lowpass = () if cutoff < 0 else ("--cutoff", f"{cutoff:g}", "--filter-order", "3")
-    asked = "analyze walk.sto --robot leg.osim --loads plate.xml --derivative spline --sto leg --out out --no-page"
-    done = run_linkwise(*asked.split(), *lowpass, folder=tmp_path)
+    asked = "analyze walk.sto --robot leg.osim --loads plate.xml --derivative spline --sto leg --no-page"
+    done = run_linkwise(*asked.split(), "--out", "out", *lowpass, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     found = columns(osim.TimeSeriesTable(str(tmp_path / "out/leg_InverseDynamics.sto")))
     assert sorted(found) == sorted(expected)

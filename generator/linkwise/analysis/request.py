@@ -54,8 +54,8 @@ class Outputs:
     )
     storage: str = option(
         "",
-        "Also write OpenSim's storage files: NAME_InverseDynamics.sto, the shares of each coordinate, and what"
-        " --induced tells",
+        "Also write OpenSim's storage files: NAME_InverseDynamics.sto, shares of each coordinate, and what "
+        "--induced tells",
         "--sto",
         metavar="NAME",
         is_key=False,

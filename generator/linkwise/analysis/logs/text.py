@@ -203,8 +203,8 @@ def open_delimited(path: Path) -> TextLog:
 def open_storage(path: Path) -> TextLog:
     """Open an OpenSim .mot or .sto file with the facts of its header: inDegrees, nRows and nColumns.
 
-    The last two are called datarows and datacolumns in motions of SIMM. As in OpenSim's tables, names and rows
-    that are there count; where these two say otherwise, that is a warning.
+    The last two are called datarows and datacolumns in motions of SIMM. As in OpenSim's tables, the names and
+    rows that are there count; where these two say otherwise, that is a warning.
 
     Raises LinkwiseError for a header that is truncated or contradicts itself.
     """

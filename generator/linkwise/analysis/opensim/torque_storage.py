@@ -39,7 +39,7 @@ def _file(name: str, title: str, columns: Sequence[tuple[str, int]]) -> StorageF
     for column, count in Counter(names).items():
         if count > 1:
             raise LinkwiseError(
-                f"--sto: {count} columns of {name} would be called {column!r}; name the body or load otherwise"
+                f"--sto: {count} columns of {name} would be called {column!r}; rename a body or load"
             )
     turns = (False,) * len(names)
     return StorageFile(name, title, names, tuple((row,) for _, row in columns), turns, has_angles=False)

@@ -28,7 +28,7 @@ CLASS_OF_CLASS = re.compile(rb"(</?\w+)::")
 """A tag such as <HuntCrossleyForce::ContactParametersSet>, which OpenSim writes and XML forbids."""
 
 OLDEST, JOINTS_BY_THEMSELVES, SOCKETS = 20000, 30500, 30517
-"""Versions: the first one read here, with joints in bodies; the first with a JointSet; the first with sockets.
+"""Versions: the first one read, with joints in bodies; the first with a JointSet; the first with sockets.
 
 Versions before the first, of OpenSim 1, and between the last two, of previews of OpenSim 4 that changed the
 layout many times, are read as OpenSim itself brings them to its latest.
@@ -103,7 +103,7 @@ class OsimDocument:
 
 
 def read_document(path: Path) -> OsimDocument:
-    """Return the model of a file, all of its components with names; raises LinkwiseError naming the remedy."""
+    """Return the model of a file, its components with names; raises LinkwiseError naming the remedy."""
     notes: list[Note] = []
     model, version = _model(parse(path, LARGEST, as_xml))
     if _number(version) < OLDEST or JOINTS_BY_THEMSELVES <= _number(version) < SOCKETS:

@@ -1,8 +1,8 @@
 """PointOnLineConstraint: a point of one body stays on a line of another.
 
-Between the bodies stands a slider without mass, which a joint lets slide along the line, and to which the point
-is tied. That leaves the point what the line leaves it: the slider's coordinate follows the others, and no
-force acts along the line, as the slider has nothing to bear there.
+Between the bodies stands a slider without mass, which a joint lets slide along the line, and to which the
+point is tied. That leaves the point what the line leaves it: the slider's coordinate follows the others, and
+no force acts along the line, as the slider has nothing to bear there.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ ENDING = "slide"
 
 @dataclass(frozen=True)
 class Slider:
-    """A slider: its body, the joint by which it slides on its line, and the tie that holds the point to it."""
+    """A slider: its body, the joint by which it slides on its line, and the tie that holds the point."""
 
     body: Body
     joint: Connection
