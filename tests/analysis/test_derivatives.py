@@ -10,6 +10,7 @@ from scipy import signal
 
 FIVE = Processing()
 SAVGOL = Processing("savitzky-golay", window=9, degree=4)
+SPLINE = Processing("spline")
 
 
 def test_five_point_weights_are_those_of_taylor():
@@ -20,7 +21,7 @@ def test_five_point_weights_are_those_of_taylor():
         np.testing.assert_array_equal(powers @ SECOND[p], [0, 0, 24, 0, 0])
 
 
-@pytest.mark.parametrize(("processing", "tolerance"), [(FIVE, 2e-4), (SAVGOL, 2e-2)])
+@pytest.mark.parametrize(("processing", "tolerance"), [(FIVE, 2e-4), (SAVGOL, 2e-2), (SPLINE, 1e-3)])
 def test_derivatives_of_a_sine(processing, tolerance):
     t = np.arange(400) / 100
     q, qd, qdd = derivatives(np.sin(3 * t)[:, None], 100.0, 0, 400, processing)
@@ -50,6 +51,28 @@ def test_blocks_give_what_the_whole_gives(processing, rows):
         stop = min(start + rows, 101)
         for part, full in zip(derivatives(q, 100.0, start, stop, processing), whole, strict=True):
             np.testing.assert_array_equal(part, full[start:stop])
+
+
+@pytest.mark.parametrize("padding", ["odd", "even", "none"])
+@pytest.mark.parametrize("rows", [1, 7, 100, 300])
+def test_blocks_of_a_spline_give_what_the_whole_gives(padding: str, rows: int) -> None:
+    how = Processing("spline", lowpass=Lowpass(6.0, 3, padding))
+    q = smooth(301, 2)[:, 1:]
+    whole = derivatives(q, 100.0, 0, 301, how)
+    for start in range(0, 301, rows):
+        stop = min(start + rows, 301)
+        for part, full in zip(derivatives(q, 100.0, start, stop, how), whole, strict=True):
+            np.testing.assert_allclose(part, full[start:stop], atol=1e-9 * np.abs(full).max())
+
+
+def test_a_spline_goes_through_what_the_filter_continued_the_log_by() -> None:
+    """A long log, of which the filter takes each end for the middle, and its spline there."""
+    half = smooth(301, 2)[:, 1:]
+    how = Processing("spline", lowpass=Lowpass(6.0, 3, "odd"))
+    turned = np.concatenate([2.0 * half[0] - half[:0:-1], half])
+    expected = [part[300:] for part in derivatives(turned, 100.0, 0, len(turned), SPLINE)]
+    for part, full in zip(derivatives(half, 100.0, 0, 301, how), expected, strict=True):
+        np.testing.assert_allclose(part[:200], full[:200], atol=1e-9 * np.abs(full).max())
 
 
 @pytest.mark.parametrize("padding", ["odd", "even", "constant", "none"])

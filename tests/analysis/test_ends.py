@@ -34,10 +34,6 @@ def short(path):
     return path.with_suffix(".csv")
 
 
-def promised(path):
-    return write_mot(path.with_suffix(".mot"), smooth(20, 3), JOINTS, nRows="30")
-
-
 def in_degrees(path):
     return write_mot(path.with_suffix(".mot"), smooth(20, 3), JOINTS)
 
@@ -48,7 +44,6 @@ def in_degrees(path):
         (holed, (), "row 11, column 'joint2': nan"),
         (gap, (), "a gap of"),
         (short, (), "2 cells where"),
-        (promised, (), "nRows=30"),
         (in_degrees, ("--units", "rad"), "contradicts"),
     ],
 )

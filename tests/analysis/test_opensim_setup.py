@@ -35,7 +35,7 @@ def test_a_setup_is_a_command_line(tmp_path: Path) -> None:
     assert asked.options == {
         "ignore_extra": True,
         "induced_whole": True,
-        "induced_sto": "walk_InducedAccelerations",
+        "sto": "walk_InducedAccelerations",
         "sto_units": "rad",
         "from_time": 0.2,
         "to_time": 1.2,
@@ -228,8 +228,11 @@ def test_a_setup_and_its_command_line_write_the_same(tmp_path: Path) -> None:
     changed(setup, "<in_degrees>false", "<in_degrees>true")
     analyze(tmp_path, "--opensim-setup", "setup.xml", "--format", "none")
     files = {file.name: file.read_bytes() for file in (tmp_path / "out").glob("*.sto")}
+    units = {f"joint0_t{axis}": "force" for axis in "xyz"}
+    torques = (f"{name}_{units.get(name, 'moment')}" for name in COORDINATES)
     assert sorted(files) == sorted(
-        f"walk_InducedAccelerations_{name}.sto" for name in (*COORDINATES, "center_of_mass")
+        f"walk_InducedAccelerations_{name}.sto"
+        for name in (*COORDINATES, "center_of_mass", "InverseDynamics", *torques)
     )
     assert json.loads((tmp_path / "out" / "analysis.json").read_text())["files"] == [
         "analysis.json",
@@ -237,7 +240,7 @@ def test_a_setup_and_its_command_line_write_the_same(tmp_path: Path) -> None:
     ]
     options = "walk.sto --robot leg.osim --from 0.2 --to 1.2 --cutoff 6 --filter-order 3 --induced joints"
     contact = "--contact sole:body3=pressed --contact-loads plate.xml --contact-threshold 20"
-    store = "--induced centre-of-mass --induced-whole --induced-sto walk_InducedAccelerations --sto-units deg"
+    store = "--induced centre-of-mass --induced-whole --sto walk_InducedAccelerations --sto-units deg"
     analyze(tmp_path, *options.split(), *contact.split(), *store.split(), "--format", "none")
     assert {file.name: file.read_bytes() for file in (tmp_path / "out").glob("*.sto")} == files
 
@@ -282,5 +285,5 @@ def test_what_a_setup_says_is_not_given_again(tmp_path: Path) -> None:
     assert told.startswith("linkwise: error: LOG: setup.xml says that")
     told = analyze(tmp_path, "walk.sto", code=2)
     assert told == "linkwise: error: Missing option '--robot'. See linkwise analyze --help\n"
-    told = analyze(tmp_path, "walk.sto", "--robot", "leg.osim", "--induced-sto", "a", code=2)
-    assert told == "linkwise: error: --induced-sto goes with --induced; add it\n"
+    told = analyze(tmp_path, "walk.sto", "--robot", "leg.osim", "--sto-units", "deg", code=2)
+    assert told == "linkwise: error: --sto-units goes with --sto; add it\n"

@@ -96,7 +96,9 @@ def _refuse_missing(what: str, joints: Sequence[str], free: Sequence[str]) -> No
     """
     if joints:
         near = with_nearest(joints, [column for column in free if not column.endswith(SPEED)])
-        raise LinkwiseError(f"no column for {what} {near}; name it with --map COLUMN={joints[0]}")
+        held = " ".join(f"--lock {joint}=VALUE" for joint in joints[:MOST_FOUND])
+        mend = f", or hold what the log leaves out with {held}, in rad or m" if what == "joint" else ""
+        raise LinkwiseError(f"no column for {what} {near}; name it with --map COLUMN={joints[0]}{mend}")
 
 
 def _refuse_extra(columns: Sequence[str], source: Mapping[str, str]) -> None:

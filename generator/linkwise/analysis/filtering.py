@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwise.analysis.disk_rows import let_go
-from linkwise.analysis.settings import Lowpass, Processing
+from linkwise.analysis.settings import SPLINE_DEGREE, Lowpass, Processing
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.extras import extra
@@ -162,11 +162,13 @@ def derivatives(
 
     positions: of all samples, (samples, n), at `rate` Hz; at least `processing.span` of them
     """
-    reach = processing.span - 1
+    reach = processing.reach
     low, high = max(0, start - reach), min(len(positions), stop + reach)
     window = np.asarray(positions[low:high])
     if processing.derivative == "five-point":
         motion = (window, *_five_point(window, rate))
+    elif processing.derivative == "spline":
+        motion = (window, *_splined(window, rate, processing, low == 0, high == len(positions)))
     else:
         motion = _savitzky_golay(window, rate, processing)
     q, qd, qdd = (x[start - low : stop - low] for x in motion)
@@ -198,3 +200,25 @@ def _savitzky_golay(q: Array, rate: float, processing: Processing) -> tuple[Arra
         savgol(q, processing.window, processing.degree, deriv=m, delta=1 / rate, axis=0) for m in range(3)
     ]
     return fitted[0], fitted[1], fitted[2]
+
+
+def _splined(q: Array, rate: float, processing: Processing, first: bool, last: bool) -> tuple[Array, Array]:
+    """Return q̇, q̈ of the natural spline of degree 5 through the samples, as OpenSim derives coordinates.
+
+    OpenSim's spline also goes through what its filter continued the log by. A filter without a shift in time
+    leaves the symmetry of such a continuation, so that it is the filtered log's own: turned about its end, or
+    mirrored there. Where nothing is filtered, the spline ends with the log.
+
+    first, last: whether the samples begin and end with the log
+    """
+    padding = "none" if processing.lowpass is None else processing.lowpass.padding
+    reach = min(processing.reach, len(q) - 1) if padding in ("odd", "even") else 0
+    front, back = (reach if at_end else 0 for at_end in (first, last))
+    whole = [_extension(q[: front + 1], padding), q, _extension(q[-1 : -back - 2 : -1], padding)[::-1]]
+    knots = np.concatenate(whole)
+    held = [(order, np.zeros(q.shape[1])) for order in range(SPLINE_DEGREE // 2 + 1, SPLINE_DEGREE)]
+    make = extra("scipy.interpolate").make_interp_spline
+    spline = make(np.arange(-front, len(q) + back), knots, SPLINE_DEGREE, bc_type=(held, held))
+    at = np.arange(len(q))
+    qd, qdd = (np.asarray(spline(at, order)) * rate**order for order in (1, 2))
+    return qd, qdd

@@ -39,7 +39,7 @@ class PassedNoise:
     @classmethod
     def of(cls, samples: int, rate: float, processing: Processing) -> "PassedNoise":
         """Return the passage at `rate` Hz; raise LinkwiseError as `lowpass` does."""
-        reach = processing.span
+        reach = processing.reach + 1
         if processing.lowpass is not None:
             reach += filter_memory(rate, processing.lowpass)
         length = min(samples, 4 * reach + 1)

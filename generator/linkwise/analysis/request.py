@@ -58,13 +58,14 @@ class Outputs:
     )
     storage: str = option(
         "",
-        "Also write what --induced tells as OpenSim's storage files, NAME_POINT.sto",
-        "--induced-sto",
+        "Also write OpenSim's storage files: NAME_InverseDynamics.sto, shares of each coordinate, and what "
+        "--induced tells",
+        "--sto",
         metavar="NAME",
         is_key=False,
     )
     storage_units: Units = option(
-        "rad", "Unit of their angles; rad if not given", "--sto-units", needs="--induced-sto", is_key=False
+        "rad", "Unit of their angles; rad if not given", "--sto-units", needs="--sto", is_key=False
     )
     induced_power: bool = option(
         False, "Tell by its sources the power that each link gets, and that which flows through each joint"
@@ -86,7 +87,7 @@ class Outputs:
 
     def __post_init__(self) -> None:
         for flag, given, needed, there in (
-            ("--induced-sto", self.storage, "--induced", self.induced),
+            ("--sto-units", self.storage_units != "rad", "--sto", self.storage),
             ("--induced-whole", self.induced_whole, "--induced", self.induced),
         ):
             if given and not there:

@@ -12,7 +12,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.option import REQUIRED, option
 
 Units = Literal["rad", "deg"]
-Derivative = Literal["five-point", "savitzky-golay"]
+Derivative = Literal["five-point", "savitzky-golay", "spline"]
 Padding = Literal["odd", "even", "constant", "none"]
 Edges = Literal["one-sided", "trim"]
 Convention = Literal["closing", "gradient"]
@@ -81,6 +81,11 @@ class Reading:
         return tuple(self.mapping.items() if isinstance(self.mapping, Mapping) else self.mapping)
 
 
+SPLINE_DEGREE, SPLINE_REACH = 5, 64
+"""Degree of the spline of derivatives, OpenSim's, and the samples after which it has forgotten one: the
+influence of one falls by 0.43 from sample to sample, to 1e-23 there."""
+
+
 @dataclass(frozen=True)
 class Lowpass:
     """A Butterworth low-pass run forwards and backwards, so without a shift in time.
@@ -108,6 +113,9 @@ class Lowpass:
 @dataclass(frozen=True)
 class Processing:
     """Choices of how velocities and accelerations are derived, and the convention of the terms.
+
+    "spline" is OpenSim's derivative: of a spline of degree 5 through the samples, continued past the ends of
+    the log as the filter continues it.
 
     The low-pass, if any, is applied to q before it is differentiated; both are linear, so away from
     the ends this equals the paper's filter after the derivative. `window` (in samples) and `degree` are
@@ -153,8 +161,13 @@ class Processing:
 
     @property
     def span(self) -> int:
-        """Number of samples that one derivative uses."""
-        return 5 if self.derivative == "five-point" else self.window
+        """Number of samples that one derivative needs."""
+        return {"five-point": 5, "savitzky-golay": self.window, "spline": SPLINE_DEGREE + 1}[self.derivative]
+
+    @property
+    def reach(self) -> int:
+        """Number of samples to either side that one derivative sees."""
+        return SPLINE_REACH if self.derivative == "spline" else self.span - 1
 
 
 @dataclass(frozen=True)
@@ -189,6 +202,6 @@ class Payload:
 def choices(reading: Reading, processing: Processing) -> dict[str, Any]:
     """Return all choices as plain data, to record in the outputs."""
     kept = asdict(processing)
-    if processing.derivative == "five-point":
+    if processing.derivative != "savitzky-golay":
         del kept["window"], kept["degree"]
     return {"reading": asdict(reading), "processing": kept}

@@ -233,7 +233,7 @@ def motion_noise(
     covariance, driven, followed = asked.covariance, np.zeros(len(robot.joints)), ()
     driven[list(robot.driven)] = 1.0
     if covariance is None:
-        if processing.lowpass is None and processing.derivative == "five-point":
+        if processing.lowpass is None and processing.derivative != "savitzky-golay":
             raise LinkwiseError(
                 "[motion] estimate takes what a filter took away for noise, and nothing was; give --cutoff,"
                 " or --derivative savitzky-golay"

@@ -35,7 +35,7 @@ app = typer.Typer(add_completion=False)
 @takes(
     *("log", "robot", "opensim_setup", "out", "units", "time", "topic", "qpos"),
     ...,
-    *("induced", "induced_sto", "sto_units", "induced_power", "reaction", "uncertain", "cutoff_sweep"),
+    *("induced", "sto", "sto_units", "induced_power", "reaction", "uncertain", "cutoff_sweep"),
     *("trace", "trace_windows", "trace_weight", "trace_restart", "trace_torque"),
     *("trace_torque_factor", "backend", "page", "as_json"),
     complete=with_setup,

@@ -34,7 +34,8 @@ def build(description: Description, options: Options) -> Robot:
     whole, description = description, cut(description, options.root, options.tip)
     check_constraints(numeric(whole))
     plain = numeric(description)
-    unphysical = check_bodies(plain.bodies, options.allow_unphysical)
+    takes = description.takes_impossible
+    unphysical = check_bodies(plain.bodies, options.allow_unphysical, takes)
     if fault := unusable(*plain.gravity):
         raise LinkwiseError(f"gravity has {fault} in it; give three numbers, in m/s²")
     naming = _naming(description, options)
@@ -63,7 +64,8 @@ def build(description: Description, options: Options) -> Robot:
     if numbers and all(link.massless for link in numbers):
         which = "moving link" if any(body.mass for body in plain.bodies) else "link"
         raise LinkwiseError(f"no {which} has mass, so no torque is to be had; give one mass and inertia")
-    singular = check_mass_matrix(numbers, moving.coordinates, named, options.allow_unphysical)
+    made = description.massless
+    singular = check_mass_matrix(numbers, moving.coordinates, named, options.allow_unphysical, takes, made)
     notes = (
         *description.notes,
         *unphysical,
@@ -87,7 +89,7 @@ def build(description: Description, options: Options) -> Robot:
         description.gravity,
         parameters,
         (*notes, *naming.notes()) if naming else notes,
-        options.request(),
+        options.request() | ({"allow_unphysical": True} if singular or made else {}),
         _with_known(assembly.frames, parameters, dict(description.parameters)),
         passive,
         held.ties,

@@ -203,5 +203,10 @@ class Description:
     """Name of the body that is the world itself, where the file has one."""
     free: FreeRoot | None = None
     """Pose of a free root; None where the file holds the root, or its format does not say."""
+    takes_impossible: bool = False
+    """True if the format's own program takes moments of inertia that break the triangle inequality, and
+    joints that lack inertia of their own, though not mass; then they are taken here, with a warning."""
+    massless: tuple[str, ...] = ()
+    """Joints that the reader made up, and which move no mass."""
     ordered: bool = False
     """True if Pinocchio has siblings in the file's order, false if in the order of their joints' names."""

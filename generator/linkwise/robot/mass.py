@@ -15,6 +15,8 @@ from linkwise.robot.transforms import add, rotate, rotate_inertia, total
 TRIANGLE = 1e-6
 """Relative slack of the triangle inequality: files round flat bodies' moments to about six digits."""
 
+BREAKS_TRIANGLE = "an inertia that breaks the triangle inequality"
+
 MOST_NAMED = 20
 """Most bodies that cannot exist, in one message."""
 
@@ -59,14 +61,17 @@ def _empty(body: Body) -> bool:
     return body.mass == 0 and all(entry == 0 for row in body.inertia for entry in row)
 
 
-def check_bodies(bodies: Iterable[Body], allow: bool) -> list[Note]:
+def check_bodies(bodies: Iterable[Body], allow: bool, allow_triangle: bool = False) -> list[Note]:
     """Return a note for each body that cannot exist; the bodies have numbers for values.
 
     Raises LinkwiseError that names all of them unless `allow` or the file itself allows it, and always for
-    numbers that are not usable.
+    numbers that are not usable. With `allow_triangle`, moments may break the triangle inequality.
     """
     faults = [(body, fault) for body in bodies if (fault := _fault(body))]
-    refused = [] if allow else [(body.name, fault) for body, fault in faults if not body.unphysical]
+    refused = []
+    for body, fault in faults:
+        if not (allow or body.unphysical or (allow_triangle and fault.startswith(BREAKS_TRIANGLE))):
+            refused.append((body.name, fault))
     if len(refused) == 1:
         name, fault = refused[0]
         raise LinkwiseError(f"link {name!r} has {fault}; correct it, or pass --allow-unphysical")
@@ -75,10 +80,7 @@ def check_bodies(bodies: Iterable[Body], allow: bool) -> list[Note]:
         raise LinkwiseError(
             f"{len(refused)} links cannot exist; correct them, or pass --allow-unphysical: {told}"
         )
-    return [
-        Note("unphysical", body.name, body.unphysical or f"link {body.name!r} has {fault}", IMPOSSIBLE)
-        for body, fault in faults
-    ]
+    return [Note("unphysical", body.name, body.unphysical or fault, IMPOSSIBLE) for body, fault in faults]
 
 
 def principal(mass: float, inertia: Array) -> tuple[Array, Array]:
@@ -107,5 +109,5 @@ def _fault(body: Body) -> str:
     if high > low + middle + TRIANGLE * high:
         numbers = f"{high:.4g} > {low:.4g} + {middle:.4g} kg·m²"
         excess = f" by {100 * (high / (low + middle) - 1):.2g} %" if low + middle else ""
-        return f"an inertia that breaks the triangle inequality ({numbers}){excess}"
+        return f"{BREAKS_TRIANGLE} ({numbers}){excess}"
     return ""

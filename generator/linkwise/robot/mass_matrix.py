@@ -69,11 +69,17 @@ def _clearly_regular(m: Array) -> bool:
 
 
 def check_mass_matrix(
-    links: Sequence[Link], moving: Sequence[Coordinate], files: Collection[str], allow: bool
+    links: Sequence[Link],
+    moving: Sequence[Coordinate],
+    files: Collection[str],
+    allow: bool,
+    allow_mass: bool = False,
+    made: Collection[str] = (),
 ) -> list[Note]:
     """Return a note on each coordinate without inertia of its own; raises LinkwiseError unless `allow`.
 
-    Links have numbers for values; `files` are the names of those that stand in the file.
+    Links have numbers for values; `files` are the names of those that stand in the file. With `allow_mass`,
+    coordinates may lack inertia that move mass, or beyond which others do; those in `made` are the reader's.
     """
     generator = np.random.default_rng(0)
     states = generator.uniform(-np.pi, np.pi, (STATES, len(moving)))
@@ -81,7 +87,9 @@ def check_mass_matrix(
     notes = []
     for k in map(int, np.flatnonzero(first.idle)):
         name, lacking = moving[k].name, "inertia" if first.turned[k] else "mass"
-        if not allow:
+        if name in made:
+            continue
+        if not (allow or (allow_mass and first.turned[k])):
             raise LinkwiseError(
                 f"joint {name!r} moves no {lacking} at all; give a link beyond it {lacking}, hold it with "
                 f"--lock {name}=0, or pass --allow-unphysical"
@@ -94,7 +102,7 @@ def check_mass_matrix(
     if all(alike):
         together = sorted({k for group in alike for k in group})
         names = ", ".join(repr(moving[k].name) for k in together)
-        if not allow:
+        if not (allow or allow_mass):
             raise LinkwiseError(
                 f"the joints {names} can move together without moving any mass; "
                 f"{_mend(links, together[-1], files)}, "

@@ -1,5 +1,6 @@
 """Loads as a user gives them: forces and moments on bodies, constant, over time, or in columns of a log."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,7 +62,8 @@ class Loads:
     """All loads of an analysis: values, and files, which are logs or OpenSim's external-loads XML.
 
     `cutoff` in Hz is that of a low-pass filter for the data of files, of second order, run forwards and
-    backwards; None for no filter. Raises LinkwiseError for a cutoff that is not above 0, or without files.
+    backwards; None for no filter. Raises LinkwiseError for a cutoff that is not above 0, or without files,
+    and for a file that is given twice.
     """
 
     given: tuple[Load, ...] = ()
@@ -73,6 +75,9 @@ class Loads:
             raise LinkwiseError(f"--loads-cutoff {self.cutoff:g}: give a frequency in Hz above 0")
         if self.cutoff is not None and not self.paths:
             raise LinkwiseError("--loads-cutoff goes with --loads, or with --contact-loads; add one")
+        for path, count in Counter(path.resolve() for path in self.paths).items():
+            if count > 1:
+                raise LinkwiseError(f"{path.name} is given {count} times, as loads; give it once")
 
     @classmethod
     def of(cls, several: Sequence[Load | str | Path], cutoff: float | None = None) -> "Loads":

@@ -6,7 +6,7 @@ editor numbers lines, from 1, header included.
 
 import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -30,7 +30,7 @@ DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 class TextLog:
     """A log of delimited text.
 
-    delimiter: None for any run of blanks; promised: the number of samples that the header promises, if any
+    delimiter: None for any run of blanks
     """
 
     path: Path
@@ -38,7 +38,6 @@ class TextLog:
     first_row: int
     delimiter: str | None
     degrees: bool | None = None
-    promised: int | None = None
     warnings: tuple[str, ...] = ()
     brought: frozenset[str] = frozenset()
 
@@ -50,7 +49,7 @@ class TextLog:
     def read(self, columns: Sequence[int], rows: int = 65536) -> Iterator[tuple[Array, int]]:
         """Yield blocks (at most `rows`, len(columns)) and the bytes read so far.
 
-        Raises LinkwiseError that names row and column for what is not a number, and for a truncated file.
+        Raises LinkwiseError that names row and column for what is not a number.
         """
         row, done, blank = self.first_row, 0, 0
         with self.path.open(encoding="utf-8-sig") as handle:
@@ -67,12 +66,6 @@ class TextLog:
                     yield block, done
             except UnicodeDecodeError as error:
                 raise LinkwiseError(f"{self.path}: row {row} or after: not UTF-8 text") from error
-        found = row - self.first_row
-        if self.promised is not None and found != self.promised:
-            raise LinkwiseError(
-                f"{self.path}: the header promises nRows={self.promised} but {found} rows follow"
-                f" (the last is row {row - 1}); the file is cut off or nRows is wrong"
-            )
 
     def _numbers(self, lines: list[str], columns: Sequence[int], row: int) -> Array:
         """Return the numbers (lines, columns); `row` is the number of the first line."""
@@ -210,7 +203,8 @@ def open_delimited(path: Path) -> TextLog:
 def open_storage(path: Path) -> TextLog:
     """Open an OpenSim .mot or .sto file with the facts of its header: inDegrees, nRows and nColumns.
 
-    The last two are called datarows and datacolumns in motions of SIMM.
+    The last two are called datarows and datacolumns in motions of SIMM. As in OpenSim's tables, the names and
+    rows that are there count; where these two say otherwise, that is a warning.
 
     Raises LinkwiseError for a header that is truncated or contradicts itself.
     """
@@ -218,11 +212,6 @@ def open_storage(path: Path) -> TextLog:
     columns = _columns(path, row, names.rstrip(), "\t" if "\t" in names else None)
     if not any(columns):
         raise LinkwiseError(f"{path}: row {row}: no column names after 'endheader'")
-    promised = _count(path, facts, "nColumns")
-    if promised is not None and promised != len(columns):
-        raise LinkwiseError(
-            f"{path}: row {row}: {len(columns)} column names where the header promises nColumns={promised}"
-        )
     kind = facts.get("datatype", "double")
     if kind.lower() not in {"double", "float"}:
         raise LinkwiseError(
@@ -233,9 +222,31 @@ def open_storage(path: Path) -> TextLog:
     degrees = None if told is None else {"yes": True, "no": False}.get(told.lower())
     if told is not None and degrees is None:
         raise LinkwiseError(f"{path}: inDegrees={short(told, SHOWN)!r} in the header is neither yes nor no")
-    rows = _count(path, facts, "nRows")
+    warnings = (*_miscounted(path, facts, len(columns), row), *_warnings_of_the_end(path, None))
     # Values are padded with blanks, so any run of blanks separates them, whatever separates the names.
-    return TextLog(path, columns, row + 1, None, degrees, rows, _warnings_of_the_end(path, None))
+    return TextLog(path, columns, row + 1, None, degrees, warnings)
+
+
+def _miscounted(path: Path, facts: Mapping[str, str], columns: int, row: int) -> Iterator[str]:
+    """Yield warnings where the header promises other counts than there are.
+
+    columns: number of names; row: number of the row that holds them
+    """
+    if (promised := _count(path, facts, "nColumns")) not in (None, columns):
+        yield f"the header promises nColumns={promised}, and {columns} columns have names, which count"
+    promised = _count(path, facts, "nRows")
+    if promised is not None and promised != (found := _rows_below(path, row)):
+        doubt = ": is the file cut off?" if found < promised else ", which all count"
+        yield f"the header promises nRows={promised}, and {found} rows follow{doubt}"
+
+
+def _rows_below(path: Path, row: int) -> int:
+    """Return the number of rows behind one, without blank ones at the end."""
+    last = count = 0
+    with path.open("rb") as handle:
+        for count, line in enumerate(handle, 1):
+            last = count if line.strip() else last
+    return max(0, last - row)
 
 
 def _storage_header(path: Path) -> tuple[dict[str, str], str, int]:
@@ -269,7 +280,7 @@ def _columns(path: Path, row: int, line: str, delimiter: str | None) -> tuple[st
         return tuple(name.strip() for name in split_cells(line, delimiter))
 
 
-def _count(path: Path, facts: dict[str, str], key: str) -> int | None:
+def _count(path: Path, facts: Mapping[str, str], key: str) -> int | None:
     text = facts.get(key.lower())
     if text is None:
         return None

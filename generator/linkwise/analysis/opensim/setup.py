@@ -15,7 +15,7 @@ from linkwise_runtime.chosen_names import nearest_first
 
 from linkwise.analysis.induced_points import CENTRE, JOINTS
 from linkwise.analysis.opensim.constraints import as_contacts
-from linkwise.analysis.opensim.storage import CENTRE as CENTRE_OF_MASS
+from linkwise.analysis.opensim.induced_storage import CENTRE as CENTRE_OF_MASS
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
@@ -96,7 +96,7 @@ def read_setup(path: Path) -> InducedSetup:
         log, robot, loads = _files(path, tool)
         added = _forces(path, tool)
     with within(str(robot)):
-        model, _ = read_document(robot)
+        model = read_document(robot).model
     with within(str(path)):
         (threshold,) = numbers_of(analysis, "force_threshold", THRESHOLD, f"<{ANALYSIS}>", 1)
         contacts = as_contacts(analysis, model, loads, threshold)
@@ -107,7 +107,7 @@ def read_setup(path: Path) -> InducedSetup:
             "ignore_extra": True,
             "induced": points,
             "induced_whole": True,
-            "induced_sto": f"{name_of(tool)}_{name_of(analysis)}",
+            "sto": f"{name_of(tool)}_{name_of(analysis)}",
             "sto_units": "deg" if yes(analysis, "in_degrees", True) else "rad",
             **_times(tool, analysis),
             **_filter(tool),

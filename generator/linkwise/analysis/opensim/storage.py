@@ -1,65 +1,20 @@
-"""Induced accelerations as OpenSim's storage files: a file a coordinate or body, a column a source.
+"""A result as OpenSim's storage files: inverse dynamics, their shares, and induced accelerations."""
 
-Files and columns have the names that OpenSim's InducedAccelerations gives them. Its muscles and actuators are
-the torques of joints here, by the names of the coordinates. What it counts as velocity is all that velocities
-do: velocity forces, ties that turn, and J̇ q̇ of the point. What contacts do themselves has columns of its own
-here, as a motion that was measured slips.
-"""
-
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
-from linkwise.analysis.induced_points import JOINTS, InducedPoint
-from linkwise.analysis.result_quantities import LOSSES
+from linkwise.analysis.opensim.induced_storage import induced_files
+from linkwise.analysis.opensim.torque_storage import torque_files
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.settings import Units
 from linkwise.arrays import Array
-from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names
-from linkwise.extras import extra
-
-CENTRE = "center_of_mass"
-"""Name that OpenSim gives to the centre of mass."""
-TOTAL, GRAVITY, VELOCITY = "total", "gravity", "velocity"
-SUMMED = ("acc", "acc_gravity", "acc_weight")
-"""Quantities that have one column each, whatever link or joint they are of."""
-OF_VELOCITY = ("acc_velocity", "acc_qd", "acc_kinematic", "acc_constraint")
-ENDS = {
-    "x": "_X",
-    "y": "_Y",
-    "z": "_Z",
-    "angular_x": "_Ox",
-    "angular_y": "_Oy",
-    "angular_z": "_Oz",
-}
-"""Ends of column names by component of a point, in OpenSim's order."""
-TEXT = """
-This file contains accelerations of coordinates or bodies.
-
-Units are S.I. units (seconds, meters, Newtons, ...)
-If the header above contains a line with 'inDegrees', this indicates whether rotational values are in degrees (yes) or radians (no).
-
-"""  # noqa: E501, as OpenSim writes it
-
-
-@dataclass(frozen=True)
-class StorageFile:
-    """A storage file: its name without ending, its columns, and the rows of the result that each sums."""
-
-    name: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[int, ...], ...]
-    turns: tuple[bool, ...]
-    """True for columns that are angles."""
 
 
 def begin_storages(
     folder: Path, rows: ResultRows, samples: int, name: str, units: Units
 ) -> Callable[[Array], None]:
-    """Begin NAME_COORDINATE.sto, NAME_BODY.sto and NAME_center_of_mass.sto of all points in a folder.
+    """Begin NAME_InverseDynamics.sto and the other storage files of a result in a folder.
 
     Return the function that writes a block (rows, some samples) of the result to all of them; without a name
     it does nothing.
@@ -68,111 +23,14 @@ def begin_storages(
     """
     if not name:
         return lambda block: None
-    files = [*storage_files(rows)]
+    files = [*torque_files(rows), *induced_files(rows)]
     names = file_names(f"{file_name(name)}_{file_name(file.name)}" for file in files)
     paths = [folder / f"{own}.sto" for own in names]
     for path, file in zip(paths, files, strict=True):
-        path.write_text(_header(file, samples, units), encoding="utf-8")
+        file.begin(path, samples, units)
 
     def write(block: Array) -> None:
         for path, file in zip(paths, files, strict=True):
-            _append(path, file, block, units)
+            file.append(path, block, units)
 
     return write
-
-
-def storage_files(rows: ResultRows) -> Iterator[StorageFile]:
-    """Yield the files of a result's rows: of each coordinate, each body, the centre of mass."""
-    for number, point in enumerate(rows.points):
-        sources = [_sources(rows, number, row) for row in point.rows]
-        if point.name == JOINTS and point.frame is None:
-            for joint, found, unit in zip(point.rows, sources, point.units, strict=True):
-                turns = (unit.startswith("rad"),) * len(found)
-                yield StorageFile(joint, tuple(found), tuple(map(tuple, found.values())), turns)
-        else:
-            yield _of_point(point, dict(zip(point.rows, sources, strict=True)))
-
-
-def _of_point(point: InducedPoint, sources: Mapping[str, dict[str, list[int]]]) -> StorageFile:
-    ends = [row for row in ENDS if row in sources]
-    every = [(source, row) for source in sources[ends[0]] for row in ends]
-    return StorageFile(
-        point.frame or CENTRE,
-        tuple(f"{source}{ENDS[row]}" for source, row in every),
-        tuple(tuple(sources[row][source]) for source, row in every),
-        tuple(row.startswith("angular") for _, row in every),
-    )
-
-
-def _sources(rows: ResultRows, point: int, component: str) -> dict[str, list[int]]:
-    """Return the rows of each source of a component's acceleration, in OpenSim's order."""
-    found: dict[str, list[int]] = {TOTAL: []}
-    owners: dict[str, tuple[object, ...]] = {}
-    own = rows.axes["component"].names.index(component)
-    for row, (quantity, at) in enumerate(rows.places):
-        if quantity.startswith("acc") and at[:2] == (point, own):
-            name = _source(rows, quantity, at[2:])
-            owner = (name,) if quantity in (*SUMMED, *OF_VELOCITY) else (quantity, *at[2:])
-            if owners.setdefault(name, owner) != owner:
-                raise LinkwiseError(
-                    f"--induced-sto: two sources of accelerations would be called {name!r} there; name the"
-                    " joint, load or contact otherwise"
-                )
-            found.setdefault(name, []).append(row)
-    last = [source for source in (GRAVITY, VELOCITY) if source in found]
-    contacts = [source for source in found if source.startswith("contact_")]
-    first = [source for source in found if source not in (*last, *contacts)]
-    return {source: found[source] for source in (*first, *last, *contacts)}
-
-
-def _source(rows: ResultRows, quantity: str, at: Sequence[int]) -> str:
-    """Return the name of a source: of joints as they are called, of what OpenSim lacks with its kind."""
-    if quantity in OF_VELOCITY:
-        return VELOCITY
-    match quantity:
-        case "acc":
-            return TOTAL
-        case "acc_gravity" | "acc_weight":
-            return GRAVITY
-        case "acc_tau":
-            found = rows.axes["joint"].names[at[0]]
-        case "acc_share":
-            found = rows.axes["share"].names[at[1]]
-        case "acc_contact":
-            found = f"contact_{rows.axes['contact'].names[at[0]]}"
-        case "acc_load":
-            found = f"load_{rows.axes['load'].names[at[0]]}"
-        case _:
-            assert quantity in LOSSES
-            found = f"{quantity.removeprefix('acc_')}_{rows.axes['joint'].names[at[0]]}"
-    return "_".join(found.split())  # blanks part columns
-
-
-def _header(file: StorageFile, samples: int, units: Units) -> str:
-    facts = (
-        f"version=1\nnRows={samples}\nnColumns={1 + len(file.columns)}"
-        f"\ninDegrees={'yes' if units == 'deg' else 'no'}"
-    )
-    names = "\t".join(("time", *file.columns))
-    return f"{'_'.join(file.name.split())}\n{facts}\n{TEXT}endheader\n{names}\n"
-
-
-def _append(path: Path, file: StorageFile, values: Array, units: Units) -> None:
-    """Append the samples of a part of the result (rows, S), in numbers that read back exactly."""
-    columns = [values[0], *(_sum(values, rows) for rows in file.rows)]
-    for column, turns in zip(columns[1:], file.turns, strict=True):
-        if turns and units == "deg":
-            np.degrees(column, out=column)
-    arrow, csv = extra("pyarrow"), extra("pyarrow.csv")
-    table = arrow.table(columns, names=[str(number) for number in range(len(columns))])
-    how = csv.WriteOptions(include_header=False, delimiter="\t", quoting_style="none")
-    with path.open("ab") as out:
-        csv.write_csv(table, out, how)
-
-
-def _sum(values: Array, rows: Sequence[int]) -> Array:
-    """Return the sum (S,) of rows; neighbours are added without a copy of them."""
-    cuts = [at for at in range(1, len(rows)) if rows[at] != rows[at - 1] + 1]
-    runs = zip([0, *cuts], [*cuts, len(rows)], strict=True)
-    found: Array = sum(values[rows[a] : rows[b - 1] + 1].sum(axis=0) for a, b in runs)
-    return found

@@ -49,7 +49,11 @@ def parse(path: Path, largest: int = LARGEST, as_xml: Callable[[bytes], bytes] |
 
     largest: most bytes of the file; as_xml: makes XML of a file that is not quite
     """
-    data = content(path, largest)
+    return parse_text(content(path, largest), as_xml)
+
+
+def parse_text(data: bytes, as_xml: Callable[[bytes], bytes] | None = None) -> Element:
+    """Return the root element of a file's bytes, as `parse` does."""
     data = as_xml(data) if as_xml else data
     parser = DefusedXMLParser(target=_Builder())
     try:

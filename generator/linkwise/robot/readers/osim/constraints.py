@@ -13,7 +13,7 @@ from linkwise.robot.readers.osim.frames import Frames, Placed, offset_of
 from linkwise.robot.readers.osim.functions import IDENTITY, function_of
 from linkwise.robot.robot import UNLIMITED, Limits, TieKind
 
-COUPLER = "CoordinateCouplerConstraint"
+COUPLER, POINT_ON_LINE = "CoordinateCouplerConstraint", "PointOnLineConstraint"
 
 KINDS: dict[str, TieKind] = {
     "PointConstraint": "point",
@@ -61,6 +61,24 @@ def coordinate_rules(
             notes.append(Note("mimic", dependent, f"a function of {rule.free}" if rule.free else "held"))
             own[dependent] = rule
     return {name: _resolved(name, own) for name in own}, tuple(notes)
+
+
+def with_idle_held(
+    rules: Mapping[str, Rule], idle: Iterable[Element]
+) -> tuple[dict[str, Rule], tuple[Note, ...]]:
+    """Return the rules where coordinates that move nothing stay at their default values, and notes on them.
+
+    idle: coordinates that move no axis of their joint; one that others follow moves those, and stays free
+    """
+    leading = {rule.free for name, rule in rules.items() if rule.free != name}
+    held, notes = dict(rules), []
+    for coordinate in idle:
+        name = name_of(coordinate)
+        if held[name].free == name and name not in leading:
+            (value,) = numbers_of(coordinate, "default_value", "0", f"coordinate {name!r}", 1)
+            held[name] = Rule("", Curve.straight(value))
+            notes.append(Note("locked", name, f"at {value:g}, as it moves no axis"))
+    return held, tuple(notes)
 
 
 def is_enforced(constraint: Element) -> bool:
@@ -117,7 +135,7 @@ def ties(model: Element, frames: Frames) -> Iterator[AnchoredTie]:
 def unmodelled(model: Element) -> Iterator[Loop]:
     """Yield the constraints of other kinds, which are not modelled."""
     for constraint in members(model, "ConstraintSet"):
-        if constraint.tag not in (COUPLER, *KINDS) and is_enforced(constraint):
+        if constraint.tag not in (COUPLER, POINT_ON_LINE, *KINDS) and is_enforced(constraint):
             yield Loop(
                 f"the model has the {constraint.tag} {name_of(constraint)!r}",
                 "remove it, or switch it off there",

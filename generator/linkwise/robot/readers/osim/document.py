@@ -6,13 +6,17 @@ takes the default for what it does not find. Under <axes> an axis would be anoth
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from linkwise.bounded_file import MIB
-from linkwise.errors import LinkwiseError
+from linkwise.errors import LinkwiseError, within
 from linkwise.escape import short
-from linkwise.robot.readers.xml_file import parse
+from linkwise.robot.notes import Note
+from linkwise.robot.readers.osim.conversion import converted
+from linkwise.robot.readers.osim.own_names import give_own_names
+from linkwise.robot.readers.xml_file import parse, parse_text
 from linkwise.robot.readers.xml_names import Names, names, refuse_misspelt
 
 LARGEST = 64 * MIB
@@ -26,8 +30,13 @@ CLASS_OF_CLASS = re.compile(rb"(</?\w+)::")
 OLDEST, JOINTS_BY_THEMSELVES, SOCKETS = 20000, 30500, 30517
 """Versions: the first one read, with joints in bodies; the first with a JointSet; the first with sockets.
 
-Versions between the last two were written by previews of OpenSim 4, which changed the layout many times.
+Versions before the first, of OpenSim 1, and between the last two, of previews of OpenSim 4 that changed the
+layout many times, are read as OpenSim itself brings them to its latest.
 """
+METRES = ("meters", "m", "unassigned")
+"""Units of length that are metres; OpenSim writes the last where nobody has said one, and takes metres."""
+CONVERTED = "brought to OpenSim's latest version by OpenSim itself"
+ASSUMED_METRES = "lengths in metres, as OpenSim takes them where no unit is said"
 ENDS = {
     "BodySet": ("Body",),
     "JointSet": ("Joint",),
@@ -49,6 +58,10 @@ OF_TAG = {
     "Model": names("gravity length_units BodySet JointSet ConstraintSet ForceSet"),
     "Coordinate": names("default_value range clamped locked prescribed prescribed_function motion_type"),
     "PhysicalOffsetFrame": names("translation orientation socket_parent"),
+    "StationDefinedFrame": names(
+        "socket_point_a socket_point_b socket_point_c socket_origin_point ab_axis ab_x_ac_axis"
+    ),
+    "Station": names("socket_parent_frame location"),
     "SpatialTransform": names("TransformAxis"),
     "TransformAxis": names("axis coordinates function"),
     "LinearFunction": names("coefficients"),
@@ -73,31 +86,66 @@ OF_END = {
     "Constraint": OF_TIE
     | names(
         "independent_coordinate_names dependent_coordinate_name scale_factor coupled_coordinates_function "
-        "constant_distance"
+        "constant_distance line_body follower_body socket_line_body socket_follower_body line_direction_vec "
+        "point_on_line point_on_follower"
     ),
 }
 """Children that are read, and others near one of them, by the end of the component's tag."""
 
 
-def read_document(path: Path) -> tuple[Element, bool]:
-    """Return the model, and whether its joints are in its bodies; raises LinkwiseError naming the remedy."""
-    root = parse(path, LARGEST, as_xml)
+@dataclass(frozen=True)
+class OsimDocument:
+    """A model: its element, whether its joints are in its bodies, and notes on what was read otherwise."""
+
+    model: Element
+    has_joints_in_bodies: bool
+    notes: tuple[Note, ...] = ()
+
+
+def read_document(path: Path) -> OsimDocument:
+    """Return the model of a file, its components with names; raises LinkwiseError naming the remedy."""
+    notes: list[Note] = []
+    model, version = _model(parse(path, LARGEST, as_xml))
+    if _number(version) < OLDEST or JOINTS_BY_THEMSELVES <= _number(version) < SOCKETS:
+        with within(f"Version {short(version)!r}"):
+            model, newer = _model(parse_text(converted(path), as_xml))
+        notes.append(Note("warned", name_of(model), f"Version {version}", CONVERTED))
+        version = newer
+    units = text_of(model, "length_units", METRES[0])
+    if units.lower() not in METRES:
+        raise LinkwiseError(f"the model's lengths are in {units}; give them in meters")
+    if units.lower() == METRES[-1]:
+        notes.append(Note("warned", name_of(model), f"length_units {units}", ASSUMED_METRES))
+    refuse_misspelt_names(model)
+    for components in _named_apart(model):
+        notes += give_own_names(components)
+    return OsimDocument(model, _number(version) < JOINTS_BY_THEMSELVES, tuple(notes))
+
+
+def _model(root: Element) -> tuple[Element, str]:
+    """Return the model in a document, and the document's version."""
     model = root.find("Model") if root.tag == "OpenSimDocument" else None
     if model is None:
         raise LinkwiseError(
             f"the root element is <{root.tag}>; an OpenSim model has <OpenSimDocument><Model>"
         )
-    text = root.get("Version", "")
-    version = int(text) if text.isdecimal() and len(text) < 10 else 0
-    if version < OLDEST or JOINTS_BY_THEMSELVES <= version < SOCKETS:
-        raise LinkwiseError(
-            f"Version {short(text)!r} is not read, but {OLDEST} to {JOINTS_BY_THEMSELVES - 1} "
-            f"(OpenSim 2 and 3) and from {SOCKETS} on (OpenSim 4); open the file in OpenSim 4 and save it"
-        )
-    units = text_of(model, "length_units", "meters")
-    if units.lower() not in ("meters", "m"):
-        raise LinkwiseError(f"the model's lengths are in {units}; give them in meters")
-    return model, version < JOINTS_BY_THEMSELVES
+    return model, root.get("Version", "")
+
+
+def _number(version: str) -> int:
+    """Return the number of a version, 0 for what is none."""
+    return int(version) if version.isdecimal() and len(version) < 10 else 0
+
+
+def _named_apart(model: Element) -> Iterator[list[Element]]:
+    """Yield the bodies, the joints, the coordinates and the constraints of a model."""
+    bodies = list(members(model, "BodySet"))
+    in_bodies = (joint for body in bodies for holder in body.iterfind("Joint") for joint in holder)
+    joints = [*members(model, "JointSet"), *in_bodies]
+    yield bodies
+    yield joints
+    yield [one for joint in joints for one in joint.iter("Coordinate")]
+    yield list(members(model, "ConstraintSet"))
 
 
 def as_xml(data: bytes) -> bytes:

@@ -5,14 +5,19 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.robot import transforms
 from linkwise.robot.description import IDENTITY, ZERO3
 from linkwise.robot.readers.osim.document import name_of, numbers_of, text_of
 from linkwise.robot.robot import Rotation
 
 GROUND = "ground"
-BODY, OFFSET = "Body", "PhysicalOffsetFrame"
+BODY, OFFSET, BY_STATIONS = "Body", "PhysicalOffsetFrame", "StationDefinedFrame"
+STATION = "Station"
+AXES = ("+x", "+y", "+z", "-x", "-y", "-z")
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,7 @@ class Frames:
 
     def __init__(self, model: Element) -> None:
         self._frames: dict[str, Element] = {}
+        self._stations: dict[str, Element] = {}
         self._paths: dict[int, str] = {}
         self._enter(model, "")
 
@@ -64,8 +70,10 @@ class Frames:
         for part in parts:
             own = f"{path}/{name_of(part)}"
             self._paths[id(part)] = own
-            if part.tag in (BODY, OFFSET):
+            if part.tag in (BODY, OFFSET, BY_STATIONS):
                 self._frames[own] = part
+            elif part.tag == STATION:
+                self._stations[own] = part
             self._enter(part, own)
 
     def found(self, path: str, owner: Element, passed: tuple[str, ...] = ()) -> Placed:
@@ -73,21 +81,80 @@ class Frames:
 
         Raises LinkwiseError where there is none, or several of the name.
         """
-        whole = posixpath.normpath(posixpath.join(self._paths.get(id(owner), "/"), path))
+        whole = self._whole(path, owner)
         name = posixpath.basename(whole)
-        if whole == f"/{GROUND}":
+        if whole == f"/{GROUND}" or (name == GROUND and not _alike(self._frames, whole)):
             return Placed(GROUND)
-        alike = [at for at in self._frames if posixpath.basename(at) == name]
-        ways = [whole] if whole in self._frames else alike
-        if not ways and name == GROUND:
-            return Placed(GROUND)
-        if len(ways) != 1 or ways[0] in passed:
-            raise LinkwiseError(
-                f"{owner.tag} {name_of(owner)!r} stands in the frame {path!r}, of which there are "
-                f"{len(ways)}; name a body, ground or an offset frame of one"
-            )
-        frame = self._frames[ways[0]]
+        at = _only(self._frames, whole, owner, path, "frame", "a body, ground or a frame of one")
+        if at in passed:
+            raise LinkwiseError(f"frame {name!r} stands on itself; let it stand on a body")
+        frame = self._frames[at]
         if frame.tag == BODY:
             return Placed(name_of(frame))
-        carrier = self.found(text_of(frame, "socket_parent"), frame, (*passed, *ways))
+        if frame.tag == BY_STATIONS:
+            return self._by_stations(frame, (*passed, at))
+        carrier = self.found(text_of(frame, "socket_parent"), frame, (*passed, at))
         return carrier.behind(*offset_of(frame, f"frame {name!r}", "translation", "orientation"))
+
+    def _whole(self, path: str, owner: Element) -> str:
+        return posixpath.normpath(posixpath.join(self._paths.get(id(owner), "/"), path))
+
+    def _by_stations(self, frame: Element, passed: tuple[str, ...]) -> Placed:
+        """Return the frame through four stations of one body, as OpenSim's documentation defines it.
+
+        From station a to b goes the axis `ab_axis`; a cross product with the way from a to c gives
+        `ab_x_ac_axis`; the third axis makes the two right-handed. The origin is a station of its own.
+        """
+        place = f"frame {name_of(frame)!r}"
+        names = ("point_a", "point_b", "point_c", "origin_point")
+        stations = [self._station(text_of(frame, f"socket_{name}"), frame, passed) for name in names]
+        if len({one.body for one in stations}) > 1:
+            raise LinkwiseError(f"{place}: its stations are on several bodies; give it stations of one")
+        a, b, c, origin = (np.array(one.translation) for one in stations)
+        first, second = _axis(frame, "ab_axis", "+x"), _axis(frame, "ab_x_ac_axis", "+y")
+        if first[0] == second[0]:
+            raise LinkwiseError(f"{place}: ab_axis and ab_x_ac_axis are one axis; give two")
+        rows, across = np.zeros((3, 3)), np.cross(b - a, c - a)
+        for (at, sign), along in ((first, b - a), (second, across)):
+            if not (size := float(np.linalg.norm(along))):
+                raise LinkwiseError(f"{place}: its stations a, b, c are on one line; move one")
+            rows[at] = sign * along / size
+        third = 3 - first[0] - second[0]
+        rows[third] = np.cross(rows[(third + 1) % 3], rows[(third + 2) % 3])
+        x, y, z = origin.tolist()
+        return Placed(stations[0].body, transforms.snap(rows.T.tolist()), (x, y, z))
+
+    def _station(self, path: str, owner: Element, passed: tuple[str, ...]) -> Placed:
+        wanted = "a station"
+        station = self._stations[
+            _only(self._stations, self._whole(path, owner), owner, path, "station", wanted)
+        ]
+        carrier = self.found(text_of(station, "socket_parent_frame"), station, passed)
+        place = numbers_of(station, "location", "0 0 0", f"station {name_of(station)!r}", 3)
+        return carrier.behind(IDENTITY, place)
+
+
+def _axis(frame: Element, tag: str, usual: str) -> tuple[int, float]:
+    """Return the index and the direction of an axis such as -y; raises LinkwiseError for another text."""
+    text = text_of(frame, tag, usual).lower()
+    text = text if text[:1] in "+-" else f"+{text}"
+    if text not in AXES:
+        raise LinkwiseError(f"frame {name_of(frame)!r}: <{tag}>{text}</{tag}> needs one of {listed(AXES)}")
+    return "xyz".index(text[1]), 1.0 if text[0] == "+" else -1.0
+
+
+def _alike(places: Iterable[str], whole: str) -> list[str]:
+    """Return the places of the last name of a path; the path itself alone where it is one."""
+    name = posixpath.basename(whole)
+    return [whole] if whole in places else [at for at in places if posixpath.basename(at) == name]
+
+
+def _only(places: Iterable[str], whole: str, owner: Element, path: str, what: str, wanted: str) -> str:
+    """Return the one place of a path, or of its name; raises LinkwiseError where there is none, or more."""
+    found = _alike(places, whole)
+    if len(found) != 1:
+        raise LinkwiseError(
+            f"{owner.tag} {name_of(owner)!r} stands in the {what} {path!r}, of which there are"
+            f" {len(found)}; name {wanted}"
+        )
+    return found[0]

@@ -20,12 +20,15 @@ SUFFIXES = {"prismatic": "t", "revolute": "r"}
 UNITS: dict[Kind, Literal["rad", "m"]] = {"prismatic": "m", "revolute": "rad"}
 
 
-def from_ground(joints: Iterable["OsimJoint"]) -> tuple["OsimJoint", ...]:
-    """Return the joints in an order that leads away from ground, some of them turned round.
+def from_ground(joints: Iterable["OsimJoint"]) -> tuple[tuple["OsimJoint", ...], tuple["OsimJoint", ...]]:
+    """Return the joints in an order that leads away from ground, some of them turned round, and those beside.
 
-    Raises LinkwiseError for a loop, and for a body that no joints connect to ground.
+    A joint beside leads to a body that another has reached, and so closes a loop.
+
+    Raises LinkwiseError for a body that no joints connect to ground.
     """
     found: list[OsimJoint] = []
+    beside: list[OsimJoint] = []
     reached, waiting = {GROUND}, list(joints)
     while waiting:
         ahead = [joint for joint in waiting if joint.parent.body in reached]
@@ -36,15 +39,15 @@ def from_ground(joints: Iterable["OsimJoint"]) -> tuple["OsimJoint", ...]:
                 f"no joints lead from ground to {waiting[0].parent.body!r}, on which joint "
                 f"{waiting[0].name!r} stands; give it one, a FreeJoint say"
             )
-        if joint.child.body in reached:
+        if joint.parent.body == joint.child.body:
             raise LinkwiseError(
-                f"joint {joint.name!r} leads to {joint.child.body!r}, to which another one leads; have a "
-                "PointConstraint or a WeldConstraint close the loop in its place"
+                f"joint {joint.name!r} leads from {joint.child.body!r} to itself; let it lead to another body"
             )
         waiting = [other for other in waiting if other.element is not joint.element]
+        joint = joint.turned if joint.child.body == GROUND else joint
+        (beside if joint.child.body in reached else found).append(joint)
         reached.add(joint.child.body)
-        found.append(joint)
-    return tuple(found)
+    return tuple(found), tuple(beside)
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,11 @@ class OsimJoint:
     def name(self) -> str:
         """Name of the joint."""
         return name_of(self.element)
+
+    def idle(self) -> tuple[Element, ...]:
+        """Return the elements of the coordinates that move no axis."""
+        axes = tuple(self._axes())
+        return tuple(one for one in self.coordinates if carrier(axes, name_of(one)) is None)
 
     def connection(self, rules: Mapping[str, Rule]) -> Connection:
         """Return the joint as a Connection, with the rules of its coordinates.

@@ -12,18 +12,19 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
 from linkwise.robot.description import ZERO33, Body, Description
 from linkwise.robot.notes import Note, Omission
-from linkwise.robot.readers.osim.constraints import coordinate_rules, ties, unmodelled
+from linkwise.robot.readers.osim.constraints import coordinate_rules, ties, unmodelled, with_idle_held
 from linkwise.robot.readers.osim.document import (
     members,
     name_of,
     numbers_of,
     read_document,
-    refuse_misspelt_names,
     text_of,
     yes,
 )
 from linkwise.robot.readers.osim.frames import GROUND, Frames, Placed, offset_of
 from linkwise.robot.readers.osim.joints import OsimJoint, from_ground
+from linkwise.robot.readers.osim.parted_bodies import with_parted_bodies
+from linkwise.robot.readers.osim.point_on_line import sliders
 from linkwise.robot.readers.xml_names import Known, ignored, names
 from linkwise.robot.robot import Mat3, Vec3
 
@@ -58,29 +59,38 @@ BODY = Known(
 
 def read_osim(path: Path) -> Description:
     """Return the description of a model; raises LinkwiseError naming the element and the remedy."""
-    model, old = read_document(path)
-    refuse_misspelt_names(model)
+    document = read_document(path)
+    model = document.model
     elements = [body for body in members(model, "BodySet") if name_of(body) != GROUND]
     if not elements:
         raise LinkwiseError(f"the model {name_of(model)!r} has no <Body>; give one that has some")
     others, frames = ignored(elements, _known, "OpenSim's Body"), Frames(model)
-    joints = from_ground(_joints_in_bodies(elements) if old else _joints(model, frames))
+    written = _joints_in_bodies(elements) if document.has_joints_in_bodies else _joints(model, frames)
+    parted = with_parted_bodies(from_ground(written), {name_of(body) for body in elements})
+    joints = parted.joints
     rules, notes = coordinate_rules((c for joint in joints for c in joint.coordinates), model)
+    sliding = tuple(sliders(model, frames))
+    rules, held = with_idle_held(rules, (one for joint in joints for one in joint.idle()))
     return Description(
         name_of(model) or path.stem,
-        (Body(GROUND), *_bodies(elements, joints)),
-        tuple(joint.connection(rules) for joint in joints),
+        (Body(GROUND), *parted.bodies(_bodies(elements, joints)), *(one.body for one in sliding)),
+        (*(joint.connection(rules) for joint in joints), *(one.joint for one in sliding)),
         _vector(numbers_of(model, "gravity", EARTH, "the model", 3)),
         notes=(
+            *document.notes,
             *notes,
+            *held,
+            *parted.notes(),
             *(note for joint in joints for note in joint.notes(rules)),
             *_ignored(model),
             *others,
         ),
         loops=tuple(unmodelled(model)),
-        ties=tuple(ties(model, frames)),
+        ties=(*ties(model, frames), *parted.welds(), *(one.tie for one in sliding)),
         omissions=tuple(_forces(model)),
         ground=GROUND,
+        takes_impossible=True,
+        massless=tuple(one.joint.name for one in sliding),
     )
 
 
