@@ -14,6 +14,7 @@ BROUGHT_BY = {
     "matplotlib": "motion",
     "mujoco": "mjcf",
     "networkx": "torch",
+    "opensim": "opensim",
     "plotly": "motion",
     "pyarrow": "motion",
     "ray": "ray",

@@ -212,7 +212,7 @@ class Job:
         held = () if robot.contacts is None else zip(robot.ground.names, robot.ground.contacts, strict=True)
         for name, contact in held:
             for load in self.decomposer.loads:
-                if load.acts_on.frame.joint == robot.joint_of(contact.frame):
+                if not load.is_muscle and robot.joint_of(load.bodies[0]) == robot.joint_of(contact.frame):
                     yield (
                         f"load {load.name!r} and contact {name!r} act on one body; what was measured at the"
                         " contact is given with --contact-loads"

@@ -14,10 +14,11 @@ from linkwise.analysis.contacts.times import contact_times, switch_columns
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.induced_points import InducedPlan, induced_points
 from linkwise.analysis.job import Job
+from linkwise.analysis.loads.muscles import placed_muscles
 from linkwise.analysis.loads.read import placed_loads
 from linkwise.analysis.logs import Log, open_log
 from linkwise.analysis.measured_torques import measured_torques, torque_columns
-from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.opened_robot import OpenedRobot, told_apart
 from linkwise.analysis.phases import phase_columns, placed_phases
 from linkwise.analysis.request import Request
 from linkwise.analysis.samples import Samples, read_samples
@@ -66,6 +67,10 @@ def prepared(
     samples = replace(samples, warnings=(*samples.warnings, *slips))
     motion = samples.time[start:stop]
     borne = placed_loads(asked.loads, robot, motion, reading.ignore_extra, progress, buffer)
+    if asked.muscles is not None:
+        pulling = placed_muscles(asked.muscles, robot, motion, samples.q[start:stop], progress)
+        told_apart("muscle", [one.name for one in pulling], [one.name for one in borne], "rename one of them")
+        borne = (*borne, *pulling)
     times = contact_times(asked.contacts, opened, robot, reading, motion, progress, buffer)
     every = (*borne, *(() if times is None else times.loads))
     phases = placed_phases(outputs.phases, opened, robot, every, reading, progress)

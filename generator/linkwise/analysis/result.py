@@ -171,7 +171,7 @@ class AnalysisResult(WholeMovement):
     @property
     def load_labels(self) -> tuple[str, ...]:
         """Names of the loads in figures, where a load on the foot differs from the foot's own share."""
-        return tuple(f"load {borne.name}" for borne in self.loads)
+        return tuple(borne.label for borne in self.loads)
 
     @property
     def power(self) -> Array:
@@ -209,8 +209,9 @@ class AnalysisResult(WholeMovement):
         ends = (("from", made.start), ("to", made.stop))
         parts += [f"{word} {time:g} s" for word, time in ends if time is not None]
         for source in dict.fromkeys(borne.source for borne in self.loads):
-            names = listed([borne.name for borne in self.loads if borne.source == source])
-            parts.append(printable(f"loads {names} of {source}" if source else f"loads {names}"))
+            some = [borne for borne in self.loads if borne.source == source]
+            names = f"{'muscles' if some[0].is_muscle else 'loads'} {listed([one.name for one in some])}"
+            parts.append(printable(f"{names} of {source}" if source else names))
         cutoffs = sorted({borne.cutoff for borne in self.loads if borne.cutoff is not None})
         if self.robot.contacts is not None:
             parts.append(printable(f"contacts {listed(self.robot.contacts.names)}"))

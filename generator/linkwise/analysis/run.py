@@ -15,7 +15,7 @@ from linkwise.analysis.cutoff_range import CutoffRange
 from linkwise.analysis.disk_rows import EverySample
 from linkwise.analysis.job import Analysis
 from linkwise.analysis.load_robot import load_robot
-from linkwise.analysis.loads import Load, Loads
+from linkwise.analysis.loads import Load, Loads, Muscles
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.opensim.storage import begin_storages
 from linkwise.analysis.outputs import open_table
@@ -64,6 +64,7 @@ def analyze(
     uncertain: str | PathLike[str] | None = None,
     cutoff_sweep: Sequence[float] | None = None,
     columns: Sequence[str] = (),
+    muscles: Muscles | None = None,
 ) -> Analysis:
     """Analyse a motion log with a generated robot, all samples in memory.
 
@@ -88,6 +89,7 @@ def analyze(
     are told by `Analysis.cutoff_sweep`; `processing` needs a low-pass
     columns: columns that are computed, written as for --columns: "sums", ``"tau_gravity/*/hand"``; all where
     there are none, and where points, powers, a trace or a sweep, made of all torques, are asked for
+    muscles: forces of muscles, and the model of OpenSim with their paths; each is a load, or each group
 
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
@@ -113,7 +115,9 @@ def analyze(
     )
     told = None if uncertain is None else Path(uncertain)
     swept = None if cutoff_sweep is None else CutoffRange.of(cutoff_sweep)
-    asked = Request(reading or Reading(), processing or Processing(), outputs, borne, held, told, swept)
+    asked = Request(
+        reading or Reading(), processing or Processing(), outputs, borne, held, told, swept, muscles
+    )
     job = prepared(Path(log), loaded, asked, progress)
     with EverySample(len(job.decomposer.rows), job.count) as kept:
         return job.analysis(job.run(kept, progress), kept.values)
@@ -136,7 +140,8 @@ def analyze_to(
     for name in outputs.figures:
         check_figure(name, robot, told)
     refuse_inside_package(out)
-    own = () if asked.uncertain is None else (asked.uncertain,)
+    own = [] if asked.uncertain is None else [asked.uncertain]
+    own += [] if asked.muscles is None else asked.muscles.files
     for file in (log, *asked.loads.paths, *asked.contacts.measured.paths, *own):
         if is_inside(file, out):
             raise LinkwiseError(f"--out {out} is to be replaced and holds the log {file}; give another --out")
