@@ -59,7 +59,7 @@ class ConstrainedModel:
     @property
     def kinematics(self) -> "ConstrainedKinematics":
         """Kinematics of the open tree, in which the independent joints carry the loads."""
-        return ConstrainedKinematics(self.open.kinematics, self.on_independent)
+        return ConstrainedKinematics(self.open.kinematics, self._projected)
 
     def consistent(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
         """Return q, qd, qdd (S, n) in which ties close, from the motion of the independent joints.
@@ -110,7 +110,7 @@ class ConstrainedModel:
 
         They are those of springs, losses and armatures.
         """
-        return tuple(self.on_independent(q, _array(a)) for a in self.open.passive_torque(q, qd, qdd))
+        return tuple(self._projected(q, _array(a)) for a in self.open.passive_torque(q, qd, qdd))
 
     def named_shares(self, q: Array, qd: Array) -> Array:
         """Return the shares with names of tau^_aj, (S, n, N, count)."""
@@ -137,7 +137,7 @@ class ConstrainedModel:
         """Return the constraint forces due to torques (S, n, X) on all joints, (S, C, X)."""
         return _array(self.constraints.forces_of(q, torque, by_link=True))
 
-    def on_independent(self, q: Array, torque: Array) -> Array:
+    def _projected(self, q: Array, torque: Array) -> Array:
         """Return G^T torque in the places of the independent joints, (S, n)."""
         return self._spread(_array(self.constraints.projected(q, torque)))
 

@@ -192,6 +192,11 @@ def _placed(
     on_ground = not moving.issuperset(effect.wrenches)
     balanced = float(np.abs(sum(forces, np.zeros((len(time), 3)))).max()) <= BALANCED * largest
     given = _efforts(effect.efforts, robot, time, q)
+    if given is not None and robot.constrained is not None:
+        raise LinkwiseError(
+            f"--muscles: {name!r} is a generalized force, and joints of {robot.name} are tied by loops, which"
+            " would carry a part of it that is not modelled; leave its column out of the file"
+        )
     source, warnings = told
     return PlacedLoad(
         name,

@@ -14,7 +14,6 @@ import numpy as np
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
 
-from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.loads import FORCE, MOMENT, POINT, WORLD
 from linkwise.analysis.opened_robot import OpenedRobot, body_frame
 from linkwise.arrays import Array
@@ -107,7 +106,7 @@ class PlacedLoad:
     """Warnings about the file; each names it."""
     kind: Literal["load", "muscle", "actuator"] = "load"
     efforts: Array | None = None
-    """Rows of time, then of generalized forces on the coordinates of the open tree (S, 1 + n), in N·m or N;
+    """Rows of time, then of generalized forces on the coordinates (S, 1 + n), in N·m or N;
     None for none."""
     is_inside: bool = False
     """True if the wrenches are in balance, so that coordinates that move all bodies alike bear nothing."""
@@ -137,16 +136,15 @@ class PlacedLoad:
         """Name in figures, where a load on the foot differs from the foot's own share."""
         return f"{self.kind} {self.name}"
 
-    def torque(self, model: Any, time: Array, q: Array) -> Array:
+    def torque(self, model: Dynamics, time: Array, q: Array) -> Array:
         """Return the joint torques τ_ie (S, n) that the load requires, in N·m or N."""
         found = sum((one.torque(model, time, q) for one in self.wrenches), np.zeros_like(q))
         if self.efforts is None:
             return found
-        given = self.effort(time)
-        return found - (model.on_independent(q, given) if isinstance(model, ConstrainedModel) else given)
+        return found - self.effort(time)
 
     def effort(self, time: Array) -> Array:
-        """Return the generalized forces (S, n) on the coordinates of the open tree at instants (S,)."""
+        """Return the generalized forces (S, n) on the coordinates at instants (S,)."""
         assert self.efforts is not None
         return rows_at(self.efforts, time)[:, 1:]
 

@@ -5,7 +5,7 @@ each body and its generalized forces on coordinates are the actuator's: path poi
 coordinate and that exist for some angles only, and surfaces that a path wraps over, are in them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -74,7 +74,7 @@ def actuator_names(osim: Any, given: ActuatorFile) -> ActuatorNames:
     own = _scalar_actuators(osim, model)
     return ActuatorNames(
         tuple(own),
-        frozenset(name for name, one in own.items() if osim.PathActuator.safeDownCast(one) is not None),
+        frozenset(name for name, one in own.items() if _is_path(osim, one)),
         groups,
         tuple(one.getName() for one in _all(model.getCoordinateSet())),
     )
@@ -94,6 +94,7 @@ def actuator_wrenches(
     model = _alone(osim, given)
     state = model.initSystem()
     own = _scalar_actuators(osim, model)
+    paths = {name: _moving_points(osim, one) for name, one in own.items() if _is_path(osim, one)}
     for actuator in own.values():
         actuator.overrideActuation(state, True)
         actuator.setOverrideActuation(state, 0.0)
@@ -104,6 +105,7 @@ def actuator_wrenches(
     shape = len(sources), values.shape[1]
     wrenches, efforts = np.zeros((*shape, len(bodies), 6)), np.zeros((*shape, len(speeds)))
     origins = np.zeros((values.shape[1], len(bodies), 3))
+    places = [*speeds]
     for s in range(values.shape[1]):
         for coordinate, value in zip(each, values[:, s].tolist(), strict=True):
             coordinate.setValue(state, value, False)
@@ -112,12 +114,15 @@ def actuator_wrenches(
         for x, source in enumerate(sources):
             for name, force in source.items():
                 own[name].setOverrideActuation(state, float(force[s]))
-            model.realizeDynamics(state)
-            on = model.getRigidBodyForces(state)
-            for b, index in enumerate(bodies.values()):
-                spatial = on.get(index)
-                wrenches[x, s, b] = [*spatial.get(0).to_numpy(), *spatial.get(1).to_numpy()]
-            efforts[x, s] = model.getMobilityForces(state).to_numpy()[list(speeds.values())]
+            wrenches[x, s] = _on_bodies(model, state, [*bodies.values()])
+            for name, force in source.items():
+                own[name].setOverrideActuation(state, 0.0 if name in paths else float(force[s]))
+                if paths.get(name):
+                    for coordinate, effort in _of_moving(osim, own[name], state):
+                        efforts[x, s, places.index(coordinate)] += float(force[s]) * effort
+            if not paths.keys() >= source.keys():
+                model.realizeDynamics(state)
+                efforts[x, s] += model.getMobilityForces(state).to_numpy()[[*speeds.values()]]
             for name in source:
                 own[name].setOverrideActuation(state, 0.0)
     found = [
@@ -165,6 +170,50 @@ def _alone(osim: Any, given: ActuatorFile) -> Any:
 def _scalar_actuators(osim: Any, model: Any) -> dict[str, Any]:
     every = (osim.ScalarActuator.safeDownCast(force) for force in _all(model.updForceSet()))
     return {one.getName(): one for one in every if one is not None}
+
+
+def _is_path(osim: Any, actuator: Any) -> bool:
+    return osim.PathActuator.safeDownCast(actuator) is not None
+
+
+def _on_bodies(model: Any, state: Any, bodies: Sequence[int]) -> list[list[float]]:
+    """Return the moment about the origin and the force on each body that the actuators give together."""
+    model.realizeDynamics(state)
+    on = model.getRigidBodyForces(state)
+    spatial = [on.get(index) for index in bodies]
+    return [[*one.get(0).to_numpy(), *one.get(1).to_numpy()] for one in spatial]
+
+
+def _moving_points(osim: Any, actuator: Any) -> bool:
+    """Return whether a path has points that move on their bodies."""
+    path = osim.GeometryPath.safeDownCast(osim.PathActuator.safeDownCast(actuator).getPath())
+    points = [] if path is None else _all(path.getPathPointSet())
+    return any(osim.MovingPathPoint.safeDownCast(point) is not None for point in points)
+
+
+def _of_moving(osim: Any, actuator: Any, state: Any) -> Iterator[tuple[str, float]]:
+    """Yield coordinates and generalized forces on them of a tension of 1 N, as a path's points move.
+
+    A point that goes by dp as the coordinate goes by dq has the force u2 - u1 of the tendon behind it and
+    before it, with u along the tendon. OpenSim 4.6 adds the part of u1 alone.
+    """
+    path = osim.GeometryPath.safeDownCast(osim.PathActuator.safeDownCast(actuator).getPath())
+    current = path.getCurrentPath(state)
+    points = [current.get(number) for number in range(current.getSize())]
+    places = np.array([point.getLocationInGround(state).to_numpy() for point in points])
+    along = np.diff(places, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    pull = np.zeros_like(places)
+    pull[:-1] += along
+    pull[1:] -= along
+    for point, force in zip(points, pull, strict=True):
+        moving = osim.MovingPathPoint.safeDownCast(point)
+        if moving is not None:
+            turn = moving.getParentFrame().getTransformInGround(state).R().asMat33()
+            axes = np.array([[turn.get(row, axis) for row in range(3)] for axis in range(3)])
+            by = moving.getXCoordinate(), moving.getYCoordinate(), moving.getZCoordinate()
+            each = moving.getdPointdQ(state).to_numpy() * (axes @ force)
+            yield from ((one.getName(), float(effort)) for one, effort in zip(by, each, strict=True))
 
 
 def _speeds(model: Any, state: Any) -> dict[str, int]:

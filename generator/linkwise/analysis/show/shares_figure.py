@@ -98,7 +98,9 @@ def _fixed(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
         sizes, spreads = (sum(getattr(one, what) for one in small) for what in ("sizes", "spreads"))
         nothing = np.zeros(len(result.robot.driven), np.bool_)
         label = f"{len(small)} other muscles, added up"
-        out.append(SharePart(label, np.asarray(sizes), np.asarray(spreads), nothing, GRAVITY, HATCHES["load"]))
+        out.append(
+            SharePart(label, np.asarray(sizes), np.asarray(spreads), nothing, GRAVITY, HATCHES["load"])
+        )
     return out
 
 
