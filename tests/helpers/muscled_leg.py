@@ -8,6 +8,8 @@ import numpy as np
 COORDINATES = ("slide", "hip", "knee", "ankle")
 MUSCLES = ("straight", "wrapping", "moving", "conditional")
 RESERVE = "knee_reserve"
+PLACES = ((0.05, 0.02, 0.06), (-0.04, -0.1, 0.05), (0.03, -0.2, -0.05))
+"""Places of the markers on each body."""
 
 
 def built(osim: Any, path: Path) -> None:
@@ -65,6 +67,10 @@ def built(osim: Any, path: Path) -> None:
     model.updForceSet().addGroup("thigh muscles")
     for name in MUSCLES[1:3]:
         model.updForceSet().addObjectToGroup("thigh muscles", name)
+    for body in bodies:
+        for number, place in enumerate(PLACES):
+            model.addMarker(osim.Marker(f"{body.getName()}{number}", body, osim.Vec3(*place)))
+    model.finalizeConnections()
     model.printToXML(str(path))
 
 

@@ -93,6 +93,7 @@ def record(result: AnalysisResult) -> dict[str, Any]:
         "samples": result.total,
         "loads": [borne.record() for borne in result.loads],
         **({"left_by_muscles": remainder_record(result)} if "tau_before_muscles" in result.rows else {}),
+        **({} if result.markers is None else {"markers": result.markers.record()}),
         "induced": list(result.induced),
         "reactions": list(result.reactions),
         "phases": [phase.told for phase in result.phases],

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from linkwise.analysis.asked_trace import AskedTrace, restart_times
 from linkwise.analysis.borne_joints import borne_joints
@@ -17,6 +18,7 @@ from linkwise.analysis.job import Job
 from linkwise.analysis.loads.muscles import placed_muscles
 from linkwise.analysis.loads.read import placed_loads
 from linkwise.analysis.logs import Log, open_log
+from linkwise.analysis.markers.followed import followed
 from linkwise.analysis.measured_torques import measured_torques, torque_columns
 from linkwise.analysis.opened_robot import OpenedRobot, told_apart
 from linkwise.analysis.phases import phase_columns, placed_phases
@@ -45,8 +47,21 @@ def prepared(
 ) -> Job:
     """Read and filter the log of a robot that stands on its contacts; return the job that analyses it.
 
+    A log of markers is brought to joint coordinates first.
+
     buffer: a directory that keeps the samples in a disk buffer, not in memory
     """
+    with TemporaryDirectory() as folder:
+        made = followed(log, asked.markers, asked.loads, Path(folder), progress)
+        if made is None:
+            return _prepared(log, robot, asked, progress, buffer)
+        job = _prepared(made.log, robot, replace(asked, loads=made.loads), progress, buffer)
+        warnings = (*job.samples.warnings, *made.told)
+        return replace(job, source=log.name, markers=made, samples=replace(job.samples, warnings=warnings))
+
+
+def _prepared(log: Path, robot: OpenedRobot, asked: Request, progress: Progress, buffer: Path | None) -> Job:
+    """Return the job of a log of joint coordinates."""
     reading, processing, outputs = asked.reading, asked.processing, asked.outputs
     if outputs.trace.joints and processing.convention != "closing":
         raise LinkwiseError("--trace goes with --convention closing, whose velocity terms sum to torques")

@@ -7,6 +7,7 @@ from linkwise.analysis.asked_trace import TraceChoices
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.cutoff_range import CutoffRange
 from linkwise.analysis.loads import Loads, Muscles
+from linkwise.analysis.markers import MarkerChoices
 from linkwise.analysis.outputs import Format
 from linkwise.analysis.phases import Phase
 from linkwise.analysis.settings import Processing, Reading, Units
@@ -104,6 +105,8 @@ class Request:
     """Cutoffs at which sizes of torques are told too."""
     muscles: Muscles | None = None
     """Forces of muscles, which are loads too."""
+    markers: MarkerChoices | None = None
+    """Reading of a log of markers and plates."""
 
     def __post_init__(self) -> None:
         for flag, given in (("--uncertain", self.uncertain), ("--cutoff-sweep", self.cutoff_sweep)):

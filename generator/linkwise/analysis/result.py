@@ -13,6 +13,7 @@ from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.markers.followed import MarkerLog
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result_rows import Column, ResultRows
@@ -65,6 +66,8 @@ class AnalysisResult(WholeMovement):
     """Uncertainty of bodies that was assumed, as the record has it; None without."""
     traced: Mapping[str, Any] | None = None
     """Joints, sources and windows of a trace, as the record has them; None without."""
+    markers: MarkerLog | None = None
+    """Recording of markers that the log was made of, with its errors; None for other logs."""
 
     def __getitem__(self, name: str) -> Array:
         """Return a column (S,) by its name, as in the Parquet file: "tau/joint1/link2".

@@ -94,6 +94,7 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
         f" these to joint torques within {closure.links_relative:.1e} (relative){where}{shares}",
         *_of_contacts(analysis),
         *_of_residual(analysis),
+        *([] if analysis.markers is None else [analysis.markers.line]),
         *filter(None, [remainder_line(analysis)]),
         *_of_bodies(analysis),
         *analysis.signs.lines,

@@ -115,7 +115,12 @@ def page_data(result: AnalysisResult) -> str:
     data = {
         "robot": printable(robot.name),
         "log": printable(result.source),
-        "provenance": " · ".join(filter(None, [result.provenance, remainder_line(result)])),
+        "provenance": " · ".join(
+            filter(
+                None,
+                [result.provenance, result.markers.line if result.markers else "", remainder_line(result)],
+            )
+        ),
         "rate": result.rate,
         "samples": len(instants.time),
         "total": result.total,
