@@ -156,6 +156,27 @@ def test_errors_of_markers_are_told(walk: Walk, tmp_path: Path) -> None:
     assert largest["error"] == pytest.approx(0.03, rel=0.05)
 
 
+def test_weights_are_those_of_a_file(walk: Walk, tmp_path: Path) -> None:
+    tasks = osim.IKTaskSet()
+    for name in walk.names:
+        task = osim.IKMarkerTask()
+        task.setName(name)
+        task.setWeight(1e-9 if name == "foot0" else 1.0)
+        tasks.cloneAndAppend(task)
+    tasks.printToXML(str(tmp_path / "tasks.xml"))
+    held = walk.markers.copy()
+    walk.markers[:, walk.names.index("foot0"), 0] += 0.05
+    try:
+        walk.c3d(tmp_path / "off.c3d")
+    finally:
+        walk.markers[:] = held
+    wanted, there = walk.known().q, walk.followed(tmp_path / "off.c3d", tasks=tmp_path / "tasks.xml").q
+    assert np.abs(there - wanted).max() < 1e-4
+    assert np.abs(walk.followed(tmp_path / "off.c3d").q - wanted).max() > 0.01
+    with pytest.raises(LinkwiseError, match="it is a Model; give a setup of inverse kinematics"):
+        walk.followed(tmp_path / "off.c3d", tasks=walk.file)
+
+
 def test_a_trc_file_is_analysed_by_the_command(walk: Walk, tmp_path: Path) -> None:
     table = osim.TimeSeriesTableVec3()
     table.setColumnLabels(walk.names)

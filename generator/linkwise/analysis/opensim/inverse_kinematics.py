@@ -11,6 +11,8 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 
 MOTION, LOCATIONS = "inverse_kinematics.mot", "_ik_model_marker_locations.sto"
+FROM_FILE = 2
+"""Kind of a coordinate's task whose values are in a file."""
 ACCURACY = 1e-8
 """OpenSim's usual 1e-5 ends its search up to 0.3 mrad from where markers are met exactly."""
 IN_METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}
@@ -97,9 +99,19 @@ def _recorded(osim: Any, markers: Path) -> tuple[Array, list[str], Array]:
 def _tasks(osim: Any, tasks: Path | None, names: list[str]) -> Any:
     """Return the tasks of a file, or every marker with the weight 1."""
     if tasks is not None:
-        if osim.Object.makeObjectFromFile(str(tasks)).getConcreteClassName() == "InverseKinematicsTool":
-            return osim.InverseKinematicsTool(str(tasks)).getIKTaskSet()
-        return osim.IKTaskSet(str(tasks))
+        kind = osim.OpenSimObject.makeObjectFromFile(str(tasks)).getConcreteClassName()
+        if kind not in ("InverseKinematicsTool", "IKTaskSet"):
+            raise LinkwiseError(
+                f"{tasks}: it is a {kind}; give a setup of inverse kinematics, or its IKTaskSet"
+            )
+        given = osim.IKTaskSet(str(tasks)) if kind == "IKTaskSet" else osim.InverseKinematicsTool(str(tasks))
+        found = given if kind == "IKTaskSet" else given.getIKTaskSet()
+        every = [osim.IKCoordinateTask.safeDownCast(found.get(at)) for at in range(found.getSize())]
+        if any(one is not None and one.getApply() and one.getValueType() == FROM_FILE for one in every):
+            raise LinkwiseError(
+                f"{tasks}: a coordinate follows a file, which is not read; leave that task out"
+            )
+        return found.clone()
     made = osim.IKTaskSet()
     for name in names:
         task = osim.IKMarkerTask()

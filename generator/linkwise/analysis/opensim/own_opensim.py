@@ -1,5 +1,6 @@
 """OpenSim itself, asked in a process of its own, which a fault of its compiled code may end."""
 
+import os
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -18,9 +19,21 @@ def asked_of_opensim(work: Callable[[Any], T], what: str) -> T:
     Raises LinkwiseError where OpenSim is not installed, with how to install it, and where it fails.
     """
     try:
-        return in_own_process(lambda: work(_quiet()))
+        return in_own_process(lambda: _silently(work))
     except (Ended, RuntimeError, MemoryError) as error:
         raise LinkwiseError(f"{what}: OpenSim fails: {' '.join(str(error).split())}") from None
+
+
+def _silently(work: Callable[[Any], T]) -> T:
+    """Return what `work` makes of OpenSim, whose tools print what they do on standard output."""
+    nowhere, output = os.open(os.devnull, os.O_WRONLY), os.dup(1)
+    os.dup2(nowhere, 1)
+    try:
+        return work(_quiet())
+    finally:
+        os.dup2(output, 1)
+        os.close(output)
+        os.close(nowhere)
 
 
 def _quiet() -> Any:
