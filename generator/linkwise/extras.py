@@ -9,6 +9,7 @@ from linkwise.errors import LinkwiseError
 
 BROUGHT_BY = {
     "clarabel": "identify",
+    "ezc3d": "markers",
     "fsspec": "study",
     "h5py": "logs",
     "matplotlib": "motion",

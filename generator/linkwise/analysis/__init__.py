@@ -4,7 +4,8 @@ from linkwise_runtime.quantities import Contact
 
 from linkwise.analysis.contacts import Contacts, WhileColumn
 from linkwise.analysis.job import Analysis
-from linkwise.analysis.loads import Load
+from linkwise.analysis.loads import Load, Muscles
+from linkwise.analysis.markers import MarkerChoices
 from linkwise.analysis.run import analyze
 from linkwise.analysis.settings import Lowpass, Payload, Processing, Reading
 
@@ -14,6 +15,8 @@ __all__ = [
     "Contacts",
     "Load",
     "Lowpass",
+    "MarkerChoices",
+    "Muscles",
     "Payload",
     "Processing",
     "Reading",

@@ -163,19 +163,21 @@ class ReactionShares:
         model: Any = self.robot.model
         q = motion[0]
         loads = []
-        for load in self.loads:
-            force, moment, place = load.wrench(time, q, model_pose(model))
-            loads.append(AppliedLoad(load.acts_on.frame.name, force, moment, at=place))
+        for one in (one for load in self.loads for one in load.wrenches):
+            force, moment, place = one.wrench(time, q, model_pose(model))
+            loads.append(AppliedLoad(one.acts_on.frame.name, force, moment, at=place))
         found = model.reactions(*motion, axes=borne.axes, joints=[borne.joint], loads=loads)
         acceleration, velocity, gravity, of_loads, passive = (np.asarray(share)[:, 0] for share in found)
         causes = [self._by_joint(share.sum(1)) for share in (acceleration, velocity)]
+        counts = np.array([len(load.wrenches) for load in self.loads], np.intp)
+        owners = np.repeat(np.eye(len(self.loads)), counts, axis=0)
         shares = {
             "reaction_link": acceleration.sum(2) + velocity.sum(2) + gravity,
             "reaction_qdd": causes[0],
             "reaction_qd": causes[1],
             "reaction_gravity": gravity,
             "reaction_own": passive.sum(2),
-            "reaction_load": of_loads,
+            "reaction_load": np.einsum("sxw,xe->sew", of_loads, owners),
         }
         return {name: np.swapaxes(share, 1, 2) for name, share in shares.items()}
 

@@ -9,7 +9,8 @@ from linkwise_runtime.quantities import Contact
 from linkwise.analysis.contacts import Contacts, WhileColumn
 from linkwise.analysis.contacts.pressed import PRESSED
 from linkwise.analysis.cutoff_range import CutoffRange
-from linkwise.analysis.loads import Load, Loads
+from linkwise.analysis.loads import Load, Loads, Muscles
+from linkwise.analysis.markers import PLATE_THRESHOLD, MarkerChoices
 from linkwise.analysis.opened_robot import OpenedRobot, named_body
 from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.settings import Payload, Processing, Reading
@@ -46,6 +47,46 @@ class AnalysisChoices:
     )
     loads_cutoff: float | None = option(
         None, "Zero-phase low-pass for these loads, Hz; no filter if not given"
+    )
+    muscles: str | None = option(
+        None,
+        "Forces of muscles, as OpenSim's static optimization or computed muscle control writes them: each is"
+        " a load on the bodies that it spans, and joint torques are what muscles leave; --robot is the .osim",
+        metavar="FILE",
+        is_file=True,
+    )
+    muscle_group: tuple[str, ...] = option(
+        (),
+        "Muscles that are one load, * standing for anything in a name, or a group of the model's by its"
+        " name; may be repeated",
+        metavar="NAME=MUSCLE,MUSCLE",
+    )
+    muscle_actuators: tuple[str, ...] = option(
+        (),
+        "OpenSim's ForceSet of actuators that the model lacks, such as reserves; may be repeated",
+        metavar="FILE",
+        is_file=True,
+    )
+    ik_tasks: str | None = option(
+        None,
+        "Of a log of markers: OpenSim's setup of inverse kinematics, or its tasks, with the markers' weights;"
+        " all weigh alike if not given",
+        metavar="FILE",
+        is_file=True,
+    )
+    plate: tuple[str, ...] = option(
+        (),
+        "Of a .c3d file: the body that stands on a force plate, plates counted from 1; may be repeated",
+        metavar="NUMBER=BODY",
+    )
+    plate_threshold: float | None = option(
+        None, "Force in N below which a plate counts as bare; 20 if not given"
+    )
+    c3d_axes: str | None = option(
+        None,
+        "Axes of the laboratory that are the model's x, and up, +X,+Z say; those that the .c3d file says if"
+        " not given",
+        metavar="X,UP",
     )
     contact: tuple[str, ...] = option(
         (),
@@ -89,20 +130,38 @@ class AnalysisChoices:
     )
 
     def __post_init__(self) -> None:
+        for flag, given in (
+            ("--muscle-group", self.muscle_group),
+            ("--muscle-actuators", self.muscle_actuators),
+        ):
+            if given and self.muscles is None:
+                raise LinkwiseError(f"{flag} goes with --muscles; add it")
         if self.cutoff_sweep is not None:  # refused before a robot is opened
             Request(processing=self.processing, cutoff_sweep=CutoffRange.of(self.cutoff_sweep))
 
     @property
     def files(self) -> tuple[str, ...]:
         """Paths of all files that choices name."""
-        return (*self.loads, *self.contact_loads, *(() if self.uncertain is None else (self.uncertain,)))
+        alone = (one for one in (self.uncertain, self.muscles, self.ik_tasks) if one is not None)
+        return (*self.loads, *self.contact_loads, *self.muscle_actuators, *alone)
 
-    def request(self, robot: OpenedRobot) -> Request:
-        """Return what is asked of a robot's log."""
+    def request(self, robot: OpenedRobot, file: str | Path) -> Request:
+        """Return what is asked of a robot's log; file: the path of the robot's own file or package."""
         uncertain = None if self.uncertain is None else Path(self.uncertain)
         borne, held = self.borne(robot), self.contacts(robot)
         swept = None if self.cutoff_sweep is None else CutoffRange.of(self.cutoff_sweep)
-        return Request(self.reading, self.processing, self.outputs, borne, held, uncertain, swept)
+        muscles = None
+        if self.muscles is not None:
+            beside = tuple(map(Path, self.muscle_actuators))
+            muscles = Muscles(Path(self.muscles), Path(file), self.muscle_group, beside)
+        asked = self.reading, self.processing, self.outputs, borne, held, uncertain, swept, muscles
+        return Request(*asked, self.markers(Path(file)))
+
+    def markers(self, model: Path) -> MarkerChoices:
+        """Return how a log of markers is read; model: the path of the robot's own file."""
+        least = PLATE_THRESHOLD if self.plate_threshold is None else self.plate_threshold
+        tasks = None if self.ik_tasks is None else Path(self.ik_tasks)
+        return MarkerChoices(model, tasks, self.plate, self.c3d_axes or "", least, self.loads_cutoff)
 
     def payloads(self, robot: OpenedRobot) -> tuple[Payload, ...]:
         """Return the point masses that a robot carries."""
@@ -111,7 +170,8 @@ class AnalysisChoices:
     def borne(self, robot: OpenedRobot) -> Loads:
         """Return the external loads on a robot."""
         given: list[Load | str] = [*constant_loads(self.load, robot), *self.loads]
-        return Loads.of(given, None if self.contact_loads and not self.loads else self.loads_cutoff)
+        is_other = not self.loads and (self.contact_loads or self.plate)
+        return Loads.of(given, None if is_other else self.loads_cutoff)
 
     def contacts(self, robot: OpenedRobot) -> Contacts:
         """Return the contacts on which the robot stands."""

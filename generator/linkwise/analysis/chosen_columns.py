@@ -11,7 +11,7 @@ from linkwise.arrays import Index
 
 ALWAYS = ("time", "q", "qd", "qdd", "contact", "slip")
 """Quantities that every result has: its motion, and what contacts do."""
-SUMS = (*ALWAYS, "tau", "power", "force", "force_measured", "tau_as_loads")
+SUMS = (*ALWAYS, "tau", "tau_before_muscles", "power", "force", "force_measured", "tau_as_loads")
 """Quantities of joints, and of rows of constraints, without what these are the sum of."""
 CAUSES = (*SUMS, *TERMS, *PASSIVE, "tau_load", *FORCES)
 """These, and torques and forces by cause: without sums by link, and without powers by link."""

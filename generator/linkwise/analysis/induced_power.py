@@ -117,8 +117,6 @@ class PowerShares:
             if quantity in AT_JOINT:
                 given[:, g] = inside[:, at[0]]
                 own[at[0], g] = True
-            elif quantity == "acc_load":
-                given[list(self.loads[at[0]].acts_on.joints), g] = True
         contacts = np.zeros((n, 0 if self.robot.contacts is None else len(self.robot.ground.names)))
         for c in range(contacts.shape[1]):
             joint = self.robot.joint_of(self.robot.ground.contacts[c].frame)
@@ -126,7 +124,7 @@ class PowerShares:
         armatures = np.zeros_like(holders)
         armatures[turning, range(links, links + len(turning))] = True
         holders[:, links:] = inside[:, turning]
-        return Behind(holders, holders | armatures, given, given | own, contacts)
+        return Behind(holders, holders | armatures, inside, given, given | own, contacts)
 
     def fill(
         self, out: Array, packed: TermArrays, standing: Standing | None, time: Array, motion: Motion
@@ -168,12 +166,12 @@ class PowerShares:
         sums = [_error(gains, whole)]
         if self._has_flow:
             behind = self._behind
-            given = power @ self._merged[: power.shape[1]]
+            given, before_joint = self._given(power @ self._merged[: power.shape[1]], time, q, qd)
             fed = behind.contacts @ fed @ self._merged
-            through = behind.holders @ gains - behind.given * given[:, None] - fed
+            through = behind.holders @ gains - given - fed
             flow, before = (
-                whole @ held.T.astype(float) - given @ other.T - fed.sum(axis=2)
-                for held, other in ((behind.holders, behind.given), (behind.before, behind.given_before))
+                whole @ held.T.astype(float) - other.sum(axis=2) - fed.sum(axis=2)
+                for held, other in ((behind.holders, given), (behind.before, before_joint))
             )
             blocks.append(_flat(before[..., None], flow[..., None], through))
             sums.append(_error(through, flow))
@@ -181,6 +179,27 @@ class PowerShares:
         out[self.first : self.first + len(filled)] = filled
         absolute, relative = worst_of(sums)
         return Closure(power_absolute=absolute, power_relative=relative)
+
+    def _given(self, power: Array, time: Array, q: Array, qd: Array) -> tuple[Array, Array]:
+        """Return the power (S, n, G) that sources give behind each joint, and that with the joint's own.
+
+        power: that of each column of sources, (S, G)
+        """
+        behind, model = self._behind, opened(self.robot)
+        given, before = (mask * power[:, None] for mask in (behind.given, behind.given_before))
+        for g, (quantity, at) in enumerate(self.columns):
+            if quantity != "acc_load":
+                continue
+            load = self.loads[at[0]]
+            for one in load.wrenches:
+                pushed = -(one.torque(model, time, q) * qd).sum(axis=1)
+                given[:, list(one.acts_on.joints), g] += pushed[:, None]
+            before[..., g] = given[..., g]
+            if load.efforts is not None:
+                driven = load.effort(time) * qd
+                given[..., g] += driven @ behind.joints.T
+                before[..., g] = given[..., g] + driven
+        return given, before
 
     def _momenta(self, terms: TermArrays, qd: Array) -> Array:
         """Return q̇ᵀ M_j of links, and a_i q̇_i of armatures, (S, H, n)."""
@@ -282,9 +301,11 @@ class Behind:
     holders: Mask
     before: Mask
     """Holders, with the joint's own armature."""
+    joints: Mask
+    """Joints behind each joint, (n, n)."""
     given: Mask
     given_before: Mask
-    """Columns, with those of the joint's own torque, spring and losses."""
+    """Columns, with those of the joint's own torque, spring and losses; loads are in neither."""
     contacts: Array
     """Contacts that hold a frame behind the joint, (n, contacts): 1, else 0."""
 

@@ -8,6 +8,7 @@ from linkwise_runtime.motion.induced_power import fed_by_couplings
 
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.cutoff_sweep import RowSizes
+from linkwise.analysis.markers.followed import MarkerLog
 from linkwise.analysis.outputs import named_result, record, result_table
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.poles import pole_warnings
@@ -88,6 +89,8 @@ class Job:
     uncertain: UncertainInputs = field(default_factory=UncertainInputs)
     swept: SweptLog | None = None
     """The log as it was before the filter, where a sweep of cutoffs is asked for."""
+    markers: MarkerLog | None = None
+    """Recording of markers that the log was made of, if it was."""
 
     def run(self, sink: Sink, progress: Progress) -> WholeMovement:
         """Analyse every sample, handing the blocks to `sink`; then sweep cutoffs where that is asked for."""
@@ -178,6 +181,7 @@ class Job:
             times=self.decomposer.times,
             phases=self.phases,
             uncertain=self.uncertain.record(),
+            markers=self.markers,
             traced=None if self.decomposer.traced is None else self.decomposer.traced.record(),
         )
 
@@ -212,7 +216,7 @@ class Job:
         held = () if robot.contacts is None else zip(robot.ground.names, robot.ground.contacts, strict=True)
         for name, contact in held:
             for load in self.decomposer.loads:
-                if load.acts_on.frame.joint == robot.joint_of(contact.frame):
+                if not load.is_muscle and robot.joint_of(load.bodies[0]) == robot.joint_of(contact.frame):
                     yield (
                         f"load {load.name!r} and contact {name!r} act on one body; what was measured at the"
                         " contact is given with --contact-loads"

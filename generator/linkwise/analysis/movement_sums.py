@@ -27,6 +27,8 @@ class PartSums(NamedTuple):
     """Σ |x| of each row over the samples, (rows,); not finite where a value is not."""
     peak: Array
     """Largest |x| of each row, (rows,)."""
+    squares: Array
+    """Σ x² of joint torques."""
     energy: Array
     """∫ max(P, 0) and ∫ max(-P, 0) of each power in each span, in steps, (spans, 2, powers)."""
     steps: Array
@@ -48,6 +50,8 @@ class MovementSums:
         self.closure, self._rows, self._samples = Closure(), rows, 0
         self._robot, self._phases = robot, phases
         self._total, self._peak = np.zeros((2, len(rows)))
+        self._torques = rows.numbers("tau", "tau_before_muscles")
+        self._squares = np.zeros(len(self._torques))
         self._power = rows.numbers(*POWER_OF.values(), *WORK_BY_SOURCE)
         self._energy = np.zeros((1 + len(phases), 2, len(self._power)))
         self._last: PartSums | None = None
@@ -73,7 +77,8 @@ class MovementSums:
         taken = given - power
         energy = np.stack([weights @ given.T, weights @ taken.T], axis=1)
         ends, sides = (power[:, 0].copy(), power[:, -1].copy()), (on[:, 0].copy(), on[:, -1].copy())
-        return PartSums(total, peak, energy, steps.sum(axis=1), ends, sides)
+        squares = np.square(part[self._torques]).sum(axis=1)
+        return PartSums(total, peak, squares, energy, steps.sum(axis=1), ends, sides)
 
     def add(self, part: Array, sums: PartSums, closure: Closure) -> bool:
         """Add the next part (rows, samples), its sums and errors; return whether its values are finite."""
@@ -82,6 +87,7 @@ class MovementSums:
             return False
         self._samples += part.shape[1]
         self._total += sums.total
+        self._squares += sums.squares
         np.maximum(self._peak, sums.peak, out=self._peak)
         self._search.add(part)
         self._energy += sums.energy
@@ -121,8 +127,10 @@ class MovementSums:
             {power: Work(*(self._rows.dense(power, way)[0] for way in part)) for power in kept}
             for part in energy
         )
+        rms = np.zeros(len(self._rows))
+        rms[self._torques] = np.sqrt(self._squares / self._samples)
         return WholeMovement(
-            totals=Totals(self._total / self._samples, self._peak),
+            totals=Totals(self._total / self._samples, self._peak, rms),
             closure=self.closure,
             total=self._samples,
             peaks=self._search.peaks(),

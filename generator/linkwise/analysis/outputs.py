@@ -14,6 +14,7 @@ from linkwise_runtime.version import VERSION
 
 from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.joint_causes import are_motions_whole, causes_of, sizes
+from linkwise.analysis.muscle_remainder import remainder_record
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import POWER_OF, QUANTITIES, WORKS, ResultQuantity
 from linkwise.analysis.result_rows import Column
@@ -91,6 +92,8 @@ def record(result: AnalysisResult) -> dict[str, Any]:
         "rate_hz": result.rate,
         "samples": result.total,
         "loads": [borne.record() for borne in result.loads],
+        **({"left_by_muscles": remainder_record(result)} if "tau_before_muscles" in result.rows else {}),
+        **({} if result.markers is None else {"markers": result.markers.record()}),
         "induced": list(result.induced),
         "reactions": list(result.reactions),
         "phases": [phase.told for phase in result.phases],

@@ -105,7 +105,7 @@ class PlacedPhase:
         if self.contact is not None:
             found |= contacts[self.contact] > 0.0
         if self.load is not None:
-            force = self.load.wrench(time, q, model_pose(robot.model)).force
+            force = self.load.wrenches[0].wrench(time, q, model_pose(robot.model)).force
             found |= np.linalg.norm(force, axis=1) > self.above
         return found
 
@@ -127,7 +127,7 @@ def placed_phases(
 
     Raises LinkwiseError for a name that is none of them.
     """
-    by_name = {load.name: load for load in loads}
+    by_name = {load.name: load for load in loads if not load.is_muscle}
     contacts = () if robot.contacts is None else robot.contacts.names
     found = []
     for phase in phases:

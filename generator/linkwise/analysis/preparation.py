@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from linkwise.analysis.asked_trace import AskedTrace, restart_times
 from linkwise.analysis.borne_joints import borne_joints
@@ -14,10 +15,12 @@ from linkwise.analysis.contacts.times import contact_times, switch_columns
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.induced_points import InducedPlan, induced_points
 from linkwise.analysis.job import Job
+from linkwise.analysis.loads.muscles import placed_muscles
 from linkwise.analysis.loads.read import placed_loads
 from linkwise.analysis.logs import Log, open_log
+from linkwise.analysis.markers.followed import followed
 from linkwise.analysis.measured_torques import measured_torques, torque_columns
-from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.opened_robot import OpenedRobot, told_apart
 from linkwise.analysis.phases import phase_columns, placed_phases
 from linkwise.analysis.request import Request
 from linkwise.analysis.samples import Samples, read_samples
@@ -44,8 +47,21 @@ def prepared(
 ) -> Job:
     """Read and filter the log of a robot that stands on its contacts; return the job that analyses it.
 
+    A log of markers is brought to joint coordinates first.
+
     buffer: a directory that keeps the samples in a disk buffer, not in memory
     """
+    with TemporaryDirectory() as folder:
+        made = followed(log, asked.markers, asked.loads, Path(folder), progress)
+        if made is None:
+            return _prepared(log, robot, asked, progress, buffer)
+        job = _prepared(made.log, robot, replace(asked, loads=made.loads), progress, buffer)
+        warnings = (*job.samples.warnings, *made.told)
+        return replace(job, source=log.name, markers=made, samples=replace(job.samples, warnings=warnings))
+
+
+def _prepared(log: Path, robot: OpenedRobot, asked: Request, progress: Progress, buffer: Path | None) -> Job:
+    """Return the job of a log of joint coordinates."""
     reading, processing, outputs = asked.reading, asked.processing, asked.outputs
     if outputs.trace.joints and processing.convention != "closing":
         raise LinkwiseError("--trace goes with --convention closing, whose velocity terms sum to torques")
@@ -66,6 +82,10 @@ def prepared(
     samples = replace(samples, warnings=(*samples.warnings, *slips))
     motion = samples.time[start:stop]
     borne = placed_loads(asked.loads, robot, motion, reading.ignore_extra, progress, buffer)
+    if asked.muscles is not None:
+        pulling = placed_muscles(asked.muscles, robot, motion, samples.q[start:stop], progress)
+        told_apart("muscle", [one.name for one in pulling], [one.name for one in borne], "rename one of them")
+        borne = (*borne, *pulling)
     times = contact_times(asked.contacts, opened, robot, reading, motion, progress, buffer)
     every = (*borne, *(() if times is None else times.loads))
     phases = placed_phases(outputs.phases, opened, robot, every, reading, progress)

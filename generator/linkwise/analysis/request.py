@@ -6,7 +6,8 @@ from pathlib import Path
 from linkwise.analysis.asked_trace import TraceChoices
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.cutoff_range import CutoffRange
-from linkwise.analysis.loads import Loads
+from linkwise.analysis.loads import Loads, Muscles
+from linkwise.analysis.markers import MarkerChoices
 from linkwise.analysis.outputs import Format
 from linkwise.analysis.phases import Phase
 from linkwise.analysis.settings import Processing, Reading, Units
@@ -107,7 +108,17 @@ class Request:
     """File of how uncertain bodies are."""
     cutoff_sweep: CutoffRange | None = None
     """Cutoffs at which sizes of torques are told too."""
+    muscles: Muscles | None = None
+    """Forces of muscles, which are loads too."""
+    markers: MarkerChoices | None = None
+    """Reading of a log of markers and plates."""
 
     def __post_init__(self) -> None:
+        for flag, given in (("--uncertain", self.uncertain), ("--cutoff-sweep", self.cutoff_sweep)):
+            if self.muscles is not None and given is not None:
+                raise LinkwiseError(
+                    f"{flag}: paths of muscles are found for the one motion that is analysed; leave it or"
+                    " --muscles out"
+                )
         if self.cutoff_sweep is not None and self.processing.lowpass is None:
             raise LinkwiseError("--cutoff-sweep goes with --cutoff, that of the analysis itself; add it")

@@ -13,6 +13,7 @@ from linkwise.analysis.closed_motion import ClosedLog
 from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.markers.followed import MarkerLog
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result_rows import Column, ResultRows
@@ -65,6 +66,8 @@ class AnalysisResult(WholeMovement):
     """Uncertainty of bodies that was assumed, as the record has it; None without."""
     traced: Mapping[str, Any] | None = None
     """Joints, sources and windows of a trace, as the record has them; None without."""
+    markers: MarkerLog | None = None
+    """Recording of markers that the log was made of, with its errors; None for other logs."""
 
     def __getitem__(self, name: str) -> Array:
         """Return a column (S,) by its name, as in the Parquet file: "tau/joint1/link2".
@@ -171,7 +174,7 @@ class AnalysisResult(WholeMovement):
     @property
     def load_labels(self) -> tuple[str, ...]:
         """Names of the loads in figures, where a load on the foot differs from the foot's own share."""
-        return tuple(f"load {borne.name}" for borne in self.loads)
+        return tuple(borne.label for borne in self.loads)
 
     @property
     def power(self) -> Array:
@@ -209,8 +212,9 @@ class AnalysisResult(WholeMovement):
         ends = (("from", made.start), ("to", made.stop))
         parts += [f"{word} {time:g} s" for word, time in ends if time is not None]
         for source in dict.fromkeys(borne.source for borne in self.loads):
-            names = listed([borne.name for borne in self.loads if borne.source == source])
-            parts.append(printable(f"loads {names} of {source}" if source else f"loads {names}"))
+            some = [borne for borne in self.loads if borne.source == source]
+            names = f"{'muscles' if some[0].is_muscle else 'loads'} {listed([one.name for one in some])}"
+            parts.append(printable(f"{names} of {source}" if source else names))
         cutoffs = sorted({borne.cutoff for borne in self.loads if borne.cutoff is not None})
         if self.robot.contacts is not None:
             parts.append(printable(f"contacts {listed(self.robot.contacts.names)}"))

@@ -33,7 +33,10 @@ FORCE_OF = {torque: torque.replace("tau", "force", 1) for torque in (*PASSIVE, "
 FORCES = ("force", "force_link", *FORCE_OF.values())
 GROUND = ("contact", "slip", "force_measured", "tau_as_loads", "power_contact")
 """Quantities of contacts beside the constraint forces."""
-CERTAIN = ("time", "contact", "force_measured", "tau_as_loads", "qd_from", "tau_from", "kinetic_from")
+CERTAIN = (
+    *("time", "contact", "force_measured", "tau_as_loads", "tau_before_muscles"),
+    *("qd_from", "tau_from", "kinetic_from"),
+)
 """Quantities without deviations: times, what is on, what was measured, what is traced."""
 LOSSES = ("acc_spring", "acc_damping", "acc_friction")
 """Shares of passive torques in an acceleration, in the order of `passive_torque`."""
@@ -62,6 +65,10 @@ TABLE = {
     "tau_as_loads": (
         "torque_as_loads joint",
         "joint torque with what was measured in place of what contacts bear",
+    ),
+    "tau_before_muscles": (
+        "torque_before_muscles joint",
+        "what inverse dynamics asks of the joint: joint torque, and the torques that muscles give about it",
     ),
     "force": (
         "constraint_force constraint",

@@ -248,10 +248,10 @@ def torque_places(
     own = {name: robot.with_own(field) for name, field in PASSIVE.items()}
     out += [(name, (i,)) for name, joints in own.items() for i in robot.joints_supporting(joints)]
     out += [
-        ("tau_load", (i, e))
-        for e, borne in enumerate(loads)
-        for i in robot.joints_supporting(borne.acts_on.joints)
+        ("tau_load", (i, e)) for e, borne in enumerate(loads) for i in robot.joints_supporting(borne.joints)
     ]
+    if any(borne.is_muscle for borne in loads):
+        out += [("tau_before_muscles", (i,)) for i in robot.driven]
     powers = (*POWER, *POWER_TERMS) if power_terms else POWER
     power = [(name, at) for name in powers for torque, at in out if torque == TORQUE_OF[name]]
     forces = [FORCE_OF[name] for name, joints in own.items() if joints]

@@ -15,8 +15,10 @@ from linkwise.analysis.cutoff_range import CutoffRange
 from linkwise.analysis.disk_rows import EverySample
 from linkwise.analysis.job import Analysis
 from linkwise.analysis.load_robot import load_robot
-from linkwise.analysis.loads import Load, Loads
+from linkwise.analysis.loads import Load, Loads, Muscles
+from linkwise.analysis.markers import MarkerChoices
 from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.opensim.inverse_kinematics import MOTION
 from linkwise.analysis.opensim.storage import begin_storages
 from linkwise.analysis.outputs import open_table
 from linkwise.analysis.payload import with_payloads
@@ -64,6 +66,8 @@ def analyze(
     uncertain: str | PathLike[str] | None = None,
     cutoff_sweep: Sequence[float] | None = None,
     columns: Sequence[str] = (),
+    muscles: Muscles | None = None,
+    markers: MarkerChoices | None = None,
 ) -> Analysis:
     """Analyse a motion log with a generated robot, all samples in memory.
 
@@ -88,6 +92,8 @@ def analyze(
     are told by `Analysis.cutoff_sweep`; `processing` needs a low-pass
     columns: columns that are computed, written as for --columns: "sums", ``"tau_gravity/*/hand"``; all where
     there are none, and where points, powers, a trace or a sweep, made of all torques, are asked for
+    muscles: forces of muscles, and the model of OpenSim with their paths; each is a load, or each group
+    markers: model of OpenSim that a log of markers, .trc or .c3d, is of, and how that and its plates are read
 
     Raises LinkwiseError, naming file, row and column, for what cannot be analysed.
     """
@@ -113,7 +119,9 @@ def analyze(
     )
     told = None if uncertain is None else Path(uncertain)
     swept = None if cutoff_sweep is None else CutoffRange.of(cutoff_sweep)
-    asked = Request(reading or Reading(), processing or Processing(), outputs, borne, held, told, swept)
+    asked = Request(
+        reading or Reading(), processing or Processing(), outputs, borne, held, told, swept, muscles, markers
+    )
     job = prepared(Path(log), loaded, asked, progress)
     with EverySample(len(job.decomposer.rows), job.count) as kept:
         return job.analysis(job.run(kept, progress), kept.values)
@@ -136,12 +144,16 @@ def analyze_to(
     for name in outputs.figures:
         check_figure(name, robot, told)
     refuse_inside_package(out)
-    own = () if asked.uncertain is None else (asked.uncertain,)
+    own = [] if asked.uncertain is None else [asked.uncertain]
+    own += [] if asked.muscles is None else asked.muscles.files
+    own += [] if asked.markers is None or asked.markers.tasks is None else [asked.markers.tasks]
     for file in (log, *asked.loads.paths, *asked.contacts.measured.paths, *own):
         if is_inside(file, out):
             raise LinkwiseError(f"--out {out} is to be replaced and holds the log {file}; give another --out")
     with whole_directory(out, _refuse_unless_result) as draft:
         job = prepared(log, robot, asked, progress, draft)
+        if job.markers is not None:
+            (draft / MOTION).write_bytes(job.markers.followed.motion)
         note = json_text(job.note())
         keep = (job.count, draft) if outputs.page or outputs.figures else (0, None)
         naming = outputs.storage, outputs.storage_units

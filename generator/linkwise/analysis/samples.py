@@ -101,6 +101,11 @@ class FollowingJoint:
             found[inside] = polynomial.polyval(leader[inside] - starts[number], powers)
         return found
 
+    def slope(self, leader: Array) -> Array:
+        """Return the derivative of the joint's position (S,) by that of its leader."""
+        slopes = tuple(tuple(polynomial.polyder(powers).tolist()) for powers in self.curve.pieces)
+        return replace(self, curve=replace(self.curve, pieces=slopes)).at(leader)
+
 
 class FollowerColumns:
     """Columns of following and held joints among a log's free ones, and their distance from these joints.

@@ -151,7 +151,7 @@ class Decomposer:
 
     def with_load_off(self, e: int, shift: LoadShift) -> Self:
         """Return the decomposer in which load e is off by a shift."""
-        loads = tuple(replace(load, shift=shift) if e == at else load for at, load in enumerate(self.loads))
+        loads = tuple(load.off_by(shift) if e == at else load for at, load in enumerate(self.loads))
         return replace(
             self,
             loads=loads,
@@ -329,9 +329,14 @@ class Decomposer:
 
     def _add_loads(self, out: Array, standing: Standing | None, time: Array, q: Array) -> None:
         """Fill the torques by which joints carry loads, and add them to the joint torques."""
-        if self.loads and {"tau", "tau_load"}.intersection(self.rows.named):
+        if self.loads and {"tau", "tau_load", "tau_before_muscles"}.intersection(self.rows.named):
             asked = [_left(standing, borne.torque(self.robot.model, time, q)) for borne in self.loads]
-            self._add(out, "tau_load", np.stack(asked, axis=-1))
+            torque = np.stack(asked, axis=-1)
+            self._add(out, "tau_load", torque)
+            if "tau_before_muscles" in self.rows:
+                muscles = [borne.is_muscle for borne in self.loads]
+                whole = self.rows.dense("tau", out) - torque[..., muscles].sum(-1)
+                self.rows.put(out, "tau_before_muscles", whole)
 
     def _add(self, out: Array, name: str, torque: Array) -> None:
         """Fill the rows of a quantity from torques (S, n, X), and add them to the joint torques."""

@@ -206,14 +206,15 @@ def load_torque(recursion: NewtonEuler, borne: PlacedLoad, time: Array, q: Array
     def pose(frame: TreeFrame, q: Array) -> Array:
         return recursion.poses([frame], q)[:, 0]
 
-    force, moment, place = borne.wrench(time, q, pose)
-    frame = [(borne.acts_on.frame.joint, np.zeros(3))]
-    arm = place - recursion.places(frame, q)[:, 0]
-    out = np.zeros_like(q)
-    for i in range(recursion.n):
-        velocity, _ = recursion.points(frame, q, np.eye(recursion.n)[i] + 0.0 * q, 0.0 * q)
-        omega, v = velocity[:, 0, :3], velocity[:, 0, 3:]
-        out[:, i] = -(moment * omega).sum(-1) - (force * (v + np.cross(omega, arm))).sum(-1)
+    out = np.zeros_like(q) if borne.efforts is None else -borne.effort(time)
+    for one in borne.wrenches:
+        force, moment, place = one.wrench(time, q, pose)
+        frame = [(one.acts_on.frame.joint, np.zeros(3))]
+        arm = place - recursion.places(frame, q)[:, 0]
+        for i in range(recursion.n):
+            velocity, _ = recursion.points(frame, q, np.eye(recursion.n)[i] + 0.0 * q, 0.0 * q)
+            omega, v = velocity[:, 0, :3], velocity[:, 0, 3:]
+            out[:, i] -= (moment * omega).sum(-1) + (force * (v + np.cross(omega, arm))).sum(-1)
     return out
 
 

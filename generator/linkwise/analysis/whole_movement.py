@@ -40,6 +40,8 @@ class Totals:
 
     mean: Array
     peak: Array
+    rms: Array
+    """Root mean square of joint torques, before and after muscles; 0 for other rows."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from linkwise_runtime.motion.trace_equations import BETWEEN, RESIDUAL
 
 from linkwise.analysis import Analysis
 from linkwise.analysis.choices import AnalysisChoices
+from linkwise.analysis.muscle_remainder import remainder_line
 from linkwise.analysis.outputs import CLOSED_AT_FEW
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.run import analyze_to
@@ -56,7 +57,7 @@ def analyze(
     with shown_progress() as progress:
         package = opened_robot(robot, backend, options, progress)
     package = with_payloads(package, chosen.payloads(package))
-    asked = chosen.request(package)
+    asked = chosen.request(package, robot)
     with shown_progress(UNITS) as progress:
         analysis, files = analyze_to(out, log, package, asked, progress)
     for warning in analysis.warnings:
@@ -93,6 +94,8 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
         f" these to joint torques within {closure.links_relative:.1e} (relative){where}{shares}",
         *_of_contacts(analysis),
         *_of_residual(analysis),
+        *([] if analysis.markers is None else [analysis.markers.line]),
+        *filter(None, [remainder_line(analysis)]),
         *_of_bodies(analysis),
         *analysis.signs.lines,
         *(() if analysis.cutoff_sweep is None else analysis.cutoff_sweep.lines),

@@ -18,6 +18,7 @@ from linkwise.progress import Progress
 from linkwise.robot import Options
 
 UNITS = {
+    "inverse kinematics": "files",
     "reading": "B",
     "resampling": "samples",
     "closing": "samples",
@@ -27,7 +28,9 @@ UNITS = {
 }
 """Units in which progress is counted, by stage."""
 
-_LOG = typer.Argument(help="Motion log: .csv, .mot, .sto, .parquet, .npz, HDF5, or a bag of ROS")
+_LOG = typer.Argument(
+    help="Motion log: .csv, .mot, .sto, .parquet, .npz, HDF5, a bag of ROS, or markers in .trc or .c3d"
+)
 _ROBOT = typer.Option(
     help="Directory of a generated robot; or a robot's file, of which a package is kept", show_default=False
 )

@@ -55,7 +55,10 @@ def trial_here(trial: Trial) -> Iterator[Trial]:
             trial.choices,
             loads=tuple(map(here, trial.choices.loads)),
             contact_loads=tuple(map(here, trial.choices.contact_loads)),
+            muscle_actuators=tuple(map(here, trial.choices.muscle_actuators)),
             uncertain=trial.choices.uncertain and here(trial.choices.uncertain),
+            ik_tasks=trial.choices.ik_tasks and here(trial.choices.ik_tasks),
+            muscles=trial.choices.muscles and here(trial.choices.muscles),
         )
         yield replace(trial, log=here(trial.log), choices=choices)
 

@@ -146,7 +146,7 @@ def prepared_trial(plan: StudyPlan, trial: Trial, buffer: Path) -> Job:
     """
     loaded = opened_robot(trial.robot, plan)
     robot = with_payloads(loaded, trial.choices.payloads(loaded))
-    asked = trial.choices.request(robot)
+    asked = trial.choices.request(robot, trial.robot)
     robot = with_contacts(robot, asked.contacts)
     outputs = replace(asked.outputs, page=plan.pages)
     if plan.cycles is not None and plan.cycles.what:

@@ -73,7 +73,9 @@ class ContactTimes:
         switch = self.switches[number]
         if switch is not None:
             return f"{switch.given.column!r} is {switch.rows[:, 1].max():.4g} at most"
-        force = [np.linalg.norm(load.table[:, FORCE], axis=1).max() for load in self.measured[number]]
+        force = [
+            np.linalg.norm(load.wrenches[0].table[:, FORCE], axis=1).max() for load in self.measured[number]
+        ]
         return f"the loads on its body are {sum(force):.4g} N at most"
 
     def shares(self, model: Dynamics, time: Array, q: Array) -> Array:
@@ -133,7 +135,7 @@ class ContactTimes:
 
 
 def _wrenches(loads: Sequence[PlacedLoad], model: Dynamics, time: Array, q: Array) -> list[Wrench]:
-    return [load.wrench(time, q, model_pose(model)) for load in loads]
+    return [one.wrench(time, q, model_pose(model)) for load in loads for one in load.wrenches]
 
 
 def contact_times(
@@ -172,7 +174,7 @@ def contact_times(
 
 
 def _told(loads: Sequence[PlacedLoad]) -> str:
-    return listed([f"{load.name} is on {load.acts_on.frame.name}" for load in loads])
+    return listed([f"{load.name} is on {load.bodies[0]}" for load in loads])
 
 
 def switch_columns(contacts: Contacts, log: Log) -> tuple[str, ...]:
@@ -205,7 +207,7 @@ def _by_contact(robot: OpenedRobot, loads: Sequence[PlacedLoad]) -> tuple[tuple[
     bodies = [robot.joint_of(contact.frame) for contact in robot.ground.contacts]
     found: list[list[PlacedLoad]] = [[] for _ in bodies]
     for load in loads:
-        there = [number for number, body in enumerate(bodies) if body == load.acts_on.frame.joint]
+        there = [number for number, body in enumerate(bodies) if body == robot.joint_of(load.bodies[0])]
         if len(there) != 1:
             mend = "where no contact is; give it with --loads, or leave it out"
             if there:
@@ -213,8 +215,6 @@ def _by_contact(robot: OpenedRobot, loads: Sequence[PlacedLoad]) -> tuple[tuple[
                     "where two contacts are, of which it cannot be told apart; leave it out, and say when"
                     " they stand with --contact-while"
                 )
-            raise LinkwiseError(
-                f"--contact-loads: load {load.name!r} acts on {load.acts_on.frame.name!r}, {mend}"
-            )
+            raise LinkwiseError(f"--contact-loads: load {load.name!r} acts on {load.bodies[0]!r}, {mend}")
         found[there[0]].append(load)
     return tuple(map(tuple, found))

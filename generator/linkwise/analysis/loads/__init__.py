@@ -87,6 +87,32 @@ class Loads:
 
 
 @dataclass(frozen=True)
+class Muscles:
+    """File of actuators' forces over time in N or N·m, and the model of OpenSim that has their paths.
+
+    `groups` are written NAME=MUSCLE,MUSCLE, with * for anything in a name, or as the name of a group of
+    forces in the model; each group is one load. Raises LinkwiseError for a model that is no .osim file.
+    """
+
+    forces: Path
+    model: Path
+    groups: tuple[str, ...] = ()
+    force_sets: tuple[Path, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.model.suffix.lower() != ".osim" or not self.model.is_file():
+            raise LinkwiseError(
+                f"--muscles {self.forces}: paths of muscles are in a model of OpenSim, and {self.model} is"
+                " none; give its .osim file as --robot"
+            )
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Paths of the files that are read beside the robot's."""
+        return (self.forces, *self.force_sets)
+
+
+@dataclass(frozen=True)
 class LoadColumns:
     """A load in a log: numbers of its time column, and of its three columns of force, moment and point."""
 

@@ -6,8 +6,9 @@ nothing presses does no harm. For other loads, force, moment and point are inter
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
@@ -58,25 +59,18 @@ class LoadFrame:
 
 
 @dataclass(frozen=True, eq=False)
-class PlacedLoad:
-    """A load that a robot carries."""
+class PlacedWrench:
+    """A force and a moment on one body, over time."""
 
-    name: str
     acts_on: LoadFrame
     table: Array
     """Rows of time, force, moment, point (S, 10); moments are about the origin if all is in the world."""
-    source: str
-    """Name of the file that it is from, "" for none."""
-    cutoff: float | None = None
-    """Cutoff in Hz of the low-pass filter that was applied, None for none."""
-    warnings: tuple[str, ...] = ()
-    """Warnings about the file; each names it."""
     shift: LoadShift = NO_SHIFT
     """Addition to every row, as errors are."""
 
     def wrench(self, time: Array, q: Array, pose: Pose) -> Wrench:
         """Return the wrench that acts at instants (S,) with the robot at q (S, n)."""
-        rows, load_frame = self._at(time), self.acts_on
+        rows, load_frame = rows_at(self.table, time), self.acts_on
         force, moment, point = rows[:, FORCE], rows[:, MOMENT], rows[:, POINT]
         if load_frame.in_world:
             moment = moment - np.cross(point, force)
@@ -92,24 +86,88 @@ class PlacedLoad:
         return Wrench(force, moment, point)
 
     def torque(self, model: Dynamics, time: Array, q: Array) -> Array:
-        """Return the joint torques τ_ie (S, n) that the load requires, in N·m or N."""
+        """Return the joint torques (S, n) that the wrench requires, in N·m or N."""
         force, moment, place = self.wrench(time, q, model_pose(model))
         found: Any = model.kinematics.load_torque(q, self.acts_on.frame.name, force, moment, at=place)
         return np.asarray(found)
 
+
+@dataclass(frozen=True, eq=False)
+class PlacedLoad:
+    """A load that a robot carries: a wrench from outside, or what a muscle does to the bodies it spans."""
+
+    name: str
+    wrenches: tuple[PlacedWrench, ...]
+    source: str
+    """Name of the file that it is from, "" for none."""
+    cutoff: float | None = None
+    """Cutoff in Hz of the low-pass filter that was applied, None for none."""
+    warnings: tuple[str, ...] = ()
+    """Warnings about the file; each names it."""
+    kind: Literal["load", "muscle", "actuator"] = "load"
+    efforts: Array | None = None
+    """Rows of time, then of generalized forces on the coordinates (S, 1 + n), in N·m or N;
+    None for none."""
+    is_inside: bool = False
+    """True if the wrenches are in balance, so that coordinates that move all bodies alike bear nothing."""
+
+    @cached_property
+    def joints(self) -> tuple[int, ...]:
+        """Index of the coordinates on which the load may act."""
+        moved = [frozenset(one.acts_on.joints) for one in self.wrenches]
+        found = frozenset[int]().union(*moved)
+        if self.is_inside and moved:
+            found -= moved[0].intersection(*moved)
+        given = [] if self.efforts is None else np.flatnonzero(self.efforts[:, 1:].any(axis=0)).tolist()
+        return tuple(sorted(found.union(given)))
+
+    @property
+    def is_muscle(self) -> bool:
+        """True for what acts between the bodies of the robot: muscles, and actuators of their file."""
+        return self.kind != "load"
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of the bodies on which it acts."""
+        return tuple(one.acts_on.frame.name for one in self.wrenches)
+
+    @property
+    def label(self) -> str:
+        """Name in figures, where a load on the foot differs from the foot's own share."""
+        return f"{self.kind} {self.name}"
+
+    def torque(self, model: Dynamics, time: Array, q: Array) -> Array:
+        """Return the joint torques τ_ie (S, n) that the load requires, in N·m or N."""
+        found = sum((one.torque(model, time, q) for one in self.wrenches), np.zeros_like(q))
+        if self.efforts is None:
+            return found
+        return found - self.effort(time)
+
+    def effort(self, time: Array) -> Array:
+        """Return the generalized forces (S, n) on the coordinates at instants (S,)."""
+        assert self.efforts is not None
+        return rows_at(self.efforts, time)[:, 1:]
+
+    def off_by(self, shift: LoadShift) -> "PlacedLoad":
+        """Return the load with its wrench off by a shift."""
+        return replace(self, wrenches=tuple(replace(one, shift=shift) for one in self.wrenches))
+
     def record(self) -> dict[str, Any]:
         """Return the load as plain data, to record in the outputs."""
-        body = self.acts_on.frame.name
-        return {"name": self.name, "body": body, "file": self.source, "cutoff": self.cutoff}
+        where: dict[str, Any] = (
+            {"kind": self.kind, "bodies": list(self.bodies)} if self.is_muscle else {"body": self.bodies[0]}
+        )
+        return {"name": self.name, **where, "file": self.source, "cutoff": self.cutoff}
 
-    def _at(self, time: Array) -> Array:
-        """Return the table's rows (S, 10) at instants, linear between its samples."""
-        own = self.table[:, 0]
-        low = max(0, int(np.searchsorted(own, time[0], side="right")) - 1)
-        some = self.table[low : int(np.searchsorted(own, time[-1])) + 1]
-        if len(self.table) == 1 or not len(some):
-            some = self.table[-1:]
-        return np.stack([np.interp(time, some[:, 0], column) for column in some.T], axis=1)
+
+def rows_at(table: Array, time: Array) -> Array:
+    """Return rows (S, columns) of a table at instants (S,), linear between those of its column 0."""
+    own = table[:, 0]
+    low = max(0, int(np.searchsorted(own, time[0], side="right")) - 1)
+    some = table[low : int(np.searchsorted(own, time[-1])) + 1]
+    if len(table) == 1 or not len(some):
+        some = table[-1:]
+    return np.stack([np.interp(time, some[:, 0], column) for column in some.T], axis=1)
 
 
 def model_pose(model: Dynamics) -> Pose:

@@ -13,7 +13,7 @@ from linkwise.analysis.disk_rows import collected
 from linkwise.analysis.even_time import even_rate, usual_step
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loads import FORCE, MOMENT, PARTS, POINT, WIDTH, WORLD, Load, LoadColumns, Loads
-from linkwise.analysis.loads.placed import LoadFrame, PlacedLoad, load_frame_of
+from linkwise.analysis.loads.placed import LoadFrame, PlacedLoad, PlacedWrench, load_frame_of
 from linkwise.analysis.logs import open_log
 from linkwise.analysis.opened_robot import OpenedRobot, named_body, told_apart
 from linkwise.analysis.samples import finite_blocks, slowness
@@ -126,8 +126,8 @@ def _given(load: Load, robot: OpenedRobot, motion: Array) -> PlacedLoad:
     _about_origin(load_frame, table)
     if load.time is not None:
         with within(f"load {load.name!r}"):
-            _check_time(table[:, 0], motion, 1)
-    return PlacedLoad(load.name, load_frame, table, "")
+            check_time(table[:, 0], motion, 1)
+    return PlacedLoad(load.name, (PlacedWrench(load_frame, table),), "")
 
 
 def _read(
@@ -155,7 +155,7 @@ def _read(
 
     table = collected(blocks(), WIDTH, buffer)
     with within(str(load.log)):
-        _check_time(table[:, 0], motion, log.first_row)
+        check_time(table[:, 0], motion, log.first_row)
         if cutoff is not None:
             mend = "for --loads-cutoff bring it to an even rate, in Hz such as"
             rate = even_rate(table[:, 0], log.first_row, strict=True, mend=mend)
@@ -163,7 +163,7 @@ def _read(
     noticed = (*log.warnings, *slowness(1 / usual_step(table[:, 0], log.first_row)))
     noticed += _far(load, table)
     warnings = (*load.warnings, *(f"{load.log.name}: {warning}" for warning in noticed))
-    return PlacedLoad(load.name, load_frame, table, load.log.name, cutoff, warnings)
+    return PlacedLoad(load.name, (PlacedWrench(load_frame, table),), load.log.name, cutoff, warnings)
 
 
 def _far(load: LoadColumns, table: Array) -> tuple[str, ...]:
@@ -180,7 +180,7 @@ def _about_origin(load_frame: LoadFrame, rows: Array) -> None:
         rows[:, MOMENT] += np.cross(rows[:, POINT], rows[:, FORCE])
 
 
-def _check_time(time: Array, motion: Array, first_row: int) -> None:
+def check_time(time: Array, motion: Array, first_row: int) -> None:
     """Raise LinkwiseError for time that runs back, has gaps, or does not cover the motion's."""
     if len(time) < 2:
         raise LinkwiseError(f"{len(time)} samples; a load over time has 2 or more")

@@ -66,7 +66,7 @@ def asked_phases(result: AnalysisResult, i: int) -> tuple[PlacedPhase, ...]:
     if result.phases:
         return result.phases
     robot, tree = result.robot, result.robot.package.manifest.tree
-    loads = [one for one in result.loads if i in one.acts_on.joints]
+    loads = [one for one in result.loads if not one.is_muscle and i in one.joints]
     held: list[int] = []
     if robot.contacts is not None and tree is not None:
         moved = [moving_joints(tree, robot.joint_of(one.frame)) for one in robot.contacts.contacts]
@@ -151,7 +151,7 @@ def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
         every(values)
         spread(beside)
     shown = require_samples(result, asked, [tally.count for tally in tallies])
-    labels, rows = _rows(causes, every, peaks > NOTHING * peaks.max(initial=0.0))
+    labels, rows = _rows(result, causes, every, peaks > NOTHING * peaks.max(initial=0.0))
     found = zip(tallies, spreads, strict=True) if shown == asked else [(every, spread)]
     numbers = (
         PhaseNumbers(phase, tally.mean(rows), tally.rms(rows), own.mean(rows), own.rms(rows))
@@ -160,17 +160,28 @@ def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
     return CauseNumbers(labels, tuple(numbers), apart)
 
 
-def _rows(causes: Sequence[Cause], every: _Tally, there: Array) -> tuple[tuple[str, ...], Array]:
-    """Return labels and rows, the largest cause over the movement first, small motions summed last."""
+def _rows(
+    result: AnalysisResult, causes: Sequence[Cause], every: _Tally, there: Array
+) -> tuple[tuple[str, ...], Array]:
+    """Return labels and rows, the largest cause over the movement first, small motions and muscles last."""
     alone = np.eye(1 + len(causes))
     sizes = every.rms(alone)[1:]
     order = sorted(np.flatnonzero(there).tolist(), key=lambda at: -float(sizes[at]))
-    motions = [at for at in order if causes[at].is_motion]
-    small = [motions[at] for at in largest_few(sizes[motions], MOST)[1]]
-    named = [at for at in order if at not in small]
+    muscles = [e for e, load in enumerate(result.loads) if load.is_muscle]
+    kinds = {
+        "motion of {} others": [at for at in order if causes[at].is_motion],
+        "{} other muscles": [
+            at for at in order if causes[at].kind == "load" and causes[at].number in muscles
+        ],
+    }
+    small = {
+        label: [some[at] for at in largest_few(sizes[some], MOST)[1]] for label, some in kinds.items() if some
+    }
+    named = [at for at in order if not any(at in some for some in small.values())]
     labels = ["all causes together", *(causes[at].label for at in named)]
     rows = [alone[0], *(alone[1 + at] for at in named)]
-    if small:
-        labels.append(f"motion of {len(small)} others")
-        rows.append(alone[[1 + at for at in small]].sum(axis=0))
+    for label, some in small.items():
+        if some:
+            labels.append(label.format(len(some)))
+            rows.append(alone[[1 + at for at in some]].sum(axis=0))
     return tuple(labels), np.array(rows)

@@ -8,6 +8,7 @@ import numpy as np
 
 from linkwise.analysis.joint_causes import are_motions_whole
 from linkwise.analysis.loads.placed import model_pose
+from linkwise.analysis.muscle_remainder import remainder_line
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import (
@@ -66,7 +67,7 @@ def view(result: AnalysisResult) -> dict[str, str]:
     }
 
 
-OFF_PAGE = (*TORQUE_OF, *FORCES, *GROUND, *INDUCED, *BY_POWER, *REACTIONS, *TRACED)
+OFF_PAGE = ("tau_before_muscles", *TORQUE_OF, *FORCES, *GROUND, *INDUCED, *BY_POWER, *REACTIONS, *TRACED)
 """Quantities that a page does not hold: power, the product of two that it holds, power by source, and those
 of contacts; of what `sourced` shows it holds sums."""
 
@@ -114,7 +115,12 @@ def page_data(result: AnalysisResult) -> str:
     data = {
         "robot": printable(robot.name),
         "log": printable(result.source),
-        "provenance": result.provenance,
+        "provenance": " · ".join(
+            filter(
+                None,
+                [result.provenance, result.markers.line if result.markers else "", remainder_line(result)],
+            )
+        ),
         "rate": result.rate,
         "samples": len(instants.time),
         "total": result.total,
@@ -197,10 +203,11 @@ def _bodies(result: AnalysisResult) -> dict[str, Any] | None:
 def _loads(result: AnalysisResult) -> list[dict[str, str]]:
     """Return the place and the force of each load at every sample shown, (samples, 3) each, in m and N."""
     pose = model_pose(result.robot.model)
-    wrenches = [borne.wrench(result.time, result.q, pose) for borne in result.loads]
+    outside = [borne for borne in result.loads if not borne.is_muscle]
+    wrenches = [borne.wrenches[0].wrench(result.time, result.q, pose) for borne in outside]
     return [
-        {"name": printable(label), "places": encoded(at.place), "forces": encoded(at.force)}
-        for label, at in zip(result.load_labels, wrenches, strict=True)
+        {"name": printable(borne.label), "places": encoded(at.place), "forces": encoded(at.force)}
+        for borne, at in zip(outside, wrenches, strict=True)
     ]
 
 
@@ -209,7 +216,8 @@ def _largest_forces(result: AnalysisResult) -> tuple[float, Array]:
     up, ground, pose = _upright(result), result.robot.contacts, model_pose(result.robot.model)
     force, pressed = 0.0, np.zeros(0 if ground is None else len(ground.names))
     for part in result.parts() if result.loads or ground is not None else ():
-        borne = [load.wrench(part.time, part.q, pose).force for load in result.loads]
+        outside = [load.wrenches[0] for load in result.loads if not load.is_muscle]
+        borne = [one.wrench(part.time, part.q, pose).force for one in outside]
         forces = part.contact_wrench[..., 3:]
         every = np.concatenate([*(one[:, None] for one in borne), forces], axis=1)
         force = max(force, float(np.linalg.norm(every, axis=-1).max(initial=0.0)))

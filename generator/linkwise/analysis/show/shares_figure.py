@@ -11,7 +11,7 @@ from linkwise.analysis.certain_signs import DEVIATIONS
 from linkwise.analysis.joint_causes import Cause, are_motions_whole, causes_of, certainty, sizes
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.bands import ADDED
-from linkwise.analysis.show.drawn_curves import new_figure, write_title
+from linkwise.analysis.show.drawn_curves import largest_few, new_figure, write_title
 from linkwise.arrays import Array, Mask
 from linkwise.escape import printable
 from linkwise.extras import extra
@@ -84,14 +84,35 @@ def _fixed(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
     own = [cause for cause in causes if cause.kind == "own"]
     named = [cause for cause in causes if cause.kind == "named"][1:]  # the first is grey
     tones = [*own, *(cause for cause in causes if cause.kind == "load"), *named]  # in the page's order
+    small = _small_muscles(result, found)
     out = []
     for one in found:
+        if one in small:
+            continue
         if one.cause.kind == "named" and one.cause not in named:
             out.append(one.part(GRAVITY, ""))
         else:
             fill = tone(len(result.robot.driven) + tones.index(one.cause))
             out.append(one.part(fill, HATCHES[one.cause.kind]))
+    if small:
+        sizes, spreads = (sum(getattr(one, what) for one in small) for what in ("sizes", "spreads"))
+        nothing = np.zeros(len(result.robot.driven), np.bool_)
+        label = f"{len(small)} other muscles, added up"
+        out.append(
+            SharePart(label, np.asarray(sizes), np.asarray(spreads), nothing, GRAVITY, HATCHES["load"])
+        )
     return out
+
+
+def _small_muscles(result: AnalysisResult, found: Sequence[_Sized]) -> list[_Sized]:
+    """Return the muscles but the largest, by the largest part that each is of what loads a joint."""
+    muscles = [
+        one for one in found if one.cause.kind == "load" and result.loads[one.cause.number or 0].is_muscle
+    ]
+    whole = np.sum([one.sizes for one in found], axis=0)
+    whole[whole == 0.0] = 1.0
+    _, small = largest_few([float((one.sizes / whole).max(initial=0.0)) for one in muscles], MUSCLES)
+    return [muscles[at] for at in small]
 
 
 def _each(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
@@ -158,6 +179,8 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     return figure
 
 
+MUSCLES = 8
+"""Muscles that have parts of their own; those of all others are added up."""
 UNSURE = "no certain sign"
 UNSURE_HATCH = "\\\\\\\\\\\\"
 WIDE = 140

@@ -1,0 +1,47 @@
+"""Recordings of markers, and of the plates beside them, as a user gives them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from linkwise.errors import LinkwiseError
+
+SUFFIXES = (".trc", ".c3d")
+PLATE_THRESHOLD = 20.0
+
+
+@dataclass(frozen=True)
+class MarkerChoices:
+    """Model of OpenSim whose markers are followed, and how markers and plates are read.
+
+    `tasks` is a file of OpenSim's inverse kinematics, a setup or its tasks, with weights. `plates` are
+    written NUMBER=BODY, `axes` X,UP: axes of the laboratory that are the model's x, and up. Wrenches of
+    plates whose force is below `threshold` in N count as nothing.
+
+    Raises LinkwiseError for what is not written so.
+    """
+
+    model: Path
+    tasks: Path | None = None
+    plates: tuple[str, ...] = ()
+    axes: str = ""
+    threshold: float = PLATE_THRESHOLD
+    cutoff: float | None = None
+    """Cutoff in Hz of the low-pass filter of plates; None for none."""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.threshold < float("inf"):
+            raise LinkwiseError(f"--plate-threshold {self.threshold:g}: give a force in N, 0 or more")
+        numbers = [number for number, _ in self.bodies]
+        if len(set(numbers)) < len(numbers):
+            raise LinkwiseError("--plate: a plate is given twice; it is under one body")
+
+    @property
+    def bodies(self) -> tuple[tuple[int, str], ...]:
+        """Number of each plate that is given, from 1, and the body on it."""
+        found = []
+        for text in self.plates:
+            number, sign, body = text.partition("=")
+            if not (sign and body and number.isdecimal() and int(number)):
+                raise LinkwiseError(f"--plate {text}: write it as NUMBER=BODY, plates counted from 1")
+            found.append((int(number), body))
+        return tuple(found)

@@ -1,0 +1,167 @@
+"""From markers to a log of joint coordinates, and from plates to loads."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from linkwise.analysis.filtering import lowpass
+from linkwise.analysis.loads import Load, Loads
+from linkwise.analysis.markers import SUFFIXES, MarkerChoices
+from linkwise.analysis.markers.c3d import RecordedC3D, read_c3d
+from linkwise.analysis.opensim.inverse_kinematics import MOTION, FollowedMarkers, inverse_kinematics
+from linkwise.analysis.opensim.own_opensim import asked_of_opensim
+from linkwise.analysis.settings import Lowpass
+from linkwise.arrays import Array
+from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
+from linkwise.input_file import require_file
+from linkwise.progress import Progress
+
+HEAD = (
+    *("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units"),
+    *("OrigDataRate", "OrigDataStartFrame", "OrigNumFrames"),
+)
+"""Names of the numbers in the third line of a .trc file."""
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerLog:
+    """A log that inverse kinematics made of markers, the loads of plates, and how well markers are met."""
+
+    log: Path
+    loads: Loads
+    followed: FollowedMarkers
+    source: str
+    told: tuple[str, ...]
+
+    @property
+    def line(self) -> str:
+        """Errors of the markers in a line."""
+        worst, when, largest = self._largest
+        total = float(np.nansum(self.followed.apart**2, axis=1).mean())
+        own, rms = self.followed, 1000 * self._rms(self.followed.apart)
+        met = f"{len(own.names)} markers are met within {rms:.3g} mm (root mean square)"
+        most = f"{1000 * largest:.3g} mm at most, {worst} at {when:.6g} s"
+        return f"{met}, {most}; total squared error {total:.3g} m² a frame"
+
+    def record(self) -> dict[str, Any]:
+        """Return the errors as plain data, in m."""
+        own, (worst, when, largest) = self.followed, self._largest
+        each = zip(own.names, own.apart.T, strict=True)
+        return {
+            "file": self.source,
+            "root_mean_square": self._rms(own.apart),
+            "total_squared": float(np.nansum(own.apart**2, axis=1).mean()),
+            "largest": {"marker": worst, "time": when, "error": largest},
+            "each": [
+                {"marker": name, "root_mean_square": self._rms(apart), "largest": float(np.nanmax(apart))}
+                for name, apart in each
+            ],
+            "lacking": list(own.lacking),
+            "unknown": list(own.unknown),
+        }
+
+    @property
+    def _largest(self) -> tuple[str, float, float]:
+        apart = np.nan_to_num(self.followed.apart)
+        s, m = np.unravel_index(int(apart.argmax()), apart.shape)
+        return self.followed.names[m], float(self.followed.time[s]), float(apart[s, m])
+
+    @staticmethod
+    def _rms(apart: Array) -> float:
+        return float(np.sqrt(np.nanmean(apart**2)))
+
+
+def followed(
+    log: Path, asked: MarkerChoices | None, loads: Loads, folder: Path, progress: Progress
+) -> MarkerLog | None:
+    """Return the log that OpenSim makes of a recording of markers; None where the log is none.
+
+    folder: where files may be written; progress: told of frames
+
+    Raises LinkwiseError for choices that go with other logs, a robot that is no model, and what OpenSim,
+    ezc3d or the files lack.
+    """
+    if log.suffix.lower() not in SUFFIXES:
+        if asked is not None and (asked.tasks or asked.plates or asked.axes):
+            raise LinkwiseError(f"--ik-tasks, --plate and --c3d-axes go with a log of markers; {log} is none")
+        return None
+    if asked is None or asked.model.suffix.lower() != ".osim":
+        raise LinkwiseError(f"{log}: markers are those of a model of OpenSim; give its .osim file as --robot")
+    require_file(log)
+    markers, told = log, []
+    if log.suffix.lower() == ".c3d":
+        recorded = read_c3d(log, asked.axes)
+        markers = folder / f"{log.stem}.trc"
+        _write_trc(markers, recorded)
+        told.append(f"{recorded.axes} of the laboratory are x of the model, and up")
+        given, notes = _plates(log, asked, recorded)
+        loads, told = replace(loads, given=(*loads.given, *given)), [*told, *notes]
+    elif asked.plates or asked.axes:
+        raise LinkwiseError(f"--plate and --c3d-axes go with a .c3d file; {log} has neither plates nor axes")
+    progress("inverse kinematics", 0, 1)
+    found = asked_of_opensim(
+        lambda osim: inverse_kinematics(osim, asked.model, markers, asked.tasks, folder), str(log)
+    )
+    progress("inverse kinematics", 1, 1)
+    for names, what in ((found.lacking, "not in the recording"), (found.unknown, "not in the model")):
+        told += [f"markers {what}: {listed(names)}"] if names else []
+    motion = folder / MOTION
+    motion.write_bytes(found.motion)
+    return MarkerLog(motion, loads, found, log.name, tuple(told))
+
+
+def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tuple[Load, ...], list[str]]:
+    """Return the loads of the plates that are given, and what is told of them and the others."""
+    bodies = dict(asked.bodies)
+    missing = [number for number in bodies if number > len(recorded.plates)]
+    if missing:
+        raise LinkwiseError(
+            f"{log}: --plate {missing[0]}: it has {len(recorded.plates)} plates, counted from 1"
+        )
+    found, told = [], []
+    for number, plate in enumerate(recorded.plates, 1):
+        most = float(np.linalg.norm(plate.force, axis=1).max(initial=0.0))
+        if number not in bodies:
+            if most > asked.threshold:
+                told.append(f"plate {number} bears up to {most:.4g} N and is left out; --plate {number}=BODY")
+            continue
+        if plate.is_turned:
+            told.append(f"plate {number}: its forces point down, as on the plate, and are turned round")
+        wrench = np.column_stack([plate.force, plate.moment])
+        wrench[np.linalg.norm(plate.force, axis=1) < asked.threshold] = 0.0
+        if asked.cutoff is not None:
+            rate = 1.0 / float(np.diff(recorded.plate_time[:2])[0])
+            lowpass(wrench, rate, Lowpass(asked.cutoff), flag="--loads-cutoff")
+        found.append(
+            Load(
+                f"plate {number}",
+                bodies[number],
+                wrench[:, :3],
+                wrench[:, 3:],
+                plate.place,
+                recorded.plate_time,
+                point_in="world",
+            )
+        )
+    return tuple(found), told
+
+
+def _write_trc(path: Path, recorded: RecordedC3D) -> None:
+    count, rate = len(recorded.time), 1.0 / float(np.diff(recorded.time).mean())
+    names = [name.rpartition(":")[2].replace("\t", " ") for name in recorded.names]
+
+    def lines() -> Iterator[str]:
+        yield f"PathFileType\t4\t(X/Y/Z)\t{path.name}"
+        yield "\t".join(HEAD)
+        yield f"{rate:.10g}\t{rate:.10g}\t{count}\t{len(names)}\tm\t{rate:.10g}\t1\t{count}"
+        yield "Frame#\tTime\t" + "\t\t\t".join(names) + "\t\t"
+        yield "\t\t" + "\t".join(f"{axis}{at}" for at in range(1, 1 + len(names)) for axis in "XYZ")
+        yield ""
+        for number, (time, places) in enumerate(zip(recorded.time, recorded.markers, strict=True), 1):
+            yield "\t".join([str(number), f"{time:.9g}", *(f"{x:.9g}" for x in places.ravel())])
+
+    path.write_text("\n".join(lines()) + "\n", encoding="utf-8")

@@ -1,0 +1,122 @@
+"""OpenSim's own inverse kinematics: coordinates that bring a model's markers closest to recorded ones."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from linkwise.arrays import Array
+from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
+
+MOTION, LOCATIONS = "inverse_kinematics.mot", "_ik_model_marker_locations.sto"
+FROM_FILE = 2
+"""Kind of a coordinate's task whose values are in a file."""
+ACCURACY = 1e-8
+"""OpenSim's usual 1e-5 ends its search up to 0.3 mrad from where markers are met exactly."""
+IN_METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedMarkers:
+    """The motion as a storage file, and how far markers are from where they were recorded."""
+
+    motion: bytes
+    time: Array
+    names: tuple[str, ...]
+    """Markers that model, recording and tasks have."""
+    apart: Array
+    """Distances (S, M) in m; NaN where a marker was not seen."""
+    lacking: tuple[str, ...]
+    """Markers of the model that the recording lacks."""
+    unknown: tuple[str, ...]
+    """Markers of the recording that the model lacks."""
+
+
+def inverse_kinematics(
+    osim: Any, model: Path, markers: Path, tasks: Path | None, folder: Path
+) -> FollowedMarkers:
+    """Return what the tool finds; osim: the module of OpenSim; folder: where it may write.
+
+    Raises LinkwiseError where model and recording share fewer than three markers.
+    """
+    opened = osim.Model(str(model))
+    opened.initSystem()
+    own = [opened.getMarkerSet().get(at).getName() for at in range(opened.getMarkerSet().getSize())]
+    time, there, places = _recorded(osim, markers)
+    names = [name for name in own if name in there]
+    if len(names) < 3:
+        raise LinkwiseError(
+            f"{markers.name}: {len(names)} of its markers are in {model}, which has {listed(own[:8])}; the"
+            f" recording has {listed(there[:8])}; name them alike"
+        )
+    tool = osim.InverseKinematicsTool()
+    tool.setModel(opened)
+    tool.set_IKTaskSet(_tasks(osim, tasks, names))
+    tool.setMarkerDataFileName(str(markers))
+    tool.set_accuracy(ACCURACY)
+    tool.setStartTime(float(time[0]))
+    tool.setEndTime(float(time[-1]))
+    tool.setOutputMotionFileName(str(folder / MOTION))
+    tool.setResultsDir(str(folder))
+    tool.set_report_marker_locations(True)
+    tool.set_report_errors(False)
+    tool.run()
+    files = sorted(folder.glob(f"*{LOCATIONS}"))
+    if not files or not (folder / MOTION).is_file():
+        raise LinkwiseError(f"{markers.name}: OpenSim's inverse kinematics ends without a motion")
+    found = osim.TimeSeriesTable(str(files[0]))
+    labels, rows = list(found.getColumnLabels()), found.getMatrix().to_numpy().copy()
+    used = [name for name in names if f"{name}_tx" in labels]
+    at = [[labels.index(f"{name}_t{axis}") for axis in "xyz"] for name in used]
+    when = np.asarray(found.getIndependentColumn(), dtype=float)
+    row = np.searchsorted(time, when - 1e-9)
+    given = places[row][:, [there.index(name) for name in used]]
+    return FollowedMarkers(
+        (folder / MOTION).read_bytes(),
+        when,
+        tuple(used),
+        np.linalg.norm(rows[:, np.array(at)] - given, axis=2),
+        tuple(name for name in own if name not in there),
+        tuple(name for name in there if name not in own),
+    )
+
+
+def _recorded(osim: Any, markers: Path) -> tuple[Array, list[str], Array]:
+    """Return time (S,), names, and places (S, M, 3) in m."""
+    table = osim.TimeSeriesTableVec3(str(markers))
+    names = list(table.getColumnLabels())
+    unit = table.getTableMetaDataString("Units") if table.hasTableMetaDataKey("Units") else "m"
+    if unit not in IN_METRES:
+        raise LinkwiseError(f"{markers.name}: its unit is {unit!r}; lengths are read in {listed(IN_METRES)}")
+    flat = table.flatten()  # which its matrix does not keep
+    rows = flat.getMatrix().to_numpy().copy()
+    time = np.asarray(table.getIndependentColumn(), dtype=float)
+    return time, names, IN_METRES[unit] * rows.reshape(len(time), len(names), 3)
+
+
+def _tasks(osim: Any, tasks: Path | None, names: list[str]) -> Any:
+    """Return the tasks of a file, or every marker with the weight 1."""
+    if tasks is not None:
+        kind = osim.OpenSimObject.makeObjectFromFile(str(tasks)).getConcreteClassName()
+        if kind not in ("InverseKinematicsTool", "IKTaskSet"):
+            raise LinkwiseError(
+                f"{tasks}: it is a {kind}; give a setup of inverse kinematics, or its IKTaskSet"
+            )
+        given = osim.IKTaskSet(str(tasks)) if kind == "IKTaskSet" else osim.InverseKinematicsTool(str(tasks))
+        found = given if kind == "IKTaskSet" else given.getIKTaskSet()
+        every = [osim.IKCoordinateTask.safeDownCast(found.get(at)) for at in range(found.getSize())]
+        if any(one is not None and one.getApply() and one.getValueType() == FROM_FILE for one in every):
+            raise LinkwiseError(
+                f"{tasks}: a coordinate follows a file, which is not read; leave that task out"
+            )
+        return found.clone()
+    made = osim.IKTaskSet()
+    for name in names:
+        task = osim.IKMarkerTask()
+        task.setName(name)
+        task.setWeight(1.0)
+        task.setApply(True)
+        made.cloneAndAppend(task)
+    return made

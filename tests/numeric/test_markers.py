@@ -1,0 +1,214 @@
+"""From markers and plates to torques: OpenSim's inverse kinematics, and C3D files that ezc3d writes."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.answers import relative_error
+from helpers.command_line import run_linkwise
+from helpers.muscled_leg import COORDINATES, built, motion, write_sto
+from linkwise import Analysis, Load, MarkerChoices, kept_package
+from linkwise.analysis import Lowpass, Processing, analyze
+from linkwise.errors import LinkwiseError
+
+pytest.importorskip(
+    "opensim", reason="needs opensim, which has wheels for Linux on x86-64: pip install opensim"
+)
+import opensim as osim
+
+ezc3d: Any = pytest.importorskip("ezc3d")
+
+LAB = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""From the model's axes, y up, to those of a laboratory, z up."""
+PLATE = np.diag([1.0, -1.0, -1.0])
+"""From the laboratory's axes to those of the plate, whose z points down, and back."""
+SMOOTH = Processing(lowpass=Lowpass(8.0))
+
+
+class Walk:
+    """A known motion of the leg, its markers and what the ground gives to the foot."""
+
+    def __init__(self, folder: Path) -> None:
+        osim.Logger.removeFileSink()
+        osim.Logger.setLevelString("Off")
+        self.folder, self.file = folder, folder / "leg.osim"
+        built(osim, self.file)
+        self.time, self.q = motion(121)
+        write_sto(folder / "known.sto", COORDINATES, self.time, self.q)
+        self.names, self.markers = self._seen()
+        swing = np.sin(4 * self.time)
+        self.force = np.column_stack([20 * swing, 600 + 50 * swing, 10 * swing])
+        self.centre = np.column_stack([0.1 + 0.02 * swing, 0 * swing, 0.05 + 0.01 * swing])
+        self.free = np.column_stack([0 * swing, 2 + swing, 0 * swing])
+
+    def _seen(self) -> tuple[list[str], np.ndarray]:
+        model = osim.Model(str(self.file))
+        state = model.initSystem()
+        there = [model.getMarkerSet().get(at) for at in range(model.getMarkerSet().getSize())]
+        found = []
+        for q in self.q:
+            for name, value in zip(COORDINATES, q, strict=True):
+                model.getCoordinateSet().get(name).setValue(state, float(value), False)
+            model.realizePosition(state)
+            found.append([one.getLocationInGround(state).to_numpy() for one in there])
+        return [one.getName() for one in there], np.array(found)
+
+    def known(self, **more: Any) -> Analysis:
+        return analyze(self.folder / "known.sto", kept_package(self.file), processing=SMOOTH, **more)
+
+    def followed(self, log: Path, *plates: str, **more: Any) -> Analysis:
+        choices = MarkerChoices(self.file, plates=plates, **more)
+        return analyze(log, kept_package(self.file), processing=SMOOTH, markers=choices)
+
+    def load(self) -> Load:
+        """What the plate gives to the foot, at its centre of pressure."""
+        return Load("plate 1", "foot", self.force, self.free, self.centre, self.time, point_in="world")
+
+    def c3d(self, path: Path, sign: float = 1.0, screen: bool = True, names: list[str] | None = None) -> None:
+        """Write markers in mm and a plate of type 2, in a laboratory whose z is up; sign: of its forces."""
+        file, points, count = ezc3d.c3d(), file_points(self.markers), len(self.time)
+        file["parameters"]["POINT"]["RATE"]["value"] = [100.0]
+        file["parameters"]["POINT"]["LABELS"]["value"] = names or self.names
+        file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+        if screen:
+            file.add_parameter("POINT", "X_SCREEN", ["+X"])
+            file.add_parameter("POINT", "Y_SCREEN", ["+Z"])
+        file["data"]["points"] = points
+        force, free, centre = (a @ LAB.T for a in (self.force, self.free, self.centre))
+        middle, below = np.array([0.2, 0.1, 0.0]), np.array([0.0, 0.0, -0.04])
+        moment = free + np.cross(centre - middle - below, force)
+        channels = sign * np.concatenate([force @ PLATE, 1000 * moment @ PLATE], axis=1).T
+        for name, value in {
+            "LABELS": ["Fx", "Fy", "Fz", "Mx", "My", "Mz"],
+            "UNITS": ["N", "N", "N", "Nmm", "Nmm", "Nmm"],
+            "SCALE": [1.0] * 6,
+            "OFFSET": [0] * 6,
+            "RATE": [100.0],
+        }.items():
+            file["parameters"]["ANALOG"][name]["value"] = value
+        file["data"]["analogs"] = channels.reshape(1, 6, count)
+        corners = 1000 * middle[:, None] + np.array([[200, -200, -200, 200], [-100, -100, 100, 100], [0] * 4])
+        for name, value in {
+            "USED": np.array([1]),
+            "TYPE": np.array([2]),
+            "ZERO": np.array([0, 0]),
+            "CORNERS": corners[:, :, None].astype(float),
+            "ORIGIN": -1000 * PLATE @ below[:, None],  # from where moments are taken to the surface
+            "CHANNEL": np.arange(1, 7)[:, None],
+        }.items():
+            file["parameters"]["FORCE_PLATFORM"][name]["value"] = value
+        file.write(str(path))
+
+
+def file_points(markers: np.ndarray) -> np.ndarray:
+    """Markers (S, M, 3) in m as a C3D file has them: (4, M, S) in mm."""
+    found = np.ones((4, markers.shape[1], len(markers)))
+    found[:3] = 1000 * np.moveaxis(markers @ LAB.T, 0, 2).transpose(1, 0, 2)
+    return found
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Walk:
+    made = Walk(tmp_path_factory.mktemp("markers"))
+    made.c3d(made.folder / "walk.c3d")
+    return made
+
+
+def test_markers_and_a_plate_give_the_torques_of_the_known_motion(walk: Walk) -> None:
+    found, wanted = walk.followed(walk.folder / "walk.c3d", "1=foot"), walk.known(loads=[walk.load()])
+    assert found.time == pytest.approx(wanted.time)
+    assert np.abs(found.q - wanted.q).max() < 1e-4
+    assert relative_error(found.load_torque, wanted.load_torque) < 1e-3
+    inside = slice(6, -6)  # one-sided derivatives magnify what single precision of the file rounds
+    assert relative_error(found.torque[inside], wanted.torque[inside]) < 1e-3
+    assert np.abs(wanted.torque).max() > 100.0
+
+
+def test_forces_on_the_plate_are_turned_round(walk: Walk, tmp_path: Path) -> None:
+    walk.c3d(tmp_path / "down.c3d", sign=-1.0)
+    found, wanted = walk.followed(tmp_path / "down.c3d", "1=foot"), walk.known(loads=[walk.load()])
+    assert relative_error(found.load_torque, wanted.load_torque) < 1e-3
+    assert any("are turned round" in warning for warning in found.warnings)
+
+
+def test_errors_of_markers_are_told(walk: Walk, tmp_path: Path) -> None:
+    names = list(walk.names)
+    names[0] = "heel"  # a marker that the model lacks
+    walk.c3d(tmp_path / "named.c3d", names=names)
+    result = walk.followed(tmp_path / "named.c3d")
+    told = result.record()["markers"]
+    assert told["lacking"] == [walk.names[0]]
+    assert told["unknown"] == ["heel"]
+    assert told["root_mean_square"] < 1e-4
+    assert {one["marker"] for one in told["each"]} == {*walk.names[1:]}
+    assert any("plate 1 bears up to" in warning for warning in result.warnings)
+    moved = walk.markers.copy()
+    walk.markers[30, 4, 2] += 0.03  # 3 cm out of the leg's plane, where no joint follows
+    try:
+        walk.c3d(tmp_path / "off.c3d")
+    finally:
+        walk.markers[:] = moved
+    largest = walk.followed(tmp_path / "off.c3d").record()["markers"]["largest"]
+    assert largest["marker"] == walk.names[4]
+    assert largest["time"] == pytest.approx(0.3)
+    assert largest["error"] == pytest.approx(0.03, rel=0.05)
+
+
+def test_weights_are_those_of_a_file(walk: Walk, tmp_path: Path) -> None:
+    tasks = osim.IKTaskSet()
+    for name in walk.names:
+        task = osim.IKMarkerTask()
+        task.setName(name)
+        task.setWeight(1e-9 if name == "foot0" else 1.0)
+        tasks.cloneAndAppend(task)
+    tasks.printToXML(str(tmp_path / "tasks.xml"))
+    held = walk.markers.copy()
+    walk.markers[:, walk.names.index("foot0"), 0] += 0.05
+    try:
+        walk.c3d(tmp_path / "off.c3d")
+    finally:
+        walk.markers[:] = held
+    wanted, there = walk.known().q, walk.followed(tmp_path / "off.c3d", tasks=tmp_path / "tasks.xml").q
+    assert np.abs(there - wanted).max() < 1e-4
+    assert np.abs(walk.followed(tmp_path / "off.c3d").q - wanted).max() > 0.01
+    with pytest.raises(LinkwiseError, match="it is a Model; give a setup of inverse kinematics"):
+        walk.followed(tmp_path / "off.c3d", tasks=walk.file)
+
+
+def test_a_trc_file_is_analysed_by_the_command(walk: Walk, tmp_path: Path) -> None:
+    table = osim.TimeSeriesTableVec3()
+    table.setColumnLabels(walk.names)
+    for time, places in zip(walk.time, walk.markers, strict=True):
+        table.appendRow(float(time), osim.RowVectorVec3([osim.Vec3(*map(float, at)) for at in places]))
+    table.addTableMetaDataString("DataRate", "100")
+    table.addTableMetaDataString("Units", "m")
+    osim.TRCFileAdapter.write(table, str(tmp_path / "walk.trc"))
+    out = tmp_path / "out"
+    told = run_linkwise(
+        *("analyze", tmp_path / "walk.trc", "--robot", walk.file, "--out", out, "--cutoff", "8", "--no-page"),
+        folder=tmp_path,
+    )
+    assert told.returncode == 0, told.stderr
+    assert f"{len(walk.names)} markers are met within" in told.stdout
+    assert (out / "inverse_kinematics.mot").is_file()
+    assert json.loads((out / "analysis.json").read_text())["markers"]["file"] == "walk.trc"
+
+
+def test_what_does_not_say_all_is_refused_in_a_line(walk: Walk, tmp_path: Path) -> None:
+    walk.c3d(tmp_path / "mute.c3d", screen=False)
+    with pytest.raises(LinkwiseError, match=r"give --c3d-axes \+X,\+Z"):
+        walk.followed(tmp_path / "mute.c3d")
+    assert walk.followed(tmp_path / "mute.c3d", axes="+X,+Z").total == len(walk.time)
+    with pytest.raises(LinkwiseError, match="--plate 2: it has 1 plates"):
+        walk.followed(walk.folder / "walk.c3d", "2=foot")
+    with pytest.raises(LinkwiseError, match="write it as NUMBER=BODY"):
+        walk.followed(walk.folder / "walk.c3d", "foot")
+    with pytest.raises(LinkwiseError, match="go with a log of markers"):
+        walk.followed(walk.folder / "known.sto", "1=foot")
+    with pytest.raises(LinkwiseError, match=r"give its \.osim file as --robot"):
+        analyze(walk.folder / "walk.c3d", kept_package(walk.file))
+    (tmp_path / "broken.c3d").write_bytes(b"\x00" * 600)
+    with pytest.raises(LinkwiseError, match="ezc3d does not read it"):
+        walk.followed(tmp_path / "broken.c3d")
