@@ -73,6 +73,14 @@ CLOSED_AT_FEW = f"{SAMPLES} samples of each block, all terms computed there"
 """Samples at which sums close, where columns that were not asked for are computed of these alone."""
 
 
+def closed_at(result: AnalysisResult) -> str:
+    """Return the samples at which sums close, in words."""
+    if not result.rows.left_out:
+        return "every sample"
+    apart = "" if result.closure.nets_relative is None else "; net torques by cause of every sample"
+    return f"{CLOSED_AT_FEW}{apart}"
+
+
 def record(result: AnalysisResult) -> dict[str, Any]:
     """Return everything but the samples as plain data: choices, closure, columns and their totals."""
     robot = result.robot
@@ -99,7 +107,7 @@ def record(result: AnalysisResult) -> dict[str, Any]:
         **({} if result.cutoff_sweep is None else {"cutoff_sweep": result.cutoff_sweep.record()}),
         "asked_columns": list(result.asked_columns),
         "closure": asdict(result.closure),
-        "closure_is_of": CLOSED_AT_FEW if result.rows.left_out else "every sample",
+        "closure_is_of": closed_at(result),
         **({} if result.closed is None else {"constraints": _constraints(result, result.closed)}),
         **({} if robot.contacts is None else {"contacts": _contacts(result)}),
         "work": _work(result),

@@ -14,7 +14,7 @@ from linkwise.escape import listed
 
 def not_asked_for(quantities: Sequence[str]) -> LinkwiseError:
     """Return an error that says which preset of columns has what was not computed."""
-    preset = next(name for name in ("sums", "causes", "all") if {*quantities} <= {*PRESETS[name]})
+    preset = next(name for name in ("sums", "by-cause", "causes", "all") if {*quantities} <= {*PRESETS[name]})
     return LinkwiseError(
         f"columns left out what this is made of ({listed(quantities)}); it is there with columns {preset!r}"
     )
