@@ -1,11 +1,14 @@
 """Columns of a result that were asked for: by presets, and by patterns of their names."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from linkwise.analysis.column_patterns import fitting, matching
-from linkwise.analysis.net_causes import NET
+from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.net_causes import NET, net_causes, net_places
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_quantities import FORCES, PASSIVE, POWER_TERMS, TERMS, TORQUE_OF
 from linkwise.analysis.result_rows import DEVIATION, OF_MOTION, Place, ResultRows
 from linkwise.arrays import Index
@@ -28,8 +31,8 @@ FLAG = f"--columns, which takes {', '.join(PRESETS)}, or columns,"
 def chosen_rows(rows: ResultRows, asked: Sequence[str], power_terms: bool) -> Index:
     """Return the numbers of the rows that presets and patterns choose, ascending; all where none are given.
 
-    A power comes with the torque that it is made of, a net torque with its joint's, a deviation with what it is
-    of, and this with it.
+    A power comes with the torque that it is made of, a net torque with that of the joint, a deviation with
+    what it is of, and this with it.
     power_terms: whether powers by cause and order are asked for otherwise
 
     Raises LinkwiseError for a pattern that fits no column.
@@ -52,14 +55,43 @@ def computed_rows(rows: ResultRows, asked: Sequence[str], power_terms: bool) -> 
     return _rows_of(rows, asked, power_terms, set().union(*fits))
 
 
-def net_rows(rows: ResultRows, asked: Sequence[str], every: bool) -> list[Place]:
-    """Return the places among rows of net torques that are asked for; none where none is.
+class ChosenPlaces(NamedTuple):
+    """Places of torques that are computed."""
 
-    every: whether all of them are computed once any is, as where all other torques are
+    torques: Sequence[Place]
+    nets: Sequence[Place]
+    """Net torques by cause that are computed too."""
+    every_net: Sequence[Place]
+    left_out: frozenset[str]
+    """Quantities of which places are left out."""
+
+
+def chosen_places(
+    robot: OpenedRobot,
+    every: Sequence[Place],
+    loads: Sequence[PlacedLoad],
+    computed: Sequence[str],
+    asked: Sequence[str],
+    power_terms: bool,
+) -> ChosenPlaces:
+    """Return which of all places of torques are computed, and of net torques by cause.
+
+    computed, asked: presets and patterns of torques and of net torques; the latter are none unless asked for
     """
+    every_net = net_places(net_causes(robot, len(loads)), every)
+    rows = computed_rows(ResultRows.of(robot, every, loads), computed, power_terms)
+    nets = _nets(ResultRows.of(robot, every_net, loads), asked, len(rows) == len(every))
+    kept = {*(every[row] for row in rows.tolist()), *(("tau", at[:1]) for _, at in nets)}
+    left_out = frozenset(name for name, at in every if (name, at) not in kept)
+    left_out |= {NET} if 0 < len(nets) < len(every_net) else set()
+    return ChosenPlaces([place for place in every if place in kept], nets, every_net, left_out)
+
+
+def _nets(rows: ResultRows, asked: Sequence[str], is_whole: bool) -> list[Place]:
+    """Return the places of net torques that are asked for; all if any is and all torques are computed."""
     names = [column.name for column in rows.columns]
     fits = set().union(*(matching(names, one.removeprefix(DEVIATION)) for one in _patterns(asked)))
-    if any(NET in PRESETS.get(one, ()) for one in asked) or (every and fits):
+    if any(NET in PRESETS.get(one, ()) for one in asked) or (is_whole and fits):
         return list(rows.places)
     return [place for place, name in zip(rows.places, names, strict=True) if name in fits]
 

@@ -1,14 +1,17 @@
 """Rows of net torques by cause, summed from packed values without rows of every link."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from linkwise.analysis.net_causes import NET, NetCause
+from linkwise.analysis.closing_sums import ClosingSums
+from linkwise.analysis.net_causes import NET, NetCause, net_causes
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_quantities import MOTION
-from linkwise.analysis.result_rows import ResultRows
+from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.row_sums import RowSums
 from linkwise.analysis.term_rows import TermArrays
 from linkwise.analysis.turned_rows import TURNED, turned
@@ -31,6 +34,27 @@ class NetTorques:
     terms: TermArrays
     """Joint, link, coordinate where there is one, and place among packed values, of each kind of term."""
     rows: ResultRows
+    whole: ClosingSums
+    """Net torques of each joint's torque that is told with all of them."""
+
+    @classmethod
+    def of(
+        cls, robot: OpenedRobot, loads: int, terms: TermArrays, rows: ResultRows, every: Sequence[Place]
+    ) -> "NetTorques":
+        """Return what fills these rows.
+
+        loads: how many loads there are; every: places of all net torques, also of those without a row
+        """
+        told = {tuple(at) for _, at in rows[NET].listed()}
+        missing = {at[0] for _, at in every if at not in told}
+        joints = {at[0] for at in told} - missing
+        sums = ClosingSums(robot.units, rows, "tau", NET, joints=joints)
+        return cls(net_causes(robot, loads), terms, rows, sums)
+
+    @property
+    def closing_sums(self) -> dict[str, ClosingSums]:
+        """Sums of net torques that are held to joint torques, if there are any."""
+        return {"nets": self.whole} if self.whole.sums else {}
 
     @property
     def are_asked(self) -> bool:

@@ -59,11 +59,11 @@ class Column:
     """A row as a column of a table; `joint`, `link` and `cause` are indices, None where they mean nothing.
 
     The cause is a coordinate; for a share with a name it is that share, for the torque of a load that load,
-    for share and power of a contact that contact, and for a force or slip the row of the constraint, where
-    `load` is the load that causes a force,
-    if one does, and for a net torque its number among all causes. An induced acceleration has the number of its point and of a row of that point, a reaction
-    that of its joint among those asked for, and of a component of the wrench; the gain of energy has the
-    holder of that energy, a link or, behind these, a joint's armature, and what is traced its source.
+    for share and power of a contact that contact, for a net torque its number among all causes, and for a
+    force or slip the row of the constraint, where `load` is the load that causes a force, if one does. An
+    induced acceleration has the number of its point and of a row of that point, a reaction that of its joint
+    among those asked for, and of a component of the wrench; the gain of energy has the holder of that energy,
+    a link or, behind these, a joint's armature, and what is traced its source.
     """
 
     quantity: str

@@ -9,7 +9,7 @@ import numpy as np
 from linkwise_runtime.motion.tracer import TraceState
 
 from linkwise.analysis.borne_joints import ReactionShares
-from linkwise.analysis.chosen_columns import computed_rows, net_rows
+from linkwise.analysis.chosen_columns import chosen_places
 from linkwise.analysis.closed_motion import reason_of
 from linkwise.analysis.closing_sums import ClosingSums, closing
 from linkwise.analysis.contacts.ground import Standing
@@ -19,7 +19,7 @@ from linkwise.analysis.deviation_rows import DeviationRows
 from linkwise.analysis.induced_power import PowerShares
 from linkwise.analysis.induced_shares import InducedShares
 from linkwise.analysis.loads.placed import LoadShift, PlacedLoad
-from linkwise.analysis.net_causes import NET, net_causes, net_places
+from linkwise.analysis.net_causes import NET
 from linkwise.analysis.net_torques import NetTorques
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.reaction_forces import ReactionForces
@@ -72,8 +72,6 @@ class Decomposer:
     wholes: ClosingSums
     """Parts of each τ_i: τ_ij, passive torques of the joint, τ_ie."""
     nets: NetTorques
-    net_sums: ClosingSums
-    """Net torques by cause of each τ_i that is told with all of them."""
     induced: InducedShares
     power: PowerShares
     forces: ReactionForces
@@ -103,20 +101,13 @@ class Decomposer:
             of_robot = terms.rows
         measured = [] if times is None else [at for at, loads in enumerate(times.measured) if loads]
         every_place = torque_places(robot, of_robot, loads, told.power_terms, measured)
-        causes, points = net_causes(robot, len(loads)), told.induced.points
-        every_net = net_places(causes, every_place)
-        chosen = computed_rows(ResultRows.of(robot, every_place, loads), told.columns, told.power_terms)
-        is_whole = len(chosen) == len(every_place)
-        nets = net_rows(ResultRows.of(robot, every_net, loads), told.asked, is_whole)
-        kept = {*(every_place[row] for row in chosen.tolist()), *(("tau", at[:1]) for _, at in nets)}
-        places = [place for place in every_place if place in kept]
-        left_out = frozenset(name for name, _ in {*every_place} - {*places})
-        left_out |= {NET} if 0 < len(nets) < len(every_net) else set()
+        chosen = chosen_places(robot, every_place, loads, told.columns, told.asked, told.power_terms)
+        places, points, left_out = [*chosen.torques], told.induced.points, chosen.left_out
         sources = _sources(of_robot, places)
         induced = InducedShares.of(robot, told.induced, ResultRows.of(robot, places, loads))
         reactions = ReactionShares(robot, tuple(told.borne), tuple(loads), convention)
         traced = told.traced
-        places += [*nets, *induced.places]
+        places += [*chosen.nets, *induced.places]
         sums = ResultRows.of(robot, places, loads, points)
         power = PowerShares.of(robot, loads, sums, told.induced_power)
         velocities = [at for at in places if at[0] == "tau_qd"]
@@ -128,12 +119,10 @@ class Decomposer:
         rows = ResultRows.of(robot, every, loads, points, bearings, origins, left_out)
         parts = ClosingSums(robot.units, rows, "tau_link", *TERMS)
         wholes = ClosingSums(robot.units, rows, "tau", "tau_link", *PASSIVE, "tau_load")
-        whole_joints = {i for i in robot.driven if {at for at in every_net if at[1][0] == i} <= {*nets}}
-        net_sums = ClosingSums(robot.units, rows, "tau", *((NET,) if nets else ()), joints=whole_joints)
+        nets = NetTorques.of(robot, len(loads), of_robot, rows, chosen.every_net)
         forces = ReactionForces(robot, tuple(loads), times)
         return cls(
-            *(robot, tuple(loads), convention, rows, sources, parts, wholes),
-            *(NetTorques(causes, of_robot, rows), net_sums),
+            *(robot, tuple(loads), convention, rows, sources, parts, wholes, nets),
             *(induced, power, forces, reactions),
             *(deviations.of_rows(rows), times, terms, traced),
             cls.of(robot, convention, loads, times) if left_out else None,
@@ -209,8 +198,7 @@ class Decomposer:
             values = getattr(packed, kind, None)
             spread(out, rows[name].rows, values, places, (moved, rows[name].at[:, 2]))
         sums = {"terms": self.parts, "links": self.wholes} if self.whole is None else {}
-        sums |= {"nets": self.net_sums} if self.net_sums.sums and self.nets.are_asked else {}
-        closure |= closing(sums, out, partial, self.robot.units)
+        closure |= closing({**sums, **self.nets.closing_sums}, out, partial, self.robot.units)
         self._fill_gradient(out, packed, standing, motion)
         self._fill_power(out, qd)
         self.deviations.fill(out, self, time, motion)
