@@ -33,6 +33,7 @@ SAMPLES = 12_001
 CROWD = tuple(f"j{i}" for i in range(14))
 """Joints of which bars have but some."""
 BOTH = ("acceleration", "velocity")
+MOTION = ("motion",)
 WORDS = {"acceleration": "tau_qdd", "velocity": "tau_qd", "motion": "tau_q(?:dd|d)"}
 Shares = dict[str, NDArray[np.float64]]
 """Mean size of each cause on each joint, (joints,)."""
@@ -126,10 +127,10 @@ def crowd_of(joints: tuple[str, ...], analysis: Analysis) -> Analysis:
 
 
 def test_links_cancel_here_so_that_their_sizes_would_tell_another_cause(columns: Columns) -> None:
-    net = columns.sizes(BOTH)
+    net = columns.sizes(MOTION)
     apart = {cause: np.abs(columns.curve("joint1", cause)).mean(axis=1).sum() for cause in net}
     assert max(apart, key=lambda cause: apart[cause]) == "gravity"
-    assert largest_first(net, 0)[0] == "joint1 acceleration"
+    assert largest_first(net, 0)[0] == "joint1 motion"
 
 
 def bars(figure: Any, panel: int) -> Shares:
@@ -149,7 +150,7 @@ def assert_same(found: Shares, expected: Shares) -> None:
 def test_the_figure_has_mean_sizes_of_net_torques(place: Path, analysis: Analysis, columns: Columns) -> None:
     figure = analysis.figure("shares")
     for panel in (0, 1):
-        sizes = columns.sizes(BOTH, gravity=panel == 0)
+        sizes = columns.sizes(MOTION, gravity=panel == 0)
         assert_same(bars(figure, panel), percent(sizes))
         assert figure.axes[panel].get_xlabel() == "mean size of the net torque, % of all"
     assert (place / "out" / "shares.png").read_bytes() == figure_png(analysis, "shares")
@@ -162,19 +163,8 @@ def notebook(result: Analysis) -> list[tuple[str, str]]:
     return [(row[-4], row[-3]) for row in cells]
 
 
-@pytest.mark.parametrize(
-    ("are_many", "words"), [(False, BOTH), (True, ("motion",))], ids=["apart", "together"]
-)
-def test_the_notebook_says_the_largest_of_the_figures_parts(
-    analysis: Analysis,
-    columns: Columns,
-    monkeypatch: pytest.MonkeyPatch,
-    are_many: bool,
-    words: tuple[str, ...],
-) -> None:
-    if are_many:
-        monkeypatch.setattr("linkwise.analysis.joint_causes.FEW", 2)
-    share = percent(columns.sizes(words))
+def test_the_notebook_says_the_largest_of_the_figures_parts(analysis: Analysis, columns: Columns) -> None:
+    share = percent(columns.sizes(MOTION))
     assert_same(bars(analysis.figure("shares"), 0), share)
     first = [largest_first(share, i)[0] for i in range(3)]
     assert notebook(analysis) == [(cause, f"{share[cause][i]:.0f} %") for i, cause in enumerate(first)]
@@ -241,12 +231,12 @@ def page_table(page: Any) -> dict[str, float]:
 @pytest.mark.parametrize(
     ("chosen", "words", "gravity"),
     [
-        ({}, BOTH, True),
-        ({"motion": "together"}, ("motion",), True),
-        ({"order": "movement"}, BOTH, False),
+        ({}, MOTION, True),
+        ({"motion": "apart"}, BOTH, True),
+        ({"motion": "apart", "order": "movement"}, BOTH, False),
         ({"order": "tau_qd"}, ("velocity",), False),
-        ({"link": 1}, BOTH, True),
-        ({"link": 2, "motion": "together", "order": "movement"}, ("motion",), False),
+        ({"link": 1}, MOTION, True),
+        ({"link": 2, "order": "movement"}, MOTION, False),
     ],
     ids=str,
 )
@@ -258,8 +248,9 @@ def test_bars_and_table_of_the_page_are_those_of_all_samples(
         choose(driver, name, value)
     link = f"link{int(str(chosen['link'])) + 1}" if "link" in chosen else "[^/]+"
     sizes = columns.sizes(words, link, gravity)
-    with np.errstate(invalid="ignore"):
-        share = {cause: np.nan_to_num(values) for cause, values in percent(sizes).items()}
+    with np.errstate(invalid="ignore"):  # a view of parts counts in no share
+        counted = columns.sizes(MOTION, link, gravity) if words == BOTH else sizes
+        share = {cause: np.nan_to_num(values) for cause, values in percent(counted).items()}
     assert_same(page_bars(driver), share)
     through = "all links together" if "link" not in chosen else f"through {link}"
     said = f"net torque, {through}, over all 12,001 samples"
@@ -327,6 +318,7 @@ def test_bars_of_many_joints_are_the_same_on_the_page(
         assert hover == [f"{joint} {word}" for joint in first]
         caption = driver.find_element("id", "shares-caption").text
         assert caption.endswith("Of all other joints the shares are added up.")
+        assert ("A motion is acceleration and velocity together." in caption) == (word == "motion")
     assert driver.get_log("browser") == []
 
 

@@ -13,7 +13,7 @@ from linkwise_runtime.named_arrays import Part, dataset
 from linkwise_runtime.version import VERSION
 
 from linkwise.analysis.closed_motion import ClosedLog
-from linkwise.analysis.joint_causes import are_motions_whole, causes_of, sizes
+from linkwise.analysis.joint_causes import causes_of, largest_first, sizes
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import POWER_OF, QUANTITIES, WORKS, ResultQuantity
 from linkwise.analysis.result_rows import Column
@@ -238,7 +238,7 @@ def result_table(result: AnalysisResult) -> str:
     told = [0, *([] if "tau" in result.rows.left_out else [1, 2])]
     told += [3, 4] if not result.rows.left_out else []
     told += [5, 6] if "power" in result.works else []
-    causes = causes_of(result, joints, together=are_motions_whole(result)) if 3 in told else ()
+    causes = causes_of(result, joints) if 3 in told else ()
     rows = []
     loads = sizes(result, causes).T if causes else np.zeros((len(result.robot.driven), 0))
     for at, (i, loading) in enumerate(zip(result.robot.driven, loads, strict=True)):
@@ -247,7 +247,7 @@ def result_table(result: AnalysisResult) -> str:
         if 1 in told:
             cells |= {1: f"{peak[at]:.4g} {unit}", 2: f"{mean[at]:.4g} {unit}"}
         if 3 in told:
-            most, whole = int(loading.argmax()), float(loading.sum())
+            most, whole = largest_first(loading)[0], float(loading.sum())
             cells[3] = causes[most].label if whole else ""
             cells[4] = f"{100 * loading[most] / whole:.0f} %" if whole else ""
         if 5 in told:

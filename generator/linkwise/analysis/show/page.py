@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.joint_causes import are_motions_whole
 from linkwise.analysis.loads.placed import model_pose
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result import AnalysisResult
@@ -124,7 +123,6 @@ def page_data(result: AnalysisResult) -> str:
         "links": list(map(printable, robot.links)),
         "columns": [_column(result.columns[at], robot.driven) for at in shown],
         "values": encoded(instants.values[shown]),
-        "together": are_motions_whole(result),
         "curves": curve_data(result, sums, pieces, stride > 1),
         "work": _work(result),
         "largestPower": _largest_power(result),

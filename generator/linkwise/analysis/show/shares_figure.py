@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwise.analysis.certain_signs import DEVIATIONS
-from linkwise.analysis.joint_causes import Cause, are_motions_whole, causes_of, certainty, sizes
+from linkwise.analysis.joint_causes import Cause, causes_of, certainty, largest_first, sizes
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.bands import ADDED
 from linkwise.analysis.show.drawn_curves import new_figure, write_title
@@ -22,12 +22,13 @@ if TYPE_CHECKING:
 
 MANY = 12
 """Number of joints above which a bar has the joint's own motion, the largest other one, and the rest."""
-HATCHES = {"motion": "", "acceleration": "", "velocity": "////", "own": "....", "load": "xx", "named": ""}
+HATCHES = {"motion": "", "own": "....", "load": "xx", "named": ""}
 LEANING = (
     "Net torques are of all links together: joint torques determine them.\n"
     "What goes through one link leans on how the file spreads mass over the links."
 )
 """Remark on what rests on the file's masses, for rigid links."""
+MOVED = "A joint's motion is its acceleration and its velocity together."
 LARGEST, REST = "largest motion of another joint", "motions of all other joints, shares added"
 
 
@@ -70,7 +71,7 @@ def share_parts(result: AnalysisResult) -> tuple[list[SharePart], list[SharePart
     Motions are grouped if there are more joints than `MANY`.
     """
     robot = result.robot
-    causes = causes_of(result, robot.plot_joints, drawn, together=are_motions_whole(result))
+    causes = causes_of(result, robot.plot_joints, drawn)
     certain = certainty(result, causes)
     found = list(map(_Sized, causes, sizes(result, causes), certain.deviation, certain.unsure))
     moving = [one for one in found if one.cause.is_motion]
@@ -95,7 +96,7 @@ def _fixed(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
 
 
 def _each(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
-    """Return a part for every motion, or for its acceleration and its velocity."""
+    """Return a part for every motion."""
     place = {k: at for at, k in enumerate(result.robot.driven)}
     return [one.part(tone(place[one.cause.number or 0]), HATCHES[one.cause.kind]) for one in found]
 
@@ -107,7 +108,7 @@ def _few(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
         np.array([getattr(one, what) for one in found]).T for what in ("sizes", "spreads", "unsure")
     )
     others = by * (1.0 - np.eye(len(driven)))
-    at = np.arange(len(driven)), others.argmax(axis=1)
+    at = np.arange(len(driven)), np.array([largest_first(own)[0] for own in others])
     first = tuple(drawn(names[driven[k]]) for k in at[1])
     rest, rest_spread = (one.sum(axis=1) - one.diagonal() - one[at] for one in (by, spreads))
     nothing = np.zeros(len(driven), np.bool_)
@@ -174,7 +175,7 @@ def _unsure_patch() -> Any:
 
 def _notes(result: AnalysisResult, parts: Sequence[SharePart]) -> list[str]:
     """Return what rests on the file's masses, what whiskers are, and which causes have no certain sign."""
-    found = LEANING.split("\n") if result.robot.tree is not None else []
+    found = [MOVED, *(LEANING.split("\n") if result.robot.tree is not None else [])]
     if not any(part.spreads.any() for part in parts):
         return found
     joints = [drawn(result.robot.plot_joints[i]) for i in result.robot.driven]
