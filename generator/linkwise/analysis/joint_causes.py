@@ -15,6 +15,7 @@ from linkwise.analysis.result_quantities import MOTION, PASSIVE
 from linkwise.analysis.row_sums import SumDeviations
 from linkwise.arrays import Array, Index, Mask
 
+
 @dataclass(frozen=True)
 class Cause:
     """One cause of joint torques, and its quantities."""

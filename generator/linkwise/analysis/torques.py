@@ -102,12 +102,12 @@ class Decomposer:
         measured = [] if times is None else [at for at, loads in enumerate(times.measured) if loads]
         every_place = torque_places(robot, of_robot, loads, told.power_terms, measured)
         chosen = chosen_places(robot, every_place, loads, told.columns, told.asked, told.power_terms)
-        places, points, left_out = [*chosen.torques], told.induced.points, chosen.left_out
+        places, points, left_out = [*chosen.torques, *chosen.nets], told.induced.points, chosen.left_out
         sources = _sources(of_robot, places)
         induced = InducedShares.of(robot, told.induced, ResultRows.of(robot, places, loads))
         reactions = ReactionShares(robot, tuple(told.borne), tuple(loads), convention)
         traced = told.traced
-        places += [*chosen.nets, *induced.places]
+        places += induced.places
         sums = ResultRows.of(robot, places, loads, points)
         power = PowerShares.of(robot, loads, sums, told.induced_power)
         velocities = [at for at in places if at[0] == "tau_qd"]

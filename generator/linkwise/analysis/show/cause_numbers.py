@@ -139,9 +139,7 @@ def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
     apart = True
     for part in result.parts():
         values = rows @ np.concatenate([part.torque[:, [i]].T, curves(part, causes, i)])
-        spread = rows @ np.concatenate(
-            [[part.values[torque].sum(axis=0)], deviation_curves(part, causes, i)]
-        )
+        spread = rows @ np.concatenate([[part.values[torque].sum(axis=0)], deviation_curves(part, causes, i)])
         on = [phase.on(part) for phase in asked]
         apart &= not on or int(np.sum(on, axis=0).max()) <= 1
         for tally, here in zip(tallies, on, strict=True):

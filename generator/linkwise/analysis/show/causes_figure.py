@@ -54,7 +54,9 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
     )
     write_title(figure, result, f"What loads {drawn(result.robot.joints[i], 40)}")
     told = [phase.told for phase in asked_phases(result, i)]
-    note = " · ".join(["motion: acceleration and velocity together; size: mean of the magnitude", *told, foot(result)])
+    note = " · ".join(
+        ["motion: acceleration and velocity together; size: mean of the magnitude", *told, foot(result)]
+    )
     write_note(figure, *bands.notes, *([WHISKERS] if len(bands) else []), note)
     figure.draw_without_rendering()  # places the panels, so that labels have their final width
     for panel in (means, sizes):
