@@ -6,6 +6,7 @@ back the links' weights cancel at the shoulder, so that their sizes, added up, w
 """
 
 import html
+import json
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -22,7 +23,8 @@ from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show import figure_png
-from linkwise.analysis.show.page import report
+from linkwise.analysis.show.cause_numbers import cause_numbers
+from linkwise.analysis.show.page import page_data, report
 from linkwise.analysis.whole_movement import Totals, Work
 from linkwise.progress import silent
 from numpy.typing import NDArray
@@ -168,6 +170,33 @@ def test_the_notebook_says_the_largest_of_the_figures_parts(analysis: Analysis, 
     assert_same(bars(analysis.figure("shares"), 0), share)
     first = [largest_first(share, i)[0] for i in range(3)]
     assert notebook(analysis) == [(cause, f"{share[cause][i]:.0f} %") for i, cause in enumerate(first)]
+
+
+def test_figures_notebook_and_page_name_the_same_largest_motion(analysis: Analysis) -> None:
+    """Either of a joint's acceleration and velocity is the largest alone, and both together the least."""
+    rows, values = analysis.rows, analysis.values.copy()
+    values[rows.numbers("tau_qdd", "tau_qd", cause=1)] = 0.0
+    for name, size in (("tau_qdd", 300.0), ("tau_qd", -299.99)):
+        values[rows.numbers(name, cause=1, link=2)] = size * np.sin(analysis.time)
+    result = replace(analysis, values=values)
+    columns = Columns(result.table, JOINTS)
+    sizes = columns.sizes(MOTION)
+    apart = columns.sizes(BOTH)
+    assert [largest_first(apart, i)[0] for i in range(3)] == ["joint2 acceleration"] * 3
+    first = [largest_first(sizes, i)[0] for i in range(3)]
+    assert "joint2 motion" not in first
+    shown = bars(result.figure("shares"), 0)
+    assert [max(shown, key=lambda cause: shown[cause][i]) for i in range(3)] == first
+    assert [cause for cause, _ in notebook(result)] == first
+    page = json.loads(page_data(result))["curves"]
+    mean = dict(zip(page["keys"], page["mean"], strict=True))
+    for i in range(3):
+        by = {f"{JOINTS[k]} motion": mean.get(f"motion {i} {k} null", 0.0) for k in range(3)}
+        by["gravity"] = mean[f"tau_gravity {i} null null"]
+        assert max(by, key=lambda cause: by[cause]) == first[i]
+        numbers = cause_numbers(result, i)
+        assert numbers.labels[1] == first[i]
+        np.testing.assert_allclose(numbers.phases[0].size[1], sizes[first[i]][i])
 
 
 def few_of(columns: Columns, word: str, gravity: bool = True) -> tuple[Shares, list[str]]:

@@ -1,7 +1,7 @@
-"""Causes of joint torques, and which is the largest: the same in every figure, on the page and in the notebook.
+"""Causes of joint torques, and which is the largest: the same in figures, on the page and in the notebook.
 
-A coordinate's motion is one cause: its acceleration and its velocity, through all links, are summed first. The
-size of a cause is the mean magnitude of that sum.
+A coordinate's motion is one cause: its acceleration and its velocity, through all links, are summed first.
+The size of a cause is the mean magnitude of that sum.
 """
 
 from collections.abc import Callable, Sequence

@@ -7,7 +7,7 @@ all causes sum to the joint's torque.
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD
+from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD, SHARE
 
 from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.opened_robot import OpenedRobot
@@ -42,8 +42,8 @@ def net_causes(robot: OpenedRobot, loads: int) -> tuple[NetCause, ...]:
 def cause_names(robot: OpenedRobot, loads: Sequence[PlacedLoad]) -> tuple[str, ...]:
     """Return the names of causes as columns have them, in the order of `net_causes`.
 
-    Loads are load:NAME, as among the sources of a trace. A coordinate's motion has the coordinate's name, and
-    motion:NAME where another cause is called so already.
+    Loads are load:NAME and shares with names share:NAME, as among the sources of a trace. A coordinate's
+    motion has the coordinate's name, and motion:NAME where another cause is called so already.
     """
     causes = net_causes(robot, len(loads))
     others = [_name(cause, robot, loads) for cause in causes if cause.quantity not in MOTION]
@@ -54,8 +54,18 @@ def _name(cause: NetCause, robot: OpenedRobot, loads: Sequence[PlacedLoad]) -> s
     if cause.quantity == "tau_load":
         return f"{LOAD}{BETWEEN}{loads[cause.number].name}"
     if cause.quantity == "tau_share":
-        return robot.share_names[cause.number]
+        return f"{SHARE}{BETWEEN}{robot.share_names[cause.number]}"
     return cause.quantity.removeprefix("tau_")
+
+
+def label_of(name: str) -> str:
+    """Return a cause in words, from its name in columns."""
+    kind, between, rest = name.replace("%2F", "/").partition(BETWEEN)
+    if between and kind in (LOAD, SHARE):
+        return f"load {rest}" if kind == LOAD else rest
+    if kind == "gravity" or f"tau_{kind}" in PASSIVE:
+        return kind if kind == "gravity" else f"own {kind}"
+    return f"{rest if kind == 'motion' and between else name.replace('%2F', '/')} motion"
 
 
 def cause_of(quantity: str, at: Sequence[int]) -> NetCause | None:

@@ -14,6 +14,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names
 from linkwise.extras import extra
 from linkwise.plotstyle import INK, colour, dash, drawn, saved, styled
+from linkwise.study.causes_figure import drawn_causes
 from linkwise.study.comparisons import Compared
 from linkwise.study.deviation_columns import fitting_values
 from linkwise.study.deviations import Deviations, deviations
@@ -58,17 +59,26 @@ def band_figures(
 
     Raises LinkwiseError for unknown columns, and for deviations that are asked for and are not there.
     """
-    drawn_of = [panels_of(figure, trials, tests) for figure in figures]
+    for figure in figures:
+        figure_columns(figure, columns_of_trials(trials))
+    drawn_of = [[] if figure.joints else panels_of(figure, trials, tests) for figure in figures]
     names = [
-        figure.name or (panels[0].column if len(panels) == 1 else f"figure{number}")
+        figure.name or _name(figure, panels) or f"figure{number}"
         for number, (figure, panels) in enumerate(zip(figures, drawn_of, strict=True), 1)
     ]
     for figure, panels, name in zip(figures, drawn_of, file_names(map(file_name, names)), strict=True):
         with styled() as matplotlib:
             matplotlib.rcParams["hatch.linewidth"] = EDGE
-            drawing = _drawn(figure, panels)
+            drawing = _drawn(figure, panels) if panels else drawn_causes(figure, trials, tests)
             for kind in FORMATS:
                 yield f"{name}.{kind}", saved(drawing, kind)
+
+
+def _name(figure: PaperFigure, panels: Sequence[BandPanel]) -> str:
+    """Return the name of a figure of one column, or of one joint's causes; "" of several."""
+    if len(figure.joints) == 1:
+        return f"causes-{figure.joints[0]}"
+    return panels[0].column if len(panels) == 1 else ""
 
 
 def panels_of(
@@ -93,8 +103,8 @@ def figure_columns(figure: PaperFigure, names: Iterable[str]) -> list[str]:
 
     Raises LinkwiseError for unknown columns, for deviations as columns of their own, and for too many.
     """
-    found = fitting_values("[[figure]]", names, figure.columns)
-    if len(found) > MOST:
+    found = fitting_values("[[figure]]", names, figure.patterns)
+    if len(found) > MOST and not figure.joints:
         raise LinkwiseError(f"[[figure]]: {len(found)} columns; {MOST} are legible, so give fewer")
     return found
 

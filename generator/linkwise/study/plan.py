@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Literal
 
 from linkwise.analysis.choices import AnalysisChoices
+from linkwise.analysis.net_causes import NET
 from linkwise.analysis.phases import Phase
 from linkwise.errors import LinkwiseError
+from linkwise.escape import column_part
 from linkwise.option import written
 from linkwise.robot import Options
 
@@ -15,6 +17,8 @@ SUBJECT = "subject"
 """Factor that every study has, and the first."""
 OF_FILES = tuple(one.key for one in written(AnalysisChoices) if one.option.is_file)
 """Choices that are paths of files."""
+CAUSES = "causes:"
+"""Beginning of what a figure names in place of columns: what loads the joint that follows."""
 POINTS = 101
 """Number of points of a cycle, 0 to 100 %."""
 
@@ -74,7 +78,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """A figure of mean curves with bands, one for each level of a factor.
+    """A figure of mean curves with bands for each level of a factor; causes:JOINT is of what loads a joint.
 
     `band` is what is filled, between subjects; `hatched` the deviation by what is uncertain, where there is
     one: within a trial, of the mean, or of the truth of a new subject.
@@ -89,6 +93,21 @@ class PaperFigure:
     def __post_init__(self) -> None:
         if not self.columns:
             raise LinkwiseError("[[figure]]: 'columns' is empty; name one or more")
+        if 0 < len(self.joints) < len(self.columns):
+            raise LinkwiseError(
+                f"[[figure]]: 'columns' has {CAUSES}{self.joints[0]} beside others; draw causes in a figure"
+                " of their own"
+            )
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints whose causes are drawn; none in a figure of columns."""
+        return tuple(one.removeprefix(CAUSES) for one in self.columns if one.startswith(CAUSES))
+
+    @property
+    def patterns(self) -> tuple[str, ...]:
+        """Patterns of the columns that it is drawn of."""
+        return tuple(f"{NET}/{column_part(joint)}/*" for joint in self.joints) or self.columns
 
 
 @dataclass(frozen=True)
@@ -126,3 +145,11 @@ class StudyPlan:
     pages: bool = field(kw_only=True)
     trust_python: bool = field(kw_only=True, repr=False)
     """True if robots that are Python files are run; no result depends on it."""
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        """Patterns of net torques by cause that tables, tests, figures or integrals are of, each once."""
+        every = [*self.columns, *(() if self.cycles is None else self.cycles.integrals)]
+        every += [one for some in self.comparisons for one in some.columns]
+        every += [one for figure in self.figures for one in figure.patterns]
+        return tuple(dict.fromkeys(one for one in every if one.removeprefix("sd/").startswith(NET)))
