@@ -110,6 +110,7 @@ def record(result: AnalysisResult) -> dict[str, Any]:
         "closure_is_of": closed_at(result),
         **({} if result.closed is None else {"constraints": _constraints(result, result.closed)}),
         **({} if robot.contacts is None else {"contacts": _contacts(result)}),
+        **({"residuals": result.residual_report.record()} if result.residual_report.residuals else {}),
         "work": _work(result),
         "ignored_columns": list(result.ignored),
         "warnings": [*result.warnings, *result.load_warnings],
@@ -225,6 +226,7 @@ def _values(result: AnalysisResult, name: str) -> Array:
     return out
 
 
+RESIDUAL = " (residual)"
 HEAD = ("joint", "peak |τ|", "mean |τ|", "largest cause", "its share", "gave", "took back")
 
 
@@ -241,9 +243,10 @@ def result_table(result: AnalysisResult) -> str:
     causes = causes_of(result, joints) if 3 in told else ()
     rows = []
     loads = sizes(result, causes).T if causes else np.zeros((len(result.robot.driven), 0))
-    for at, (i, loading) in enumerate(zip(result.robot.driven, loads, strict=True)):
-        unit = result.robot.torque_units[i]
-        cells = {0: joints[i]}
+    for i in result.robot.joints_apart:
+        at = result.robot.driven.index(i)
+        unit, loading = result.robot.torque_units[i], loads[at]
+        cells = {0: f"{joints[i]}{RESIDUAL if i in result.robot.residuals else ''}"}
         if 1 in told:
             cells |= {1: f"{peak[at]:.4g} {unit}", 2: f"{mean[at]:.4g} {unit}"}
         if 3 in told:
@@ -256,7 +259,9 @@ def result_table(result: AnalysisResult) -> str:
     title = f"{result.robot.name}: who loads whom in {result.source}"
     warnings = (*result.warnings, *result.load_warnings)
     head = tuple(HEAD[at] for at in told)
-    return page_part(title, table(head, rows)) + remark(result.provenance, *warnings)
+    return page_part(title, table(head, rows)) + remark(
+        result.provenance, *result.residual_report.lines, *warnings
+    )
 
 
 def _told(work: Work, joint: int) -> tuple[str, str]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from linkwise.analysis.certain_signs import LargestTorque
 from linkwise.analysis.chosen_columns import PRESETS
 from linkwise.analysis.cutoff_sweep import CutoffSweep
+from linkwise.analysis.residuals import ResidualReport
 from linkwise.analysis.verify import Closure
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
@@ -61,6 +62,8 @@ class WholeMovement:
     """Torques at their largest magnitude, with their deviations there; none where nothing is uncertain."""
     cutoff_sweep: CutoffSweep | None
     """Sizes of torques at other cutoffs; None where they were not asked for."""
+    residual_report: ResidualReport
+    """Residuals of coordinates that nothing drives, as far as their torques are computed."""
 
     @property
     def work(self) -> Work:

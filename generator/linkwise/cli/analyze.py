@@ -94,6 +94,7 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
         f" {recursion}; closure: terms sum to partial torques within {closure.terms_relative:.1e},"
         f" these to joint torques within {closure.links_relative:.1e} (relative){where}{shares}",
         *_of_contacts(analysis),
+        *analysis.residual_report.lines,
         *_of_residual(analysis),
         *_of_bodies(analysis),
         *analysis.signs.lines,

@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,6 +50,12 @@ class SharePart:
     def name(self, i: int) -> str:
         """Return the name of the cause at the i-th joint that is drawn."""
         return f"{self.names[i]} motion" if self.names else self.label
+
+    def at(self, joints: Sequence[int]) -> "SharePart":
+        """Return the part at these places of joints."""
+        numbers = list(joints)
+        arrays = {name: getattr(self, name)[numbers] for name in ("sizes", "spreads", "unsure")}
+        return replace(self, **arrays, names=tuple(self.names[at] for at in numbers) if self.names else ())
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +128,8 @@ def _few(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
 def shares(result: AnalysisResult, _: int) -> "Figure":
     """Draw two bars for each joint, in % of mean sizes: every cause, and the movement's causes alone."""
     robot = result.robot
-    fixed, movement = share_parts(result)
+    order = [robot.driven.index(i) for i in robot.joints_apart]
+    fixed, movement = ([part.at(order) for part in some] for some in share_parts(result))
     every = [*fixed, *movement]
     notes = _notes(result, every)
     rows = -(-len(every) // 3)
@@ -135,7 +142,9 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     told = len(robot.share_names) == 1  # several are in the legend
     left.set_title(f"everything, {out} too" if told else "everything")
     right.set_title(f"the movement alone, without {out}" if told else "the movement alone")
-    left.set_yticks(range(len(robot.driven)), [drawn(robot.plot_joints[i]) for i in robot.driven])
+    left.set_yticks(range(len(robot.driven)), [drawn(robot.plot_joints[i]) for i in robot.joints_apart])
+    for axis in (left, right):
+        _set_apart(axis, len(robot.moving_itself), len(robot.driven))
     left.set_ylim(len(robot.driven) - 0.4, -0.6)
     left.set_ylabel("loaded joint")
     for part in movement:
@@ -178,7 +187,7 @@ def _notes(result: AnalysisResult, parts: Sequence[SharePart]) -> list[str]:
     found = [MOVED, *(LEANING.split("\n") if result.robot.tree is not None else [])]
     if not any(part.spreads.any() for part in parts):
         return found
-    joints = [drawn(result.robot.plot_joints[i]) for i in result.robot.driven]
+    joints = [drawn(result.robot.plot_joints[i]) for i in result.robot.joints_apart]
     unsure = [
         f"{part.name(i)} on {joints[i]}" for part in parts for i in np.flatnonzero(part.unsure).tolist()
     ]
@@ -189,6 +198,20 @@ def _notes(result: AnalysisResult, parts: Sequence[SharePart]) -> list[str]:
         *map(printable, result.signs.lines),
     ]
     return [line for note in found for line in textwrap.wrap(note, WIDE)]
+
+
+def _set_apart(axis: Any, moving: int, every: int) -> None:
+    """Draw a line between joints and the residuals below them, if there are any."""
+    if moving == every:
+        return
+    axis.axhline(moving - 0.5, color=INK, linewidth=0.9)
+    where = {
+        "xycoords": ("axes fraction", "data"),
+        "textcoords": "offset points",
+        "va": "bottom",
+        "fontsize": 7,
+    }
+    axis.annotate("below: residuals, which nothing drives", (0, moving - 0.5), (2, 1), color=INK, **where)
 
 
 def _name_beside(axis: Any, part: SharePart) -> None:
