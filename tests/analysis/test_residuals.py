@@ -77,7 +77,7 @@ def test_figures_begin_with_a_joint_and_draw_residuals_below_the_others(pushed: 
     assert "hip_flexion_r" in pushed.figure("causes").get_suptitle()
     shares = pushed.figure("shares")
     names = [text.get_text() for text in shares.axes[0].get_yticklabels()]
-    assert names == [*LEGS[3:], *LEGS[:3]]
+    assert names == [*LEGS[3:], *(f"residual {name}" for name in LEGS[:3])]
     widths = [bar.patches[0].get_width() for bar in shares.axes[0].containers]
     hip = np.abs(pushed.gravity[:, 3].sum(axis=1)).mean()
     every = [np.abs((pushed.acceleration + pushed.velocity)[:, 3, :, k].sum(1)).mean() for k in range(6)]

@@ -142,9 +142,9 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     told = len(robot.share_names) == 1  # several are in the legend
     left.set_title(f"everything, {out} too" if told else "everything")
     right.set_title(f"the movement alone, without {out}" if told else "the movement alone")
-    left.set_yticks(range(len(robot.driven)), [drawn(robot.plot_joints[i]) for i in robot.joints_apart])
-    for axis in (left, right):
-        _set_apart(axis, len(robot.moving_itself), len(robot.driven))
+    left.set_yticks(range(len(robot.driven)), _loaded(result))
+    for axis in (left, right) if len(robot.moving_itself) < len(robot.driven) else ():
+        axis.axhline(len(robot.moving_itself) - 0.5, color=INK, linewidth=0.9)
     left.set_ylim(len(robot.driven) - 0.4, -0.6)
     left.set_ylabel("loaded joint")
     for part in movement:
@@ -182,12 +182,21 @@ def _unsure_patch() -> Any:
     )
 
 
+def _loaded(result: AnalysisResult) -> list[str]:
+    """Return the names of the joints that are drawn, residuals last."""
+    robot = result.robot
+    kinds = ["" if i in robot.moving_itself else "residual " for i in robot.joints_apart]
+    return [f"{kind}{drawn(robot.plot_joints[i])}" for kind, i in zip(kinds, robot.joints_apart, strict=True)]
+
+
 def _notes(result: AnalysisResult, parts: Sequence[SharePart]) -> list[str]:
     """Return what rests on the file's masses, what whiskers are, and which causes have no certain sign."""
-    found = [MOVED, *(LEANING.split("\n") if result.robot.tree is not None else [])]
+    some = len(result.robot.moving_itself) < len(result.robot.driven)
+    apart = ["Below the line are residuals: nothing drives these."] if some else []
+    found = [*apart, MOVED, *(LEANING.split("\n") if result.robot.tree is not None else [])]
     if not any(part.spreads.any() for part in parts):
         return found
-    joints = [drawn(result.robot.plot_joints[i]) for i in result.robot.joints_apart]
+    joints = _loaded(result)
     unsure = [
         f"{part.name(i)} on {joints[i]}" for part in parts for i in np.flatnonzero(part.unsure).tolist()
     ]
@@ -198,20 +207,6 @@ def _notes(result: AnalysisResult, parts: Sequence[SharePart]) -> list[str]:
         *map(printable, result.signs.lines),
     ]
     return [line for note in found for line in textwrap.wrap(note, WIDE)]
-
-
-def _set_apart(axis: Any, moving: int, every: int) -> None:
-    """Draw a line between joints and the residuals below them, if there are any."""
-    if moving == every:
-        return
-    axis.axhline(moving - 0.5, color=INK, linewidth=0.9)
-    where = {
-        "xycoords": ("axes fraction", "data"),
-        "textcoords": "offset points",
-        "va": "bottom",
-        "fontsize": 7,
-    }
-    axis.annotate("below: residuals, which nothing drives", (0, moving - 0.5), (2, 1), color=INK, **where)
 
 
 def _name_beside(axis: Any, part: SharePart) -> None:
