@@ -81,6 +81,7 @@ def test_it_says_what_it_shows(page):
 def test_slider_moves_the_map_to_the_files_numbers(page, result):
     table = pq.read_table(result / "analysis.parquet")
     seen = []
+    choose(page, "motion", "apart")
     choose(page, "order", "movement")
     for at in (0, 123, 999):
         choose(page, "slider", at)
@@ -104,6 +105,7 @@ def test_what_rounding_leaves_is_shown_as_nothing(driver, tmp_path):
     path, robot = write_csv(tmp_path / "log.csv", log), load_robot(PLANAR3)
     analyze_to(tmp_path / "out", path, robot, Request(), silent)
     opened(driver, (tmp_path / "out" / "report.html").as_uri())
+    choose(driver, "motion", "apart")
     choose(driver, "slider", 150)
     choose(driver, "joint", 0)
     assert [name for name, *_ in driver.execute_script(TICKS, "xtick")] == [
@@ -123,6 +125,7 @@ def test_what_rounding_leaves_is_shown_as_nothing(driver, tmp_path):
 
 def test_numbers_in_the_table_are_the_files(page, result):
     table = pq.read_table(result / "analysis.parquet")
+    choose(page, "motion", "apart")
     choose(page, "slider", 321)
     choose(page, "joint", 0)
     choose(page, "link", 2)
@@ -520,6 +523,7 @@ def test_deviations_are_bands_numbers_hatches_and_a_list(driver, tmp_path):
     result = analyze(log, PLANAR3, uncertain=tmp_path / "bodies.toml")
     (tmp_path / "report.html").write_text(report(result), encoding="utf-8")
     opened(driver, (tmp_path / "report.html").as_uri())
+    choose(driver, "motion", "apart")
     choose(driver, "joint", 0)
     choose(driver, "link", 2)
     bands = driver.execute_script(

@@ -170,7 +170,7 @@ def test_a_dataset_has_what_was_asked_for(puma: Path) -> None:
     [
         (
             "sum",
-            "--columns, which takes all, sums, causes, or columns, has 'sum', which no column is called",
+            "which takes all, sums, by-cause, causes, or columns, has 'sum', which no column is called",
         ),
         ("tau/joint9", "columns, has 'tau/joint9', which no column is called"),
         ("power_qdd/**", "columns, has 'power_qdd/\\*\\*', which no column is called"),

@@ -377,7 +377,7 @@ def test_what_does_not_go_with_contacts_is_refused(folder: Path) -> None:
     with pytest.raises(LinkwiseError, match="contact 'sole': no load of --contact-loads acts on its body"):
         analyze(folder / "moving.csv", leg, contacts=Contacts((FOOT, knee), loads=shank))
     with pytest.raises(LinkwiseError, match="goes with --contact; add it"):
-        Contacts(unactuated=("pelvis_tx",))
+        Contacts(columns={"sole": WhileColumn("stands")})
     with pytest.raises(LinkwiseError, match="give a list of Contact"):
         analyze(log, leg, contacts=FOOT)
     with pytest.raises(LinkwiseError, match="'foot' is not a Contact"):

@@ -193,7 +193,12 @@ def test_the_time_line_stands_at_the_instant(page: Any, result: Analysis) -> Non
 )
 def test_captions_say_which_causes_are_left_out(page: Any, order: str, said: str) -> None:
     choose(page, "order", order)
-    assert page.find_element("id", "shares-caption").text.endswith((said, f"{said} Velocity is hatched."))
+    moved = "A motion is acceleration and velocity together."
+    if order.startswith("tau_q"):
+        moved = "Acceleration and velocity are apart here; a motion is both together."
+    caption = page.find_element("id", "shares-caption").text
+    moves = order in ("everything", "movement") or order.startswith("tau_q")
+    assert caption.endswith(f"{said} {moved}" if moves else said)
 
 
 def test_a_click_on_the_map_picks_joint_and_cause_and_another_lets_go(page: Any) -> None:

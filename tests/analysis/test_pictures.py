@@ -63,7 +63,6 @@ def test_shares_fill_the_bars(analysis):
 
 
 def test_shares_of_many_joints_are_their_own_the_largest_other_ones_and_the_rest(analysis, monkeypatch):
-    monkeypatch.setattr("linkwise.analysis.joint_causes.FEW", 2)
     monkeypatch.setattr("linkwise.analysis.show.shares_figure.MANY", 2)
     figure = analysis.figure("shares")
     assert [axis.get_title(loc="left") for axis in figure.axes[:2]] == [
@@ -88,8 +87,7 @@ def test_gravity_and_loads_stand_before_motions_in_the_shares(pushed):
     path, push, _ = pushed
     result = analyze(path, PLANAR3, Reading(ignore_extra=True), loads=[push])
     labels = [text.get_text() for text in result.figure("shares").legends[0].get_texts()]
-    kinds = ("acceleration", "velocity")
-    assert labels == ["gravity", "load push", *(f"{joint} {kind}" for joint in JOINTS for kind in kinds)]
+    assert labels == ["gravity", "load push", *(f"{joint} motion" for joint in JOINTS)]
 
 
 def test_pictures_and_the_page_leave_out_an_ending_that_all_joints_have(analysis):
@@ -109,7 +107,7 @@ def test_pictures_and_the_page_leave_out_an_ending_that_all_joints_have(analysis
 
 
 def bars(figure):
-    """Rows by name, then for each phase by name the means and the root mean squares."""
+    """Rows by name, then for each phase by name the means and the mean sizes."""
     means, sizes = figure.axes[1:]
     rows = [text.get_text() for text in means.get_yticklabels()]
     return rows, {
@@ -154,9 +152,9 @@ def test_causes_in_each_phase_are_numpys_and_add_up(pushed):
     for name, (means, sizes) in shown.items():
         mask = masks[name]
         np.testing.assert_allclose(means, [curves[row][mask].mean() for row in rows], atol=1e-12)
-        np.testing.assert_allclose(sizes, [np.sqrt((curves[row][mask] ** 2).mean()) for row in rows])
+        np.testing.assert_allclose(sizes, [np.abs(curves[row][mask]).mean() for row in rows])
         assert sum(means[1:]) == pytest.approx(means[0], rel=1e-12)
-    sizes = [np.sqrt((curves[row] ** 2).mean()) for row in rows[1:]]
+    sizes = [np.abs(curves[row]).mean() for row in rows[1:]]
     assert sizes == sorted(sizes, reverse=True)
     assert result.record()["phases"][::2] == ["stance: force of push above 20 N", "half: from 0 to 1.995 s"]
     assert "half: from 0 to 1.995 s" in " ".join(figure.get_supxlabel().split())
@@ -178,7 +176,7 @@ def test_a_joint_that_bears_one_load_has_the_phases_of_that_load(pushed, analysi
 def test_a_panel_says_what_it_shows_and_in_which_unit(analysis):
     over_time, means, sizes = analysis.figure("causes:joint1").axes
     titles = [panel.get_title() or panel.get_title(loc="left") for panel in (over_time, means, sizes)]
-    assert titles == ["all causes together", "mean (N·m)", "root mean square (N·m)"]
+    assert titles == ["all causes together", "mean (N·m)", "mean size (N·m)"]
     assert over_time.get_ylabel() == "N·m"
 
 

@@ -6,6 +6,7 @@ back the links' weights cancel at the shoulder, so that their sizes, added up, w
 """
 
 import html
+import json
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -22,7 +23,8 @@ from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.run import analyze_to
 from linkwise.analysis.show import figure_bytes
-from linkwise.analysis.show.page import report
+from linkwise.analysis.show.cause_numbers import cause_numbers
+from linkwise.analysis.show.page import page_data, report
 from linkwise.analysis.whole_movement import Totals, Work
 from linkwise.progress import silent
 from numpy.typing import NDArray
@@ -33,6 +35,7 @@ SAMPLES = 12_001
 CROWD = tuple(f"j{i}" for i in range(14))
 """Joints of which bars have but some."""
 BOTH = ("acceleration", "velocity")
+MOTION = ("motion",)
 WORDS = {"acceleration": "tau_qdd", "velocity": "tau_qd", "motion": "tau_q(?:dd|d)"}
 Shares = dict[str, NDArray[np.float64]]
 """Mean size of each cause on each joint, (joints,)."""
@@ -126,10 +129,10 @@ def crowd_of(joints: tuple[str, ...], analysis: Analysis) -> Analysis:
 
 
 def test_links_cancel_here_so_that_their_sizes_would_tell_another_cause(columns: Columns) -> None:
-    net = columns.sizes(BOTH)
+    net = columns.sizes(MOTION)
     apart = {cause: np.abs(columns.curve("joint1", cause)).mean(axis=1).sum() for cause in net}
     assert max(apart, key=lambda cause: apart[cause]) == "gravity"
-    assert largest_first(net, 0)[0] == "joint1 acceleration"
+    assert largest_first(net, 0)[0] == "joint1 motion"
 
 
 def bars(figure: Any, panel: int) -> Shares:
@@ -149,7 +152,7 @@ def assert_same(found: Shares, expected: Shares) -> None:
 def test_the_figure_has_mean_sizes_of_net_torques(place: Path, analysis: Analysis, columns: Columns) -> None:
     figure = analysis.figure("shares")
     for panel in (0, 1):
-        sizes = columns.sizes(BOTH, gravity=panel == 0)
+        sizes = columns.sizes(MOTION, gravity=panel == 0)
         assert_same(bars(figure, panel), percent(sizes))
         assert figure.axes[panel].get_xlabel() == "mean size of the net torque, % of all"
     assert (place / "out" / "shares.png").read_bytes() == figure_bytes(analysis, "shares")
@@ -162,22 +165,38 @@ def notebook(result: Analysis) -> list[tuple[str, str]]:
     return [(row[-4], row[-3]) for row in cells]
 
 
-@pytest.mark.parametrize(
-    ("are_many", "words"), [(False, BOTH), (True, ("motion",))], ids=["apart", "together"]
-)
-def test_the_notebook_says_the_largest_of_the_figures_parts(
-    analysis: Analysis,
-    columns: Columns,
-    monkeypatch: pytest.MonkeyPatch,
-    are_many: bool,
-    words: tuple[str, ...],
-) -> None:
-    if are_many:
-        monkeypatch.setattr("linkwise.analysis.joint_causes.FEW", 2)
-    share = percent(columns.sizes(words))
+def test_the_notebook_says_the_largest_of_the_figures_parts(analysis: Analysis, columns: Columns) -> None:
+    share = percent(columns.sizes(MOTION))
     assert_same(bars(analysis.figure("shares"), 0), share)
     first = [largest_first(share, i)[0] for i in range(3)]
     assert notebook(analysis) == [(cause, f"{share[cause][i]:.0f} %") for i, cause in enumerate(first)]
+
+
+def test_figures_notebook_and_page_name_the_same_largest_motion(analysis: Analysis) -> None:
+    """Either of a joint's acceleration and velocity is the largest alone, and both together the least."""
+    rows, values = analysis.rows, analysis.values.copy()
+    values[rows.numbers("tau_qdd", "tau_qd", cause=1)] = 0.0
+    for name, size in (("tau_qdd", 300.0), ("tau_qd", -299.99)):
+        values[rows.numbers(name, cause=1, link=2)] = size * np.sin(analysis.time)
+    result = replace(analysis, values=values)
+    columns = Columns(result.table, JOINTS)
+    sizes = columns.sizes(MOTION)
+    apart = columns.sizes(BOTH)
+    assert [largest_first(apart, i)[0] for i in range(3)] == ["joint2 acceleration"] * 3
+    first = [largest_first(sizes, i)[0] for i in range(3)]
+    assert "joint2 motion" not in first
+    shown = bars(result.figure("shares"), 0)
+    assert [max(shown, key=lambda cause: shown[cause][i]) for i in range(3)] == first
+    assert [cause for cause, _ in notebook(result)] == first
+    page = json.loads(page_data(result))["curves"]
+    mean = dict(zip(page["keys"], page["mean"], strict=True))
+    for i in range(3):
+        by = {f"{JOINTS[k]} motion": mean.get(f"motion {i} {k} null", 0.0) for k in range(3)}
+        by["gravity"] = mean[f"tau_gravity {i} null null"]
+        assert max(by, key=lambda cause: by[cause]) == first[i]
+        numbers = cause_numbers(result, i)
+        assert numbers.labels[1] == first[i]
+        np.testing.assert_allclose(numbers.phases[0].size[1], sizes[first[i]][i])
 
 
 def few_of(columns: Columns, word: str, gravity: bool = True) -> tuple[Shares, list[str]]:
@@ -241,12 +260,12 @@ def page_table(page: Any) -> dict[str, float]:
 @pytest.mark.parametrize(
     ("chosen", "words", "gravity"),
     [
-        ({}, BOTH, True),
-        ({"motion": "together"}, ("motion",), True),
-        ({"order": "movement"}, BOTH, False),
+        ({}, MOTION, True),
+        ({"motion": "apart"}, BOTH, True),
+        ({"motion": "apart", "order": "movement"}, BOTH, False),
         ({"order": "tau_qd"}, ("velocity",), False),
-        ({"link": 1}, BOTH, True),
-        ({"link": 2, "motion": "together", "order": "movement"}, ("motion",), False),
+        ({"link": 1}, MOTION, True),
+        ({"link": 2, "order": "movement"}, MOTION, False),
     ],
     ids=str,
 )
@@ -258,8 +277,9 @@ def test_bars_and_table_of_the_page_are_those_of_all_samples(
         choose(driver, name, value)
     link = f"link{int(str(chosen['link'])) + 1}" if "link" in chosen else "[^/]+"
     sizes = columns.sizes(words, link, gravity)
-    with np.errstate(invalid="ignore"):
-        share = {cause: np.nan_to_num(values) for cause, values in percent(sizes).items()}
+    with np.errstate(invalid="ignore"):  # a view of parts counts in no share
+        counted = columns.sizes(MOTION, link, gravity) if words == BOTH else sizes
+        share = {cause: np.nan_to_num(values) for cause, values in percent(counted).items()}
     assert_same(page_bars(driver), share)
     through = "all links together" if "link" not in chosen else f"through {link}"
     said = f"net torque, {through}, over all 12,001 samples"
@@ -327,6 +347,7 @@ def test_bars_of_many_joints_are_the_same_on_the_page(
         assert hover == [f"{joint} {word}" for joint in first]
         caption = driver.find_element("id", "shares-caption").text
         assert caption.endswith("Of all other joints the shares are added up.")
+        assert ("A motion is acceleration and velocity together." in caption) == (word == "motion")
     assert driver.get_log("browser") == []
 
 

@@ -110,8 +110,8 @@ class AnalysisChoices:
     contact_threshold: float | None = option(None, "Force in N; 20 if not given")
     unactuated: tuple[str, ...] = option(
         (),
-        "Joint that nothing drives, by whose equation reactions are found; the floating base's if not"
-        " given; may be repeated",
+        "Joint that nothing drives: its torque is a residual, and reactions are found by its equation; the"
+        " floating base's if not given, none where motors drive that; may be repeated",
         metavar="JOINT",
     )
 

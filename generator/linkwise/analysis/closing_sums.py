@@ -1,6 +1,6 @@
 """Closing sums of a result: how far the terms of each whole are from it, at every sample."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,15 +28,23 @@ class Sum(NamedTuple):
 class ClosingSums:
     """Sums of rows of a result, which are added up for all wholes at once, part by part."""
 
-    def __init__(self, units: Sequence[str], rows: ResultRows, whole: str, *parts: str) -> None:
+    def __init__(
+        self,
+        units: Sequence[str],
+        rows: ResultRows,
+        whole: str,
+        *parts: str,
+        joints: Collection[int] | None = None,
+    ) -> None:
         """Set up the sums of all entries of a quantity, of parts with the same indices along its axes.
 
-        units: those of all joints
+        units: those of all joints; joints: those whose sums are meant, all if not given
         """
         axes = QUANTITIES[whole].axes
         found = [
             Sum(index[0], row, rows.numbers(*parts, **dict(zip(axes, index, strict=True))).tolist())
             for row, index in rows[whole].listed()
+            if joints is None or index[0] in joints
         ]
         self.sums = tuple(sorted(found, key=lambda one: -len(one.parts)))
         """Sums, those of most parts first."""
@@ -78,10 +86,8 @@ class ClosingSums:
         return total
 
 
-def closing(
-    parts: ClosingSums, wholes: ClosingSums, out: Array, partial: Array, units: Sequence[str]
-) -> Closure:
-    """Return the largest errors of the closing sums of τ_ij and of τ_i, by unit.
+def closing(sums: Mapping[str, ClosingSums], out: Array, partial: Array, units: Sequence[str]) -> Closure:
+    """Return the largest errors of closing sums, by unit, under their names among those of `Closure`.
 
     A joint that carries only rounding is measured by its peers.
 
@@ -90,13 +96,14 @@ def closing(
     """
     worst = NO_ERRORS
     before = np.abs(partial).sum(axis=-1).max(axis=0, initial=0.0)
-    found = [(sums, *sums.residuals(out)) for sums in (parts, wholes)]
-    for unit in wholes.of_unit:
+    found = {name: (some, *some.residuals(out)) for name, some in sums.items()}
+    for unit in dict.fromkeys(units):
         least = max(size for size, other in zip(before, units, strict=True) if other == unit)
-        pairs = []
-        for sums, errors, sizes in found:
-            alike = sums.of_unit[unit]
+        errors_of = {}
+        for name, (some, errors, sizes) in found.items():
+            alike = some.of_unit[unit]
             error, size = errors[alike].max(initial=0.0), sizes[alike].max(initial=least)
-            pairs += [float(error), float(error / size if size else error)]
-        worst |= Closure(*pairs)
+            errors_of[f"{name}_absolute"] = float(error)
+            errors_of[f"{name}_relative"] = float(error / size if size else error)
+        worst |= Closure(**errors_of)
     return worst

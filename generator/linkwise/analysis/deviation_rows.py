@@ -20,6 +20,7 @@ from linkwise.analysis.known_deviations import (
     Motion,
     Variances,
 )
+from linkwise.analysis.net_causes import NET
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.perturbed_robots import PerturbedRobots, perturbed_robots
 from linkwise.analysis.perturbed_rows import Perturbable, PerturbedArrays, PerturbedRows
@@ -33,8 +34,8 @@ from linkwise.arrays import Array, Index
 
 AT_ONCE = 256
 """Samples perturbed at once, whose rows stay in the cache."""
-FEW = ("tau", *PASSIVE, "tau_load", "power", "power_load")
-"""Quantities that are perturbed where friction or loads are part of joint torques: they are few."""
+FEW = ("tau", *PASSIVE, "tau_load", "power", "power_load", NET)
+"""Quantities that are perturbed where they are not known, as with friction or loads: they are few."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,8 @@ class DeviationRows:
             *(self.robot, self.convention, rows, tuple(name for name in names if name in quantities)),
             *(self._exact, given.motion),
         )
-        few = rows.numbers("time", "qd", "qdd", *FEW).tolist() if {*names} - quantities else []
+        left = [name for name in FEW if name not in quantities]
+        few = rows.numbers("time", "qd", "qdd", *left).tolist() if {*names} - quantities else []
         return replace(self, known=known, few=tuple(few))
 
     @property
@@ -131,7 +133,7 @@ class DeviationRows:
             return
         few = plain.with_rows([plain.rows.places[row] for row in self.few])
         exact = {} if parts.borne is None else {"tau": _of_joints(parts.borne, few.rows)}
-        names = [name for name in _names(plain.rows) if name in FEW]
+        names = [name for name in _names(plain.rows) if name in FEW and name in few.rows]
         yield from self._varied(few, names, exact, out[list(self.few)], time, motion)
 
     def _perturbed(

@@ -13,6 +13,7 @@ from linkwise.analysis.outputs import named_result, record, result_table
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.poles import pole_warnings
 from linkwise.analysis.request import Request
+from linkwise.analysis.residuals import ResidualSums
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_rows import Column
 from linkwise.analysis.samples import Samples
@@ -95,15 +96,19 @@ class Job:
     def run(self, sink: Sink, progress: Progress) -> WholeMovement:
         """Analyse every sample, handing the blocks to `sink`; then sweep cutoffs where that is asked for."""
         own = None if self.swept is None else RowSizes(self.decomposer.rows)
+        plan = self.decomposer
+        residuals = ResidualSums(plan.robot, plan.rows, plan.loads)
 
         def both(block: Array) -> None:
             if own is not None:
                 own(block)
+            residuals(block)
             sink(block)
 
         with within(self.source):
             asked = self.asked.processing
             done = stream(self.samples, self.decomposer, asked, both, progress, self.phases)
+            done = replace(done, residual_report=residuals.report())
             if self.swept is None or own is None:
                 return done
             return replace(done, cutoff_sweep=self.swept.run(own, progress))

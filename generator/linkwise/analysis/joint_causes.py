@@ -1,8 +1,12 @@
-"""Causes of joint torques, the same in every figure and in the notebook."""
+"""Causes of joint torques, and which is the largest: the same in figures, on the page and in the notebook.
+
+A coordinate's motion is one cause: its acceleration and its velocity, through all links, are summed first.
+The size of a cause is the mean magnitude of that sum.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -11,20 +15,12 @@ from linkwise.analysis.result_quantities import MOTION, PASSIVE
 from linkwise.analysis.row_sums import SumDeviations
 from linkwise.arrays import Array, Index, Mask
 
-MOTIONS: dict[str, tuple[str, ...]] = {
-    "acceleration": MOTION[:1],
-    "velocity": MOTION[1:],
-    "motion": MOTION,
-}
-FEW = 7
-"""Most joints for which a joint's acceleration and velocity are two causes, unless chosen otherwise."""
-
 
 @dataclass(frozen=True)
 class Cause:
     """One cause of joint torques, and its quantities."""
 
-    kind: Literal["named", "load", "own", "acceleration", "velocity", "motion"]
+    kind: Literal["named", "load", "own", "motion"]
     label: str
     quantities: tuple[str, ...]
     number: int | None = None
@@ -32,8 +28,8 @@ class Cause:
 
     @property
     def is_motion(self) -> bool:
-        """True if the cause is a joint's motion, or a part of that."""
-        return self.kind in MOTIONS
+        """True if the cause is a joint's motion."""
+        return self.kind == "motion"
 
     def rows(self, result: AnalysisResult, i: int) -> Index:
         """Return the numbers of the rows of the cause's torques on joint i."""
@@ -46,12 +42,10 @@ def causes_of(
     result: AnalysisResult,
     joints: Sequence[str],
     shown: Callable[[str], str] = str,
-    together: bool = True,
 ) -> tuple[Cause, ...]:
     """Return the causes in order: gravity or shares with names, loads, passive torques, each joint's motion.
 
-    joints: names of the joints, (n,); shown: function that formats a name. together: a motion is one cause,
-    otherwise its acceleration and its velocity are two.
+    joints: names of the joints, (n,); shown: function that formats a name
     """
     robot = result.robot
     if robot.is_written:
@@ -62,31 +56,29 @@ def causes_of(
     found += [
         Cause("own", f"own {name.removeprefix('tau_')}", (name,)) for name in PASSIVE if name in result.rows
     ]
-    kinds: tuple[Any, ...] = ("motion",) if together else ("acceleration", "velocity")
-    for k in result.robot.driven:
-        found += [Cause(kind, f"{shown(joints[k])} {kind}", MOTIONS[kind], k) for kind in kinds]
+    found += [Cause("motion", f"{shown(joints[k])} motion", MOTION, k) for k in robot.driven]
     return tuple(found)
 
 
-def are_motions_whole(result: AnalysisResult) -> bool:
-    """Return whether a joint's motion is one cause in shares and at first on the page.
-
-    It is one where the joints are many.
-    """
-    return len(result.robot.driven) > FEW
-
-
-def sizes(result: AnalysisResult, causes: Sequence[Cause]) -> Array:
-    """Return the mean magnitude of each cause's net torque on every joint with torques, (causes, joints).
+def sizes(result: AnalysisResult, causes: Sequence[Cause], joints: Sequence[int] | None = None) -> Array:
+    """Return the mean magnitude of each cause's net torque on joints with torques, (causes, joints).
 
     The mean is over all samples. Links are summed first: where links pull against each other, or an
     acceleration and a velocity do, the difference counts.
+
+    joints: numbers of the joints, all that have torques if not given
     """
-    rows = [[cause.rows(result, i) for i in result.robot.driven] for cause in causes]
-    total = np.zeros((len(causes), len(result.robot.driven)))
+    loaded = result.robot.driven if joints is None else joints
+    rows = [[cause.rows(result, i) for i in loaded] for cause in causes]
+    total = np.zeros((len(causes), len(loaded)))
     for part in result.parts():
         total += [[np.abs(part.values[own].sum(axis=0)).sum() for own in some] for some in rows]
     return total / result.total
+
+
+def largest_first(sizes: Array) -> list[int]:
+    """Return the numbers of causes by their sizes on one joint, (causes,), the largest first."""
+    return sorted(range(len(sizes)), key=lambda at: -float(sizes[at]))
 
 
 class CauseCertainty(NamedTuple):

@@ -8,6 +8,7 @@ import numpy as np
 from linkwise.analysis.certain_signs import LargestTorques
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.phases import PlacedPhase
+from linkwise.analysis.residuals import ResidualReport
 from linkwise.analysis.result_quantities import POWER_OF, WORK_BY_SOURCE
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.turned_rows import scratch
@@ -135,6 +136,7 @@ class MovementSums:
             total=self._samples,
             peaks=self._search.peaks(),
             cutoff_sweep=None,
+            residual_report=ResidualReport((), None, None),
             work_by_source={power: work for power, work in whole.items() if power in WORK_BY_SOURCE},
             work_in_phases=tuple(phases),
             works={power: work for power, work in whole.items() if power not in WORK_BY_SOURCE},

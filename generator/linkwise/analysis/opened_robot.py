@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from linkwise_runtime.chosen_names import known_as, nearest_first
+from linkwise_runtime.constraints.independent_joints import loose_base
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.file_joints import FileJoint, Order
 from linkwise_runtime.qpos_motion import Qpos
@@ -62,6 +63,8 @@ class OpenedRobot:
 
     contacts: GroundContacts | None = None
     """Contacts on which the robot stands on the ground."""
+    undriven: tuple[int, ...] | None = None
+    """Numbers of the joints that nothing drives, where somebody said so; None where nobody did."""
 
     @property
     def structure(self) -> Structure:
@@ -201,10 +204,28 @@ class OpenedRobot:
         return without_ending(self.links)
 
     @property
+    def residuals(self) -> tuple[int, ...]:
+        """Numbers of the joints with torques that nothing drives: as said, or those of a floating base.
+
+        A floating base slides and turns in one place, from the ground to the first link with mass, by three
+        coordinates or more, whatever its file calls these.
+        """
+        if self.contacts is not None:
+            return self.contacts.unactuated
+        found = self.undriven
+        if found is None:
+            found = () if self.tree is None else loose_base(self.tree)
+        return tuple(i for i in self.driven if i in found)
+
+    @property
     def moving_itself(self) -> tuple[int, ...]:
-        """Numbers of the joints that have torques, without unactuated ones; with them if no other is left."""
-        still = () if self.contacts is None else self.contacts.unactuated
-        return tuple(i for i in self.driven if i not in still) or self.driven
+        """Numbers of the joints that have torques, without residuals; with them if no other is left."""
+        return tuple(i for i in self.driven if i not in self.residuals) or self.driven
+
+    @property
+    def joints_apart(self) -> tuple[int, ...]:
+        """Numbers of the joints that have torques, those that are residuals last."""
+        return tuple(dict.fromkeys((*self.moving_itself, *self.driven)))
 
     def joints_supporting(self, joints: Iterable[int]) -> tuple[int, ...]:
         """Return the numbers of the joints with torques that carry what these joints are loaded with."""

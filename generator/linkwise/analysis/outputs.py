@@ -13,7 +13,7 @@ from linkwise_runtime.named_arrays import Part, dataset
 from linkwise_runtime.version import VERSION
 
 from linkwise.analysis.closed_motion import ClosedLog
-from linkwise.analysis.joint_causes import are_motions_whole, causes_of, sizes
+from linkwise.analysis.joint_causes import causes_of, largest_first, sizes
 from linkwise.analysis.muscle_remainder import remainder_record
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.result_quantities import POWER_OF, QUANTITIES, WORKS, ResultQuantity
@@ -74,6 +74,14 @@ CLOSED_AT_FEW = f"{SAMPLES} samples of each block, all terms computed there"
 """Samples at which sums close, where columns that were not asked for are computed of these alone."""
 
 
+def closed_at(result: AnalysisResult) -> str:
+    """Return the samples at which sums close, in words."""
+    if not result.rows.left_out:
+        return "every sample"
+    apart = "" if result.closure.nets_relative is None else "; net torques by cause of every sample"
+    return f"{CLOSED_AT_FEW}{apart}"
+
+
 def record(result: AnalysisResult) -> dict[str, Any]:
     """Return everything but the samples as plain data: choices, closure, columns and their totals."""
     robot = result.robot
@@ -102,9 +110,10 @@ def record(result: AnalysisResult) -> dict[str, Any]:
         **({} if result.cutoff_sweep is None else {"cutoff_sweep": result.cutoff_sweep.record()}),
         "asked_columns": list(result.asked_columns),
         "closure": asdict(result.closure),
-        "closure_is_of": CLOSED_AT_FEW if result.rows.left_out else "every sample",
+        "closure_is_of": closed_at(result),
         **({} if result.closed is None else {"constraints": _constraints(result, result.closed)}),
         **({} if robot.contacts is None else {"contacts": _contacts(result)}),
+        **({"residuals": result.residual_report.record()} if result.residual_report.residuals else {}),
         "work": _work(result),
         "ignored_columns": list(result.ignored),
         "warnings": [*result.warnings, *result.load_warnings],
@@ -220,6 +229,7 @@ def _values(result: AnalysisResult, name: str) -> Array:
     return out
 
 
+RESIDUAL = " (residual)"
 HEAD = ("joint", "peak |τ|", "mean |τ|", "largest cause", "its share", "gave", "took back")
 
 
@@ -233,16 +243,17 @@ def result_table(result: AnalysisResult) -> str:
     told = [0, *([] if "tau" in result.rows.left_out else [1, 2])]
     told += [3, 4] if not result.rows.left_out else []
     told += [5, 6] if "power" in result.works else []
-    causes = causes_of(result, joints, together=are_motions_whole(result)) if 3 in told else ()
+    causes = causes_of(result, joints) if 3 in told else ()
     rows = []
     loads = sizes(result, causes).T if causes else np.zeros((len(result.robot.driven), 0))
-    for at, (i, loading) in enumerate(zip(result.robot.driven, loads, strict=True)):
-        unit = result.robot.torque_units[i]
-        cells = {0: joints[i]}
+    for i in result.robot.joints_apart:
+        at = result.robot.driven.index(i)
+        unit, loading = result.robot.torque_units[i], loads[at]
+        cells = {0: f"{joints[i]}{RESIDUAL if i in result.robot.residuals else ''}"}
         if 1 in told:
             cells |= {1: f"{peak[at]:.4g} {unit}", 2: f"{mean[at]:.4g} {unit}"}
         if 3 in told:
-            most, whole = int(loading.argmax()), float(loading.sum())
+            most, whole = largest_first(loading)[0], float(loading.sum())
             cells[3] = causes[most].label if whole else ""
             cells[4] = f"{100 * loading[most] / whole:.0f} %" if whole else ""
         if 5 in told:
@@ -251,7 +262,9 @@ def result_table(result: AnalysisResult) -> str:
     title = f"{result.robot.name}: who loads whom in {result.source}"
     warnings = (*result.warnings, *result.load_warnings)
     head = tuple(HEAD[at] for at in told)
-    return page_part(title, table(head, rows)) + remark(result.provenance, *warnings)
+    return page_part(title, table(head, rows)) + remark(
+        result.provenance, *result.residual_report.lines, *warnings
+    )
 
 
 def _told(work: Work, joint: int) -> tuple[str, str]:

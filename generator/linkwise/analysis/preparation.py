@@ -70,8 +70,8 @@ def _prepared(log: Path, robot: OpenedRobot, asked: Request, progress: Progress,
     opened = open_log(log, reading, robot.joints, robot.file_joints, robot.qpos)
     with within(str(log)):
         torques = torque_columns("--trace-torque", opened.columns, robot, outputs.trace.pairs)
-    beside = (*switch_columns(asked.contacts, opened), *phase_columns(outputs.phases, opened))
-    samples, closed = _samples(opened, robot, reading, (*beside, *torques.values()), progress, buffer)
+    read_beside = (*switch_columns(asked.contacts, opened), *phase_columns(outputs.phases, opened))
+    samples, closed = _samples(opened, robot, reading, (*read_beside, *torques.values()), progress, buffer)
     with within(str(log)):
         start, stop = span_of(samples, processing)
         raw = samples.q[:LONGEST].copy() if uncertain is not None else samples.q[:0]
@@ -104,7 +104,8 @@ def _prepared(log: Path, robot: OpenedRobot, asked: Request, progress: Progress,
     certain = [*(["payloads"] if robot.payloads else []), *(["traced velocities"] if traced else [])]
     inputs = uncertain_inputs(asked.uncertain, uncertain, raw, samples, processing, robot, borne, certain)
     columns = () if outputs.tells_of_all or unfiltered is not None else outputs.columns
-    told = ToldBeside(outputs.power_terms, planned, bearings, outputs.induced_power, traced, inputs, columns)
+    beside = outputs.power_terms, planned, bearings, outputs.induced_power
+    told = ToldBeside(*beside, traced, inputs, columns, outputs.columns)
     decomposer = Decomposer.of(robot, processing.convention, borne, times, told)
     in_table = chosen_rows(decomposer.rows, outputs.columns, outputs.power_terms)
     swept = None

@@ -42,8 +42,9 @@ class Outputs:
     )
     columns: tuple[str, ...] = option(
         (),
-        "Columns that are computed and written: all; sums, those of joints; causes, with torques by cause; or"
-        " names, * standing for anything in a part of one, ** for any parts; may be repeated",
+        "Columns that are computed and written: all; sums, those of joints; by-cause, with net torques by"
+        " cause; causes, with torques by cause through each link; or names, * standing for anything in a part"
+        " of one, ** for any parts; may be repeated",
         metavar="WHICH",
     )
     power_terms: bool = option(False, "Write power by cause and order too")

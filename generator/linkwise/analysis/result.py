@@ -14,6 +14,7 @@ from linkwise.analysis.contacts.times import ContactTimes
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.loads.placed import PlacedLoad
 from linkwise.analysis.markers.followed import MarkerLog
+from linkwise.analysis.net_causes import NET
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result_rows import Column, ResultRows
@@ -226,7 +227,7 @@ class AnalysisResult(WholeMovement):
 
     def require(self, *quantities: str) -> None:
         """Raise LinkwiseError where columns of these quantities were not asked for; of any unless given."""
-        missing = sorted(self.rows.left_out.intersection(quantities or self.rows.left_out))
+        missing = sorted(self.rows.left_out.intersection(quantities or self.rows.left_out - {NET}))
         if missing:
             raise not_asked_for(missing)
 

@@ -62,6 +62,11 @@ TABLE = {
     "tau_friction": ("", "what the joint takes for its own Coulomb friction"),
     "tau_armature": ("", "what the joint takes for its own armature, the inertia behind its gear"),
     "tau_load": ("load_torque joint load", "what the joint takes to bear the load"),
+    "tau_by": (
+        "torque_by joint by",
+        "on the joint, all links together, by the cause: a coordinate's acceleration and velocity together,"
+        " gravity, a load, or what joints have of their own",
+    ),
     "tau_as_loads": (
         "torque_as_loads joint",
         "joint torque with what was measured in place of what contacts bear",
@@ -355,7 +360,7 @@ OF_BODIES = frozenset(
     for name in DEVIATION_OF.values()
     if name.partition("_")[0] in ("force", "energy", "gain", "flow", "acc", "reaction")
 ) | {*OF_RIGID, "tau", "tau_link", *(power for power, torque in TORQUE_OF.items() if torque in OF_RIGID)}
-OF_BODIES |= {"power", "power_link", "power_contact"}
+OF_BODIES |= {"tau_by", "power", "power_link", "power_contact"}
 """Quantities that bodies make uncertain."""
 OF_LOADS = frozenset(name for name in OF_BODIES if name not in OF_RIGID and not name.startswith("energy")) | {
     "tau_load",

@@ -14,6 +14,7 @@ from linkwise_runtime.robot_axes import WRENCH, NamedAxis, axes_of
 
 from linkwise.analysis.induced_points import InducedPoint
 from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.net_causes import cause_names
 from linkwise.analysis.opened_robot import OpenedRobot, load_unit
 from linkwise.analysis.result_quantities import (
     FORCE_OF,
@@ -34,7 +35,7 @@ DEVIATION, OF_MOTION = "sd/", "sd-motion/"
 """Beginning of the name of a quantity that is the standard deviation of the one named behind it."""
 OVER_TIME = {"velocity": "/s", "acceleration": "/s²"}
 FIELD_OF = {"load": "cause", "share": "cause", "contact": "cause", "constraint": "cause", "component": "row"}
-FIELD_OF |= {"bearing": "point", "wrench": "row"}
+FIELD_OF |= {"bearing": "point", "wrench": "row", "by": "cause"}
 """Fields of `Column` that have the indices along axes of other names."""
 
 
@@ -58,11 +59,11 @@ class Column:
     """A row as a column of a table; `joint`, `link` and `cause` are indices, None where they mean nothing.
 
     The cause is a coordinate; for a share with a name it is that share, for the torque of a load that load,
-    for share and power of a contact that contact, and for a force or slip the row of the constraint, where
-    `load` is the load that causes a force,
-    if one does. An induced acceleration has the number of its point and of a row of that point, a reaction
-    that of its joint among those asked for, and of a component of the wrench; the gain of energy has the
-    holder of that energy, a link or, behind these, a joint's armature, and what is traced its source.
+    for share and power of a contact that contact, for a net torque its number among all causes, and for a
+    force or slip the row of the constraint, where `load` is the load that causes a force, if one does. An
+    induced acceleration has the number of its point and of a row of that point, a reaction that of its joint
+    among those asked for, and of a component of the wrench; the gain of energy has the holder of that energy,
+    a link or, behind these, a joint's armature, and what is traced its source.
     """
 
     quantity: str
@@ -112,6 +113,7 @@ class ResultRows:
         }
         axes = axes_of(robot.joints, robot.units, robot.links, robot.share_names) | {
             "load": NamedAxis("load", tuple(borne.name for borne in loads)),
+            "by": NamedAxis("by", cause_names(robot, loads)),
             "constraint": NamedAxis("constraint", rows, bases),
             "contact": NamedAxis("contact", contacts),
             "holder": NamedAxis("holder", robot.holders),

@@ -26,6 +26,8 @@ class ToldBeside(NamedTuple):
     """Uncertainty of bodies, motion and loads."""
     columns: Sequence[str] = ()
     """Presets and patterns of the columns of torques that are computed; all where there are none."""
+    asked: Sequence[str] = ()
+    """Presets and patterns that were asked for, by which net torques by cause are told."""
 
 
 NOTHING_BESIDE = ToldBeside()

@@ -9,7 +9,7 @@ import numpy as np
 from linkwise_runtime.motion.tracer import TraceState
 
 from linkwise.analysis.borne_joints import ReactionShares
-from linkwise.analysis.chosen_columns import computed_rows
+from linkwise.analysis.chosen_columns import chosen_places
 from linkwise.analysis.closed_motion import reason_of
 from linkwise.analysis.closing_sums import ClosingSums, closing
 from linkwise.analysis.contacts.ground import Standing
@@ -19,6 +19,8 @@ from linkwise.analysis.deviation_rows import DeviationRows
 from linkwise.analysis.induced_power import PowerShares
 from linkwise.analysis.induced_shares import InducedShares
 from linkwise.analysis.loads.placed import LoadShift, PlacedLoad
+from linkwise.analysis.net_causes import NET
+from linkwise.analysis.net_torques import NetTorques
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.reaction_forces import ReactionForces
 from linkwise.analysis.result_quantities import PASSIVE, TERMS, TORQUE_OF
@@ -69,6 +71,7 @@ class Decomposer:
     """Terms of each τ_ij."""
     wholes: ClosingSums
     """Parts of each τ_i: τ_ij, passive torques of the joint, τ_ie."""
+    nets: NetTorques
     induced: InducedShares
     power: PowerShares
     forces: ReactionForces
@@ -98,9 +101,8 @@ class Decomposer:
             of_robot = terms.rows
         measured = [] if times is None else [at for at, loads in enumerate(times.measured) if loads]
         every_place = torque_places(robot, of_robot, loads, told.power_terms, measured)
-        chosen = computed_rows(ResultRows.of(robot, every_place, loads), told.columns, told.power_terms)
-        places, points = [every_place[row] for row in chosen.tolist()], told.induced.points
-        left_out = frozenset(name for name, _ in {*every_place} - {*places})
+        chosen = chosen_places(robot, every_place, loads, told.columns, told.asked, told.power_terms)
+        places, points, left_out = [*chosen.torques, *chosen.nets], told.induced.points, chosen.left_out
         sources = _sources(of_robot, places)
         induced = InducedShares.of(robot, told.induced, ResultRows.of(robot, places, loads))
         reactions = ReactionShares(robot, tuple(told.borne), tuple(loads), convention)
@@ -117,9 +119,10 @@ class Decomposer:
         rows = ResultRows.of(robot, every, loads, points, bearings, origins, left_out)
         parts = ClosingSums(robot.units, rows, "tau_link", *TERMS)
         wholes = ClosingSums(robot.units, rows, "tau", "tau_link", *PASSIVE, "tau_load")
+        nets = NetTorques.of(robot, len(loads), of_robot, rows, chosen.every_net)
         forces = ReactionForces(robot, tuple(loads), times)
         return cls(
-            *(robot, tuple(loads), convention, rows, sources, parts, wholes),
+            *(robot, tuple(loads), convention, rows, sources, parts, wholes, nets),
             *(induced, power, forces, reactions),
             *(deviations.of_rows(rows), times, terms, traced),
             cls.of(robot, convention, loads, times) if left_out else None,
@@ -147,7 +150,8 @@ class Decomposer:
     def with_rows(self, places: Sequence[Place]) -> Self:
         """Return the decomposer of these rows alone, of which none is a share by link or cause."""
         nothing = TermArrays(*(some[:0] for some in self.sources))
-        return replace(self, rows=replace(self.rows, places=tuple(places)), sources=nothing)
+        rows = replace(self.rows, places=tuple(places))
+        return replace(self, rows=rows, sources=nothing, nets=replace(self.nets, rows=rows))
 
     def with_load_off(self, e: int, shift: LoadShift) -> Self:
         """Return the decomposer in which load e is off by a shift."""
@@ -169,7 +173,9 @@ class Decomposer:
         plain, (acceleration, velocity) = self.rows.plain, self.sources[:2]
         ends = plain + len(acceleration), plain + len(acceleration) + len(velocity)
         out = np.empty((ends[1], len(time)))
-        packed, *_ = self._fill(out[:plain], time, self._consistent(time, q, qd, qdd))
+        motion = self._consistent(time, q, qd, qdd)
+        packed, _, standing, _ = self._fill(out[:plain], time, motion)
+        self._fill_gradient(out, packed, standing, motion)
         spread(out, slice(plain, ends[0]), getattr(packed, "acceleration", None), acceleration)
         spread(out, slice(*ends), getattr(packed, "velocity", None), velocity)
         if self.convention == "gradient":
@@ -191,11 +197,9 @@ class Decomposer:
         ):
             values = getattr(packed, kind, None)
             spread(out, rows[name].rows, values, places, (moved, rows[name].at[:, 2]))
-        if self.whole is None:
-            closure |= closing(self.parts, self.wholes, out, partial, self.robot.units)
-        if self.convention == "gradient" and "tau_qd" in rows:
-            velocity = self.robot.model.propagation(q, qd, qdd, convention="gradient").velocity
-            rows.put(out, "tau_qd", _left(standing, velocity))
+        sums = {"terms": self.parts, "links": self.wholes} if self.whole is None else {}
+        closure |= closing({**sums, **self.nets.closing_sums}, out, partial, self.robot.units)
+        self._fill_gradient(out, packed, standing, motion)
         self._fill_power(out, qd)
         self.deviations.fill(out, self, time, motion)
         return closure
@@ -218,8 +222,11 @@ class Decomposer:
         self._add_passive(out, standing, q, qd, qdd)
         self._add_loads(out, standing, time, q)
         spread(out, rows["tau_link"].rows, getattr(packed, "torque", None), sources.torque)
-        if "tau_share" in rows:
-            rows.put(out, "tau_share", self.robot.model.named_shares(q, qd))
+        self.nets.fill(out, packed, qdd, qd)
+        if "tau_share" in rows or self.nets.are_shares:
+            shares = self.robot.model.named_shares(q, qd)
+            rows.put(out, "tau_share", shares)
+            self.nets.put(out, "tau_share", np.asarray(shares).sum(axis=2))
         if "tau_gravity" in rows:
             spread(out, rows["tau_gravity"].rows, packed.gravity, sources.gravity)
         self.forces.fill(out, rows, standing, time, motion, partial)
@@ -227,6 +234,17 @@ class Decomposer:
         self.reactions.fill(out, rows, standing, time, motion)
         closure |= self.power.fill(out, unborne, standing, time, motion)
         return Filled(packed, partial, standing, closure)
+
+    def _fill_gradient(
+        self, out: Array, packed: Any, standing: Standing | None, motion: tuple[Array, Array, Array]
+    ) -> None:
+        """Fill anew what is by velocity, where that is of the gradient convention."""
+        if self.convention == "closing" or not ("tau_qd" in self.rows or self.nets.are_of_terms):
+            return
+        velocity = self.robot.model.propagation(*motion, convention="gradient").velocity
+        velocity = _left(standing, velocity)
+        self.rows.put(out, "tau_qd", velocity)
+        self.nets.fill(out, packed, motion[2], motion[1], velocity.sum(axis=2))
 
     @property
     def is_quick(self) -> bool:
@@ -278,7 +296,7 @@ class Decomposer:
     @cached_property
     def _needs_terms(self) -> bool:
         """True if rows are made of packed values: of torques by link and cause, or of what contacts bear."""
-        beside = self.terms is not None, self.induced.points, self.power.is_asked
+        beside = self.terms is not None, self.induced.points, self.power.is_asked, self.nets.are_of_terms
         return any(beside) or any(len(places) for places in self.sources)
 
     def _dense(self, packed: Any, n: int) -> Array:
@@ -323,13 +341,13 @@ class Decomposer:
     @cached_property
     def _passive(self) -> tuple[str, ...]:
         """Passive torques that some joint has, where they or joint torques are told."""
-        if not {"tau", *PASSIVE}.intersection(self.rows.named):
+        if not {"tau", NET, *PASSIVE}.intersection(self.rows.named):
             return ()
         return tuple(name for name, field in PASSIVE.items() if self.robot.with_own(field))
 
     def _add_loads(self, out: Array, standing: Standing | None, time: Array, q: Array) -> None:
         """Fill the torques by which joints carry loads, and add them to the joint torques."""
-        if self.loads and {"tau", "tau_load", "tau_before_muscles"}.intersection(self.rows.named):
+        if self.loads and {"tau", NET, "tau_load", "tau_before_muscles"}.intersection(self.rows.named):
             asked = [_left(standing, borne.torque(self.robot.model, time, q)) for borne in self.loads]
             torque = np.stack(asked, axis=-1)
             self._add(out, "tau_load", torque)
@@ -341,6 +359,7 @@ class Decomposer:
     def _add(self, out: Array, name: str, torque: Array) -> None:
         """Fill the rows of a quantity from torques (S, n, X), and add them to the joint torques."""
         self.rows.put(out, name, torque if name == "tau_load" else torque[..., 0])
+        self.nets.put(out, name, torque)
         rows, _, at = self.rows["tau"]
         for e in range(torque.shape[2]):
             out[rows] += torque[:, at[:, 0], e].T

@@ -47,7 +47,8 @@ class Closure:
     `induced` is the residual of induced accelerations, the sum of all shares less J q̈ + J̇ q̇; None where
     none were asked for. `power` is that of power by source, in W: of the gains of links' energies, and of
     flows through joints. `trace` is that of traced velocities, the sum of all parts less q̇, which integration
-    between samples leaves.
+    between samples leaves. `nets` is that of net torques by cause against τ_i, of the joints that have all of
+    them; None where there is none.
     """
 
     terms_absolute: float = 0.0
@@ -64,6 +65,8 @@ class Closure:
     power_relative: float | None = None
     trace_absolute: float | None = None
     trace_relative: float | None = None
+    nets_absolute: float | None = None
+    nets_relative: float | None = None
 
     def __or__(self, other: "Closure") -> "Closure":
         """Return the larger of both, error by error."""
@@ -74,7 +77,7 @@ class Closure:
 
     def check(self) -> None:
         """Raise LinkwiseError where the parts do not sum to the whole, or the recursion disagrees."""
-        worst = np.maximum(self.terms_relative, self.links_relative)
+        worst = np.max([self.terms_relative, self.links_relative, self.nets_relative or 0.0])
         if not worst <= LIMIT:
             raise LinkwiseError(
                 f"the robot's torques do not close (relative error {worst:.2g}); run `linkwise check` on it"

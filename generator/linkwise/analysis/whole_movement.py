@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from linkwise.analysis.certain_signs import LargestTorque
 from linkwise.analysis.chosen_columns import PRESETS
 from linkwise.analysis.cutoff_sweep import CutoffSweep
+from linkwise.analysis.residuals import ResidualReport
 from linkwise.analysis.verify import Closure
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
@@ -14,7 +15,7 @@ from linkwise.escape import listed
 
 def not_asked_for(quantities: Sequence[str]) -> LinkwiseError:
     """Return an error that says which preset of columns has what was not computed."""
-    preset = next(name for name in ("sums", "causes", "all") if {*quantities} <= {*PRESETS[name]})
+    preset = next(name for name in ("sums", "by-cause", "causes", "all") if {*quantities} <= {*PRESETS[name]})
     return LinkwiseError(
         f"columns left out what this is made of ({listed(quantities)}); it is there with columns {preset!r}"
     )
@@ -63,6 +64,8 @@ class WholeMovement:
     """Torques at their largest magnitude, with their deviations there; none where nothing is uncertain."""
     cutoff_sweep: CutoffSweep | None
     """Sizes of torques at other cutoffs; None where they were not asked for."""
+    residual_report: ResidualReport
+    """Residuals of coordinates that nothing drives, as far as their torques are computed."""
 
     @property
     def work(self) -> Work:

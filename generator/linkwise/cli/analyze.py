@@ -10,7 +10,7 @@ from linkwise_runtime.motion.trace_equations import BETWEEN, RESIDUAL
 from linkwise.analysis import Analysis
 from linkwise.analysis.choices import AnalysisChoices
 from linkwise.analysis.muscle_remainder import remainder_line
-from linkwise.analysis.outputs import CLOSED_AT_FEW
+from linkwise.analysis.outputs import closed_at
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.run import analyze_to
 from linkwise.cli import Json, tell
@@ -87,12 +87,15 @@ def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:
         shares += f"; power by source sums to what links gain within {closure.power_relative:.1e}"
     traced = closure.trace_relative
     shares += "" if traced is None else f"; traced velocities sum to those of the log within {traced:.1e}"
-    where = f", of {CLOSED_AT_FEW}" if analysis.rows.left_out else ""
+    nets = closure.nets_relative
+    shares += "" if nets is None else f"; net torques by cause sum to joint torques within {nets:.1e}"
+    where = f", of {closed_at(analysis)}" if analysis.rows.left_out else ""
     return [
         f"{analysis.total:,} samples at {analysis.rate:.6g} Hz, back end {analysis.robot.backend};"
         f" {recursion}; closure: terms sum to partial torques within {closure.terms_relative:.1e},"
         f" these to joint torques within {closure.links_relative:.1e} (relative){where}{shares}",
         *_of_contacts(analysis),
+        *analysis.residual_report.lines,
         *_of_residual(analysis),
         *([] if analysis.markers is None else [analysis.markers.line]),
         *filter(None, [remainder_line(analysis)]),

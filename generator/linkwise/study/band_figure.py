@@ -16,6 +16,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names, listed
 from linkwise.extras import extra
 from linkwise.plotstyle import INK, colour, dash, drawn, saved, styled
+from linkwise.study.causes_figure import drawn_causes
 from linkwise.study.comparisons import Compared
 from linkwise.study.deviation_columns import fitting_values
 from linkwise.study.deviations import Deviations, deviations
@@ -65,9 +66,11 @@ def band_figures(
     not there.
     """
     words = words_of_trials(trials)
-    drawn_of = [panels_of(figure, trials, tests) for figure in figures]
+    for figure in figures:
+        figure_columns(figure, columns_of_trials(trials))
+    drawn_of = [[] if figure.joints else panels_of(figure, trials, tests) for figure in figures]
     names = [
-        figure.name or (panels[0].column if len(panels) == 1 else f"figure{number}")
+        figure.name or _name(figure, panels) or f"figure{number}"
         for number, (figure, panels) in enumerate(zip(figures, drawn_of, strict=True), 1)
     ]
     files = file_names(file_name(name.replace("/", "-")) for name in names)
@@ -75,7 +78,15 @@ def band_figures(
         with styled() as matplotlib:
             matplotlib.rcParams["hatch.linewidth"] = EDGE
             for kind in figure.formats:
-                yield f"{name}.{kind}", saved(_drawn(figure, panels, words), kind)
+                drawing = _drawn(figure, panels, words) if panels else drawn_causes(figure, trials, tests)
+                yield f"{name}.{kind}", saved(drawing, kind)
+
+
+def _name(figure: PaperFigure, panels: Sequence[BandPanel]) -> str:
+    """Return the name of a figure of one column, or of one joint's causes; "" of several."""
+    if len(figure.joints) == 1:
+        return f"causes-{figure.joints[0]}"
+    return panels[0].column if len(panels) == 1 else ""
 
 
 def panels_of(
@@ -102,9 +113,9 @@ def figure_columns(figure: PaperFigure, names: Iterable[str]) -> list[str]:
     Raises LinkwiseError for unknown columns, for deviations as columns of their own, and for too many.
     """
     names = list(names)
-    parts = (fitting_values("[[figure]]", names, [pattern]) for pattern in figure.columns)
+    parts = (fitting_values("[[figure]]", names, [pattern]) for pattern in figure.patterns)
     found = list(dict.fromkeys(name for part in parts for name in part))
-    if len(found) > MOST:
+    if len(found) > MOST and not figure.joints:
         raise LinkwiseError(f"[[figure]]: {len(found)} columns; {MOST} are legible, so give fewer")
     return found
 

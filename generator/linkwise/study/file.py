@@ -90,7 +90,14 @@ def read_study(path: Path, trust_python: bool = False) -> StudyPlan:
             trust_python=trust_python,
         )
         _check(plan)
-    return plan
+    return replace(plan, trials=tuple(_with_nets(trial, plan.nets) for trial in plan.trials))
+
+
+def _with_nets(trial: Trial, nets: tuple[str, ...]) -> Trial:
+    """Return the trial with net torques by cause among what it computes, where the study asks for some."""
+    outputs = trial.choices.outputs
+    columns = (*(outputs.columns or ("all",)), *nets) if nets else outputs.columns
+    return replace(trial, choices=replace(trial.choices, outputs=replace(outputs, columns=columns)))
 
 
 def _factors(given: Any) -> tuple[str, ...]:

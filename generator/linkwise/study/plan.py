@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Literal
 
 from linkwise.analysis.choices import AnalysisChoices
+from linkwise.analysis.net_causes import NET
 from linkwise.analysis.phases import Phase
 from linkwise.errors import LinkwiseError
+from linkwise.escape import column_part
 from linkwise.option import written
 from linkwise.plotstyle import FigureFormat
 from linkwise.robot import Options
@@ -19,6 +21,8 @@ OF_FILES = tuple(one.key for one in written(AnalysisChoices) if one.option.is_fi
 """Choices that are paths of files."""
 WIDTHS = {"single": "90 mm", "double": "180 mm"}
 """Widths of figures over one and over two columns of a journal."""
+CAUSES = "causes:"
+"""Beginning of what a figure names in place of columns: what loads the joint that follows."""
 POINTS = 101
 """Number of points of a cycle, 0 to 100 %."""
 
@@ -78,7 +82,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """A figure of mean curves with bands, one for each level of a factor.
+    """A figure of mean curves with bands for each level of a factor; causes:JOINT is of what loads a joint.
 
     `band` is what is filled, between subjects; `hatched` the deviation by what is uncertain, where there is
     one: within a trial, of the mean, or of the truth of a new subject. `title` stands above all panels,
@@ -111,12 +115,27 @@ class PaperFigure:
                 f"[[figure]]: 'size' is {self.size!r}; give single or double, or a width of 40 to 500 mm, as"
                 " 120 mm"
             )
+        if 0 < len(self.joints) < len(self.columns):
+            raise LinkwiseError(
+                f"[[figure]]: 'columns' has {CAUSES}{self.joints[0]} beside others; draw causes in a figure"
+                " of their own"
+            )
 
     @property
     def width(self) -> float | None:
         """Width in mm; None where it follows from the panels, or `size` has none."""
         number = WIDTHS.get(self.size, self.size).removesuffix("mm").strip()
         return float(number) if number.replace(".", "", 1).isdecimal() else None
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints whose causes are drawn; none in a figure of columns."""
+        return tuple(one.removeprefix(CAUSES) for one in self.columns if one.startswith(CAUSES))
+
+    @property
+    def patterns(self) -> tuple[str, ...]:
+        """Patterns of the columns that it is drawn of."""
+        return tuple(f"{NET}/{column_part(joint)}/*" for joint in self.joints) or self.columns
 
 
 @dataclass(frozen=True)
@@ -154,3 +173,11 @@ class StudyPlan:
     pages: bool = field(kw_only=True)
     trust_python: bool = field(kw_only=True, repr=False)
     """True if robots that are Python files are run; no result depends on it."""
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        """Patterns of net torques by cause that tables, tests, figures or integrals are of, each once."""
+        every = [*self.columns, *(() if self.cycles is None else self.cycles.integrals)]
+        every += [one for some in self.comparisons for one in some.columns]
+        every += [one for figure in self.figures for one in figure.patterns]
+        return tuple(dict.fromkeys(one for one in every if one.removeprefix("sd/").startswith(NET)))

@@ -34,7 +34,8 @@ class Contacts:
     value; or, if `loads` are given, while the measured loads on its body exceed `threshold` in N. These loads
     do not load the robot: contact forces are compared with them, and forces that several contacts could carry
     are shared in proportion to them. `unactuated` names the joints that nothing drives, from whose equations
-    the contact forces are found: the joints of the floating base unless given.
+    the contact forces are found, and whose torques are residuals without contacts: the joints of the floating
+    base unless given, and none by the name "none".
 
     Raises LinkwiseError for values that do not go together.
     """
@@ -53,7 +54,6 @@ class Contacts:
             for flag, there in (
                 ("--contact-while", self.columns),
                 ("--contact-loads", self.loads),
-                ("--unactuated", self.unactuated),
             ):
                 if there:
                     raise LinkwiseError(f"{flag} goes with --contact; add it")

@@ -21,11 +21,14 @@ from linkwise.escape import listed
 def with_contacts(robot: OpenedRobot, contacts: Contacts) -> OpenedRobot:
     """Return the robot with contacts.
 
+    Without contacts, only what nothing drives is as it is said there.
+
     Raises LinkwiseError for frames that do not exist or stand on the ground, contacts that leave nothing to
     move, two contacts of one name, and a robot of which every joint is driven.
     """
     if not contacts.given:
-        return robot
+        said = contacts.unactuated
+        return replace(robot, undriven=_said(robot, said)) if said else robot
     tree = robot.package.manifest.tree
     first = contacts.given[0]
     if tree is None:
@@ -53,14 +56,8 @@ def with_contacts(robot: OpenedRobot, contacts: Contacts) -> OpenedRobot:
 
 def _unactuated(robot: OpenedRobot, given: Sequence[str]) -> tuple[int, ...]:
     """Return the joints that nothing drives: those given, or those of the floating base."""
-    for name in given:
-        if name not in robot.driven_joints:
-            raise LinkwiseError(
-                f"--unactuated {name}: {robot.name} has no such joint that moves by itself; they are"
-                f" {listed(nearest_first(name, robot.driven_joints))}"
-            )
     model: Any = robot.model
-    base = [robot.joints.index(name) for name in given] or list(loose_base(model.backend.tree))
+    base = _said(robot, given) if given else loose_base(model.backend.tree)
     found = tuple(sorted({i for i in base if i in robot.driven}))
     if not found:
         raise LinkwiseError(
@@ -69,6 +66,23 @@ def _unactuated(robot: OpenedRobot, given: Sequence[str]) -> tuple[int, ...]:
             " with --unactuated"
         )
     return found
+
+
+NONE = "none"
+"""Word for no joint, where a joint that nothing drives is asked for."""
+
+
+def _said(robot: OpenedRobot, given: Sequence[str]) -> tuple[int, ...]:
+    """Return the joints of these names; raise LinkwiseError for one that has no torque."""
+    if tuple(given) == (NONE,) and NONE not in robot.joints:
+        return ()
+    for name in given:
+        if name not in robot.driven_joints:
+            raise LinkwiseError(
+                f"--unactuated {name}: {robot.name} has no such joint that moves by itself; they are"
+                f" {listed(nearest_first(name, robot.driven_joints))}, or {NONE}"
+            )
+    return tuple(robot.joints.index(name) for name in given)
 
 
 def _named(robot: OpenedRobot, contact: Contact) -> Contact:

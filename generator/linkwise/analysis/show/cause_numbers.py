@@ -1,11 +1,18 @@
-"""Numbers of the causes of one joint's torque in each phase of a movement: means and root mean squares."""
+"""Numbers of the causes of one joint's torque in each phase of a movement: means and mean sizes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from linkwise.analysis.joint_causes import Cause, causes_of, curves, deviation_curves
+from linkwise.analysis.joint_causes import (
+    Cause,
+    causes_of,
+    curves,
+    deviation_curves,
+    largest_first,
+    sizes,
+)
 from linkwise.analysis.loads.placed import moving_joints
 from linkwise.analysis.phases import PlacedPhase
 from linkwise.analysis.result import AnalysisResult
@@ -88,13 +95,12 @@ NOTHING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class PhaseNumbers:
-    """A phase, and the mean and root mean square of each row in it, (rows,); of both deviations at most."""
+    """A phase, and the mean and mean size of each row in it, (rows,); of both deviations at most."""
 
     phase: ShownPhase
     mean: Array
-    rms: Array
-    mean_deviation: Array
-    rms_deviation: Array
+    size: Array
+    deviation: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,65 +114,49 @@ class CauseNumbers:
 
 
 class _Tally:
-    """Running sums of curves and of their products, over the samples of a phase."""
+    """Running sums of rows, of their magnitudes and of their deviations, over the samples of a phase."""
 
-    def __init__(self, curves: int) -> None:
-        self.count, self.sums, self.products = 0, np.zeros(curves), np.zeros((curves, curves))
+    def __init__(self, rows: int) -> None:
+        self.count, self._sums = 0, np.zeros((3, rows))
 
-    def __call__(self, values: Array) -> None:
+    def __call__(self, values: Array, deviations: Array) -> None:
+        """Add samples of the rows, (rows, samples)."""
         self.count += values.shape[1]
-        self.sums += values.sum(axis=1)
-        self.products += values @ values.T
+        self._sums += [values.sum(axis=1), np.abs(values).sum(axis=1), deviations.sum(axis=1)]
 
-    def mean(self, rows: Array) -> Array:
-        """Return the mean of sums of curves; rows (rows, curves) has ones for the curves of each sum."""
-        mean: Array = rows @ self.sums / self.count
-        return mean
-
-    def rms(self, rows: Array) -> Array:
-        """Return the root mean square of sums of curves, with rows as for `mean`."""
-        squares = np.einsum("ra,ab,rb->r", rows, self.products, rows)
-        root: Array = np.sqrt(np.maximum(squares, 0.0) / self.count)
-        return root
+    def numbers(self, phase: ShownPhase) -> PhaseNumbers:
+        """Return what the rows come to in a phase."""
+        return PhaseNumbers(phase, *(self._sums / self.count))
 
 
 def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
     """Return the numbers of joint i over all samples; raise LinkwiseError for a phase without any."""
     causes = causes_of(result, result.robot.plot_joints, drawn)
+    labels, rows = _rows(result, causes, sizes(result, causes, [i])[:, 0])
     asked = shown_phases(result, i)
-    (every, *tallies), (spread, *spreads) = (
-        [_Tally(1 + len(causes)) for _ in range(1 + len(asked))] for _ in range(2)
-    )
+    every, *tallies = [_Tally(len(rows)) for _ in range(1 + len(asked))]
     torque = result.rows.deviations(result.rows.numbers("tau", joint=i))
-    peaks, apart = np.zeros(len(causes)), True
+    apart = True
     for part in result.parts():
-        values = np.concatenate([part.torque[:, [i]].T, curves(part, causes, i)])
+        values = rows @ np.concatenate([part.torque[:, [i]].T, curves(part, causes, i)])
+        spread = rows @ np.concatenate([[part.values[torque].sum(axis=0)], deviation_curves(part, causes, i)])
         on = [phase.on(part) for phase in asked]
-        beside = np.concatenate([[part.values[torque].sum(axis=0)], deviation_curves(part, causes, i)])
-        np.maximum(peaks, np.abs(values[1:]).max(axis=1), out=peaks)
         apart &= not on or int(np.sum(on, axis=0).max()) <= 1
-        for tally, own, here in zip(tallies, spreads, on, strict=True):
-            tally(values[:, here])
-            own(beside[:, here])
-        every(values)
-        spread(beside)
+        for tally, here in zip(tallies, on, strict=True):
+            tally(values[:, here], spread[:, here])
+        every(values, spread)
     shown = require_samples(result, asked, [tally.count for tally in tallies])
-    labels, rows = _rows(result, causes, every, peaks > NOTHING * peaks.max(initial=0.0))
-    found = zip(tallies, spreads, strict=True) if shown == asked else [(every, spread)]
-    numbers = (
-        PhaseNumbers(phase, tally.mean(rows), tally.rms(rows), own.mean(rows), own.rms(rows))
-        for phase, (tally, own) in zip(shown, found, strict=True)
-    )
-    return CauseNumbers(labels, tuple(numbers), apart)
+    found = zip(tallies if shown == asked else [every], shown, strict=True)
+    return CauseNumbers(labels, tuple(tally.numbers(phase) for tally, phase in found), apart)
 
 
-def _rows(
-    result: AnalysisResult, causes: Sequence[Cause], every: _Tally, there: Array
-) -> tuple[tuple[str, ...], Array]:
-    """Return labels and rows, the largest cause over the movement first, small motions and muscles last."""
+def _rows(result: AnalysisResult, causes: Sequence[Cause], sizes: Array) -> tuple[tuple[str, ...], Array]:
+    """Return labels and rows, the largest cause over the movement first, small motions and muscles last.
+
+    A row has ones for the torque itself, at first, and for the causes of which it is the sum.
+    """
     alone = np.eye(1 + len(causes))
-    sizes = every.rms(alone)[1:]
-    order = sorted(np.flatnonzero(there).tolist(), key=lambda at: -float(sizes[at]))
+    order = [at for at in largest_first(sizes) if sizes[at] > NOTHING * sizes.max()]
     muscles = [e for e, load in enumerate(result.loads) if load.is_muscle]
     kinds = {
         "motion of {} others": [at for at in order if causes[at].is_motion],

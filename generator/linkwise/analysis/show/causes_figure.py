@@ -1,6 +1,6 @@
 """Figure of the causes of one joint's torque, in each phase of the movement: stance against swing.
 
-Bars are the mean and the root mean square over each phase, the largest cause first.
+Bars are the mean and the mean size over each phase, the largest cause first.
 """
 
 import math
@@ -33,7 +33,7 @@ GAP = 9.0
 
 
 def causes(result: AnalysisResult, i: int) -> "Figure":
-    """Draw the joint's torque over time, and bars of each cause's mean and r.m.s. in each phase."""
+    """Draw the joint's torque over time, and bars of each cause's mean and mean size in each phase."""
     numbers = cause_numbers(result, i)
     phases = numbers.phases
     height = (0.17 * len(phases) + 0.13) * len(numbers.labels)
@@ -54,7 +54,9 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
     )
     write_title(figure, result, f"What loads {drawn(result.robot.joints[i], 40)}")
     told = [phase.told for phase in asked_phases(result, i)]
-    note = " · ".join(["motion: acceleration and velocity together", *told, foot(result)])
+    note = " · ".join(
+        ["motion: acceleration and velocity together; size: mean of the magnitude", *told, foot(result)]
+    )
     write_note(figure, *bands.notes, *([WHISKERS] if len(bands) else []), note)
     figure.draw_without_rendering()  # places the panels, so that labels have their final width
     for panel in (means, sizes):
@@ -91,10 +93,10 @@ def _over_time(panel: Any, result: AnalysisResult, i: int, numbers: CauseNumbers
 
 def _both_bars(means: Any, sizes: Any, numbers: CauseNumbers, unit: str) -> None:
     labels = [one.phase.label for one in numbers.phases]
-    _bars(means, labels, [(one.mean, one.mean_deviation) for one in numbers.phases])
-    _bars(sizes, labels, [(one.rms, one.rms_deviation) for one in numbers.phases])
+    _bars(means, labels, [(one.mean, one.deviation) for one in numbers.phases])
+    _bars(sizes, labels, [(one.size, one.deviation) for one in numbers.phases])
     means.set_title(f"mean ({unit})")
-    sizes.set_title(f"root mean square ({unit})")
+    sizes.set_title(f"mean size ({unit})")
     means.set_yticks(range(len(numbers.labels)), numbers.labels)
     means.get_yticklabels()[0].set_fontweight("bold")
     means.invert_yaxis()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from linkwise.analysis.joint_causes import largest_first
 from linkwise.analysis.result import AnalysisResult
 from linkwise.arrays import Array
 from linkwise.extras import extra
@@ -122,6 +123,6 @@ def foot(result: AnalysisResult) -> str:
 
 def largest_few(sizes: Sequence[float] | Array, most: int) -> tuple[list[int], list[int]]:
     """Return the indices of the `most` largest and of the others, each ascending; never only one other."""
-    order = sorted(range(len(sizes)), key=lambda at: -float(sizes[at]))
+    order = largest_first(np.asarray(sizes, dtype=float))
     named = len(order) if len(order) == most + 1 else most
     return sorted(order[:named]), sorted(order[named:])

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.joint_causes import are_motions_whole
 from linkwise.analysis.loads.placed import model_pose
 from linkwise.analysis.muscle_remainder import remainder_line
 from linkwise.analysis.opened_robot import OpenedRobot
@@ -127,10 +126,10 @@ def page_data(result: AnalysisResult) -> str:
         "stride": stride,
         "convention": result.processing.convention,
         "joints": _joints(result),
+        "residuals": [printable(line) for line in result.residual_report.lines],
         "links": list(map(printable, robot.links)),
         "columns": [_column(result.columns[at], robot.driven) for at in shown],
         "values": encoded(instants.values[shown]),
-        "together": are_motions_whole(result),
         "curves": curve_data(result, sums, pieces, stride > 1),
         "work": _work(result),
         "largestPower": _largest_power(result),
@@ -169,13 +168,17 @@ def _column(column: Column, driven: Sequence[int]) -> dict[str, Any]:
     }
 
 
-def _joints(result: AnalysisResult) -> list[dict[str, str]]:
-    """Return the joints with torques: names, names as plots show them, and units."""
+def _joints(result: AnalysisResult) -> list[dict[str, Any]]:
+    """Return the joints with torques: names, names as plots show them, units, and which are residuals."""
     robot = result.robot
-    every = list(zip(robot.joints, robot.plot_joints, robot.units, strict=True))
     return [
-        {"name": printable(name), "shown": printable(shown), "unit": unit}
-        for name, shown, unit in (every[i] for i in robot.driven)
+        {
+            "name": printable(robot.joints[i]),
+            "shown": printable(robot.plot_joints[i]),
+            "unit": robot.units[i],
+            "residual": i not in robot.moving_itself,
+        }
+        for i in robot.driven
     ]
 
 

@@ -18,6 +18,7 @@ from linkwise.analysis.show.drawn_curves import (
 )
 from linkwise.analysis.whole_movement import Work
 from linkwise.arrays import Array
+from linkwise.escape import listed
 from linkwise.plotstyle import INK, colour, dash, drawn, tone
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ MANY = 12
 def power(result: AnalysisResult, _: int) -> "Figure":
     """Draw curves of P_i = τ_i q̇_i in W, and bars of joints' and contacts' work on links and loads in J."""
     robot = result.robot
-    joints = [drawn(robot.plot_joints[i]) for i in robot.driven]
+    joints = [drawn(robot.plot_joints[i]) for i in robot.moving_itself]
     ground = () if robot.contacts is None else robot.contacts.names
     givers = [*joints, *(drawn(f"ground at {name}") for name in ground)]
     height = 0.9 + (0.34 if len(givers) <= MANY else 0.26) * len(givers)
@@ -43,7 +44,7 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     curves, bars = figure.subplots(2, 1, height_ratios=(2.4, height))
     bands = _curves(curves, result, joints)
     targets = [drawn(name) for name in (*robot.plot_links, *result.load_labels)]
-    _bars(bars, _every_work(result, list(robot.driven)), targets)
+    _bars(bars, _every_work(result, list(robot.moving_itself)), targets)
     into = "links and loads" if result.loads else "links"
     bars.set_title(f"Work: taken back out of {into}, and given to them")
     bars.set_yticks(range(len(givers)), givers)
@@ -52,7 +53,9 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     bars.grid(axis="y", visible=False)
     _legend(bars, "link or load" if result.loads else "link")
     write_title(figure, result)
-    write_note(figure, *bands.notes, foot(result))
+    still = [drawn(robot.plot_joints[i]) for i in robot.driven if i not in robot.moving_itself]
+    left_out = [f"Left out, as nothing drives these: {listed(still)}."] if still else []
+    write_note(figure, *left_out, *bands.notes, foot(result))
     return figure
 
 
@@ -61,7 +64,7 @@ def _curves(panel: Any, result: AnalysisResult, joints: list[str]) -> Bands:
 
     Returns the bands.
     """
-    driven, work = list(result.robot.driven), result.joint_work
+    driven, work = list(result.robot.moving_itself), result.joint_work
     named, rest = largest_few((work.given + work.taken)[driven], MOST)
     found = drawn_curves(result, lambda part: part.joint_power.T[driven])
     bands = Bands(result, [result.rows.numbers("power", joint=driven[i]) for i in named])

@@ -2,13 +2,13 @@
 
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from linkwise.analysis.certain_signs import DEVIATIONS
-from linkwise.analysis.joint_causes import Cause, are_motions_whole, causes_of, certainty, sizes
+from linkwise.analysis.joint_causes import Cause, causes_of, certainty, largest_first, sizes
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.bands import ADDED
 from linkwise.analysis.show.drawn_curves import largest_few, new_figure, write_title
@@ -22,12 +22,13 @@ if TYPE_CHECKING:
 
 MANY = 12
 """Number of joints above which a bar has the joint's own motion, the largest other one, and the rest."""
-HATCHES = {"motion": "", "acceleration": "", "velocity": "////", "own": "....", "load": "xx", "named": ""}
+HATCHES = {"motion": "", "own": "....", "load": "xx", "named": ""}
 LEANING = (
     "Net torques are of all links together: joint torques determine them.\n"
     "What goes through one link leans on how the file spreads mass over the links."
 )
 """Remark on what rests on the file's masses, for rigid links."""
+MOVED = "A joint's motion is its acceleration and its velocity together."
 LARGEST, REST = "largest motion of another joint", "motions of all other joints, shares added"
 
 
@@ -50,6 +51,12 @@ class SharePart:
         """Return the name of the cause at the i-th joint that is drawn."""
         return f"{self.names[i]} motion" if self.names else self.label
 
+    def at(self, joints: Sequence[int]) -> "SharePart":
+        """Return the part at these places of joints."""
+        numbers = list(joints)
+        arrays = {name: getattr(self, name)[numbers] for name in ("sizes", "spreads", "unsure")}
+        return replace(self, **arrays, names=tuple(self.names[at] for at in numbers) if self.names else ())
+
 
 @dataclass(frozen=True, eq=False)
 class _Sized:
@@ -70,7 +77,7 @@ def share_parts(result: AnalysisResult) -> tuple[list[SharePart], list[SharePart
     Motions are grouped if there are more joints than `MANY`.
     """
     robot = result.robot
-    causes = causes_of(result, robot.plot_joints, drawn, together=are_motions_whole(result))
+    causes = causes_of(result, robot.plot_joints, drawn)
     certain = certainty(result, causes)
     found = list(map(_Sized, causes, sizes(result, causes), certain.deviation, certain.unsure))
     moving = [one for one in found if one.cause.is_motion]
@@ -116,7 +123,7 @@ def _small_muscles(result: AnalysisResult, found: Sequence[_Sized]) -> list[_Siz
 
 
 def _each(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
-    """Return a part for every motion, or for its acceleration and its velocity."""
+    """Return a part for every motion."""
     place = {k: at for at, k in enumerate(result.robot.driven)}
     return [one.part(tone(place[one.cause.number or 0]), HATCHES[one.cause.kind]) for one in found]
 
@@ -128,7 +135,7 @@ def _few(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
         np.array([getattr(one, what) for one in found]).T for what in ("sizes", "spreads", "unsure")
     )
     others = by * (1.0 - np.eye(len(driven)))
-    at = np.arange(len(driven)), others.argmax(axis=1)
+    at = np.arange(len(driven)), np.array([largest_first(own)[0] for own in others])
     first = tuple(drawn(names[driven[k]]) for k in at[1])
     rest, rest_spread = (one.sum(axis=1) - one.diagonal() - one[at] for one in (by, spreads))
     nothing = np.zeros(len(driven), np.bool_)
@@ -142,7 +149,8 @@ def _few(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
 def shares(result: AnalysisResult, _: int) -> "Figure":
     """Draw two bars for each joint, in % of mean sizes: every cause, and the movement's causes alone."""
     robot = result.robot
-    fixed, movement = share_parts(result)
+    order = [robot.driven.index(i) for i in robot.joints_apart]
+    fixed, movement = ([part.at(order) for part in some] for some in share_parts(result))
     every = [*fixed, *movement]
     notes = _notes(result, every)
     rows = -(-len(every) // 3)
@@ -155,7 +163,9 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     told = len(robot.share_names) == 1  # several are in the legend
     left.set_title(f"everything, {out} too" if told else "everything")
     right.set_title(f"the movement alone, without {out}" if told else "the movement alone")
-    left.set_yticks(range(len(robot.driven)), [drawn(robot.plot_joints[i]) for i in robot.driven])
+    left.set_yticks(range(len(robot.driven)), _loaded(result))
+    for axis in (left, right) if len(robot.moving_itself) < len(robot.driven) else ():
+        axis.axhline(len(robot.moving_itself) - 0.5, color=INK, linewidth=0.9)
     left.set_ylim(len(robot.driven) - 0.4, -0.6)
     left.set_ylabel("loaded joint")
     for part in movement:
@@ -195,12 +205,21 @@ def _unsure_patch() -> Any:
     )
 
 
+def _loaded(result: AnalysisResult) -> list[str]:
+    """Return the names of the joints that are drawn, residuals last."""
+    robot = result.robot
+    kinds = ["" if i in robot.moving_itself else "residual " for i in robot.joints_apart]
+    return [f"{kind}{drawn(robot.plot_joints[i])}" for kind, i in zip(kinds, robot.joints_apart, strict=True)]
+
+
 def _notes(result: AnalysisResult, parts: Sequence[SharePart]) -> list[str]:
     """Return what rests on the file's masses, what whiskers are, and which causes have no certain sign."""
-    found = LEANING.split("\n") if result.robot.tree is not None else []
+    some = len(result.robot.moving_itself) < len(result.robot.driven)
+    apart = ["Below the line are residuals: nothing drives these."] if some else []
+    found = [*apart, MOVED, *(LEANING.split("\n") if result.robot.tree is not None else [])]
     if not any(part.spreads.any() for part in parts):
         return found
-    joints = [drawn(result.robot.plot_joints[i]) for i in result.robot.driven]
+    joints = _loaded(result)
     unsure = [
         f"{part.name(i)} on {joints[i]}" for part in parts for i in np.flatnonzero(part.unsure).tolist()
     ]

@@ -1,0 +1,121 @@
+"""Residuals stand apart from joints: what nothing drives is told, held to limits, and never the largest."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.command_line import run_linkwise
+from helpers.motion_logs import LEG, PLANAR3, smooth, write_csv
+from linkwise import LinkwiseError, Load, generate, read_system, write_package
+from linkwise.analysis import Analysis, analyze
+from linkwise.analysis.contacts import Contacts
+from linkwise.analysis.show.page import page_data
+
+LEGS = ["pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r"]
+FORCE = np.array([30.0, 600.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def leg(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A leg whose pelvis floats in a plane, and a log of it."""
+    made = tmp_path_factory.mktemp("leg")
+    write_package(generate(read_system(LEG), ["numpy"]), made / "leg")
+    moving = smooth(80, 6)
+    moving[:, 1:] *= 0.2
+    moving[:, 2] += 1.0
+    write_csv(made / "log.csv", moving, LEGS)
+    return made
+
+
+@pytest.fixture(scope="module")
+def pushed(leg: Path) -> Analysis:
+    """A push of the ground whose size varies over the movement."""
+    time = np.arange(80) / 100
+    push = Load("right", "foot", FORCE * (0.5 + 0.5 * np.sin(3 * time))[:, None], time=time)
+    return analyze(leg / "log.csv", leg / "leg", loads=[push])
+
+
+def test_peaks_and_root_mean_squares_are_numpys_and_held_to_external_forces(pushed: Analysis) -> None:
+    report = pushed.residual_report
+    assert [one.joint for one in report.residuals] == LEGS[:3]
+    for i, one in enumerate(report.residuals):
+        assert one.peak == pytest.approx(np.abs(pushed.torque[:, i]).max(), rel=1e-12)
+        assert one.rms == pytest.approx(np.sqrt((pushed.torque[:, i] ** 2).mean()), rel=1e-12)
+    force = np.linalg.norm(FORCE) * (0.5 + 0.5 * np.sin(3 * pushed.time)).max()
+    assert report.force == pytest.approx(force, rel=1e-9)
+    assert report.height == pytest.approx(height_of(*pushed.q[:, 1:].T).mean(), rel=1e-9)
+    assert [one.limit for one in report.residuals] == pytest.approx(
+        [0.05 * force, 0.05 * force, 0.01 * force * report.height]
+    )
+    assert pushed.record()["residuals"]["of"][0]["joint"] == "pelvis_tx"
+    assert any("doi:10.1115/1.4029304" in line for line in report.lines)
+
+
+def height_of(y: Any, tilt: Any, hip: Any, knee: Any, ankle: Any) -> Any:
+    """Height of the centre of mass, link by link in the plane."""
+
+    def raised(angle: Any, forward: float, upward: float) -> Any:
+        return forward * np.sin(angle) + upward * np.cos(angle)
+
+    thigh, shank, foot = tilt + hip, tilt + hip + knee, tilt + hip + knee + ankle
+    hip_at = y + raised(tilt, 0, -0.07)
+    knee_at = hip_at + raised(thigh, 0, -0.429)
+    ankle_at = knee_at + raised(shank, 0, -0.43)
+    heights = {
+        50.85: y + raised(tilt, 0, 0.245),
+        7.5: hip_at + raised(thigh, 0, -0.186),
+        3.49: knee_at + raised(shank, 0, -0.186),
+        1.09: ankle_at + raised(foot, 0.09, -0.04),
+    }
+    return sum(mass * height for mass, height in heights.items()) / sum(heights)
+
+
+def test_figures_begin_with_a_joint_and_draw_residuals_below_the_others(pushed: Analysis) -> None:
+    pytest.importorskip("matplotlib")
+    assert "hip_flexion_r" in pushed.figure("causes").get_suptitle()
+    shares = pushed.figure("shares")
+    names = [text.get_text() for text in shares.axes[0].get_yticklabels()]
+    assert names == [*LEGS[3:], *(f"residual {name}" for name in LEGS[:3])]
+    widths = [bar.patches[0].get_width() for bar in shares.axes[0].containers]
+    hip = np.abs(pushed.gravity[:, 3].sum(axis=1)).mean()
+    every = [np.abs((pushed.acceleration + pushed.velocity)[:, 3, :, k].sum(1)).mean() for k in range(6)]
+    whole = hip + np.abs(pushed.load_torque[:, 3, 0]).mean() + sum(every)
+    assert widths[0] == pytest.approx(100 * hip / whole)
+    power = pushed.figure("power")
+    shown = [text.get_text() for text in power.axes[1].get_yticklabels()]
+    assert shown == LEGS[3:]
+    assert "Left out, as nothing drives these: pelvis_tx" in power.get_supxlabel()
+    data = json.loads(page_data(pushed))
+    assert [joint["residual"] for joint in data["joints"]] == [True] * 3 + [False] * 3
+    assert len(data["residuals"]) == 2
+    assert "pelvis_tx (residual)" in pushed._repr_html_()
+
+
+def test_motors_are_said_to_drive_a_base_and_other_joints_to_be_driven_by_nothing(leg: Path) -> None:
+    log, robot = leg / "log.csv", leg / "leg"
+    driven = analyze(log, robot, contacts=Contacts(unactuated=("none",)))
+    assert driven.residual_report.residuals == ()
+    assert driven.robot.moving_itself == tuple(range(6))
+    other = analyze(log, robot, contacts=Contacts(unactuated=("ankle_angle_r",)))
+    assert [one.joint for one in other.residual_report.residuals] == ["ankle_angle_r"]
+    assert other.residual_report.residuals[0].limit is None
+    with pytest.raises(LinkwiseError, match="--unactuated toe: leg has no such joint that moves by itself"):
+        analyze(log, robot, contacts=Contacts(unactuated=("toe",)))
+
+
+def test_an_arm_on_the_ground_has_no_residuals(tmp_path: Path) -> None:
+    result = analyze(write_csv(tmp_path / "log.csv", smooth(40, 3)), PLANAR3)
+    assert result.residual_report.residuals == ()
+    assert "residuals" not in result.record()
+    assert not list(result.residual_report.lines)
+
+
+def test_the_command_tells_residuals_and_how_to_say_otherwise(leg: Path, tmp_path: Path) -> None:
+    given = ["analyze", leg / "log.csv", "--robot", leg / "leg", "--no-page", "--columns", "sums"]
+    told = run_linkwise(*given, "--out", "out", folder=tmp_path).stdout
+    assert "residuals, as nothing drives these: peaks of pelvis_tx" in told
+    assert "where motors do, add --unactuated none" in told
+    driven = run_linkwise(*given, "--out", "driven", "--unactuated", "none", folder=tmp_path).stdout
+    assert "residuals" not in driven
