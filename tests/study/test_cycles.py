@@ -57,7 +57,7 @@ def test_a_table_that_is_none_is_told_with_its_row(case: str, tmp_path: Path) ->
 WAYS = {
     "a column": ('start = "stands>0.5"', [(0.5, 1.5), (1.5, 2.5)]),
     "as long as it lasts": ('during = "stands"', [(0.5, 0.79), (1.5, 1.79), (2.5, 2.79)]),
-    "a load": ('start = "push>20"', [(0.25, 1.25), (1.25, 2.25)]),
+    "a load": ('start = "push>20"', [(0.244, 1.244), (1.244, 2.244)]),
     "a table": ('table = "cycles.csv"', [(0.305, 0.9), (1.0, 2.0), (2.0, 2.99)]),
     "a length": ('table = "cycles.csv"\nshortest = 0.7', [(1.0, 2.0), (2.0, 2.99)]),
 }

@@ -27,6 +27,11 @@ FORMATS = ("svg", "pdf")
 WIDE, HIGH = 3.4, 2.3
 """Width and height of a panel in inches; two stand side by side."""
 FILLED = {"deviation": "filled: ± sd between subjects", "range": "filled: range of subjects"}
+FILLED_OF_ONE = {
+    "deviation": "filled: ± sd over trials of one subject",
+    "range": "filled: range of trials of one subject",
+}
+DOTS_OF_ONE = "dots: trials of one subject; bars: ± sd over them"
 HATCHED = {
     "within": "hatched: ± sd within a trial,\nby what is uncertain",
     "mean": "hatched: ± sd of the mean,\nspread and uncertainty together",
@@ -112,6 +117,8 @@ def _levels(
         if (values := values_of(members, name))
     }
     uncertain = {level: deviations(found[level], name, one) for level, one in levels.items()}
+    if all(len(one.each) == 1 for one in levels.values()):
+        levels = {level: one.over_trials for level, one in levels.items()}
     return levels, _about(figure, name, tests), {k: one for k, one in uncertain.items() if one is not None}
 
 
@@ -130,22 +137,31 @@ def _drawn(figure: PaperFigure, panels: Sequence[BandPanel]) -> Any:
         axis.set_axis_off()
     if len(panels[0].levels) > 1:
         axes[0].legend(title=drawn(figure.by), fontsize=8, handlelength=2.5)
-    if figure.hatched != "none" and any(panel.uncertain for panel in panels):
-        _legend_of_bands(drawing, figure, across)
+    if bands := _kinds_of_bands(figure, panels):
+        handles, texts = zip(*bands, strict=True)
+        drawing.legend(handles, texts, loc="outside lower left", ncols=across, fontsize=8, handlelength=2.5)
     return drawing
 
 
-def _legend_of_bands(drawing: Any, figure: PaperFigure, across: int) -> None:
-    """Say below all panels which band is which."""
+def _kinds_of_bands(figure: PaperFigure, panels: Sequence[BandPanel]) -> list[tuple[Any, str]]:
+    """Return a sample of each kind of band and what it is, where a reader must be told."""
     patch = extra("matplotlib.patches").Patch
-    kinds = (
-        [(patch(facecolor=INK, alpha=0.2, linewidth=0), FILLED[figure.band])] if figure.band in FILLED else []
-    )
-    kinds.append(
-        (patch(fill=False, edgecolor=INK, hatch=HATCHES[0], linewidth=EDGE), HATCHED[figure.hatched])
-    )
-    handles, texts = zip(*kinds, strict=True)
-    drawing.legend(handles, texts, loc="outside lower left", ncols=across, fontsize=8, handlelength=2.5)
+    some = [spread for panel in panels for spread in panel.levels.values() if len(spread.each) > 1]
+    of_one = [spread for spread in some if spread.is_of_trials]
+    is_hatched = figure.hatched != "none" and any(panel.uncertain for panel in panels)
+    kinds = []
+    if figure.band in FILLED and (is_hatched or of_one):
+        text = (FILLED_OF_ONE if of_one else FILLED)[figure.band]
+        if of_one and of_one[0].each.shape[1] == 1:
+            kinds.append(
+                (extra("matplotlib.lines").Line2D([], [], color=INK, marker="o", linewidth=0), DOTS_OF_ONE)
+            )
+        else:
+            kinds.append((patch(facecolor=INK, alpha=0.2, linewidth=0), text))
+    if is_hatched:
+        hatched = patch(fill=False, edgecolor=INK, hatch=HATCHES[0], linewidth=EDGE)
+        kinds.append((hatched, HATCHED[figure.hatched]))
+    return kinds
 
 
 def _panel(axis: Any, panel: BandPanel, figure: PaperFigure) -> None:
