@@ -87,10 +87,11 @@ def told_of_ends(cycles: Cycles, job: Job) -> str:
     if cycles.table:
         return "at the times of the table"
     phase = job.phases[-1]
+    told = phase.told.removeprefix("cycle: ")
     if phase.load is None:
-        return f"{phase.told}; at samples of the motion"
+        return f"{told}; at samples of the motion"
     rate = (len(phase.load.table) - 1) / np.ptp(phase.load.table[:, 0]) if len(phase.load.table) > 1 else 0.0
-    return f"{phase.told}; between the load's own samples, of {rate:.6g} Hz, by straight lines"
+    return f"{told}; between the load's own samples, of {rate:.6g} Hz, by straight lines"
 
 
 def _on(job: Job) -> Mask:

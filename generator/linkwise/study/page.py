@@ -69,7 +69,8 @@ def study_page(
         ],
         "tests": [_test(test) for test in tests],
         "leftOut": left_out,
-        "notes": [*map(printable, notes), *_told(plan, folders)],
+        "notes": list(map(printable, notes)),
+        "told": _told(plan, folders),
         "colours": list(COLOURS),
         "coloursDark": list(ON_DARK),
     }

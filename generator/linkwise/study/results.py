@@ -14,7 +14,7 @@ from linkwise.study.page import study_page
 from linkwise.study.plan import StudyPlan
 from linkwise.study.summary import summaries
 from linkwise.study.tables import curve_rows, group_rows, parquet, summary_rows
-from linkwise.study.tested_rows import tested_rows
+from linkwise.study.tested_rows import rows_of_tests
 from linkwise.study.trial import TrialOutcome
 
 
@@ -50,7 +50,7 @@ def together(
     tests, lacking = compared(plan.comparisons, trials)
     told = [*lacking]
     if tests:
-        files[TESTS] = parquet(tested_rows(tests))
+        files[TESTS] = parquet(rows_of_tests(tests))
     progress("together", 2, 3)
     try:
         files |= dict(band_figures(plan.figures, trials, tests))

@@ -126,6 +126,11 @@ def turned_coordinates(robot: OpenedRobot, cycles: Cycles) -> tuple[str, ...]:
             )
         return cycles.turned
     pairs = {name: swapped(name) for name in robot.joints}
+    if all(name == other for name, other in pairs.items()):
+        raise LinkwiseError(
+            "[cycles] has sides, and no joint's name tells one: r, l, R, L, right or left, as a word or where"
+            f" capitals part words; there are {listed(map(repr, robot.joints))}"
+        )
     if lone := [name for name, other in pairs.items() if other not in pairs]:
         raise LinkwiseError(
             f"[cycles] has sides, and joint {lone[0]!r} has no {pairs[lone[0]]!r} on the other; rename it if"

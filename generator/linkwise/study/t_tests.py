@@ -75,11 +75,18 @@ class TTest:
         return Inference(float(found.zstar), parts)
 
 
-def told_p(p: float) -> str:
-    """Return p as a paper has it, "< 0.001" or "0.013"; empty where there is none."""
+def told_p(p: float, level: float) -> str:
+    """Return p as a paper has it, "< 0.001" or "0.013"; empty where there is none.
+
+    It has as many digits as tell it from the level that it is held to.
+    """
     if not np.isfinite(p):
         return ""
-    return "< 0.001" if p < 0.001 else f"{p:.3f}"
+    least = min(0.001, level)
+    if p < least:
+        return f"< {least:g}"
+    digits = next((n for n in range(3, 13) if f"{p:.{n}f}" != f"{level:.{n}f}"), 13)
+    return f"{p:.{digits}f}"
 
 
 def _field_wide(field: Any, highest: float) -> float:

@@ -12,7 +12,7 @@ from linkwise.study.t_tests import Cluster, told_p
 NOWHERE = Cluster(np.nan, np.nan, np.nan)
 
 
-def tested_rows(tests: Sequence[Compared]) -> Iterator[dict[str, object]]:
+def rows_of_tests(tests: Sequence[Compared]) -> Iterator[dict[str, object]]:
     """Yield the rows of all tests; those of parts that are too brief to differ say so."""
     for test in tests:
         parts = [(part, True) for part in test.clusters] + [(part, False) for part in test.brief]
@@ -26,7 +26,7 @@ def tested_rows(tests: Sequence[Compared]) -> Iterator[dict[str, object]]:
                 "start": part.start,
                 "end": part.end,
                 "p": part.p,
-                "p_told": told_p(part.p),
+                "p_told": told_p(part.p, test.level),
                 "at": at,
                 **asdict(effect),
                 "effect_is": KINDS[test.comparison.paired],
@@ -54,5 +54,5 @@ def _about(test: Compared) -> dict[str, object]:
         "threshold": test.threshold,
         "p_column": test.p,
         "p_column_adjusted": test.adjusted,
-        "p_column_told": told_p(test.adjusted),
+        "p_column_told": told_p(test.adjusted, test.comparison.alpha),
     }
