@@ -1,5 +1,6 @@
 """Cycles of a trial: in order, wherever blocks of samples end, and without what lies between them."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +58,7 @@ def test_a_table_that_is_none_is_told_with_its_row(case: str, tmp_path: Path) ->
 WAYS = {
     "a column": ('start = "stands>0.5"', [(0.5, 1.5), (1.5, 2.5)]),
     "as long as it lasts": ('during = "stands"', [(0.5, 0.79), (1.5, 1.79), (2.5, 2.79)]),
-    "a load": ('start = "push>20"', [(0.25, 1.25), (1.25, 2.25)]),
+    "a load": ('start = "push>20"', [(0.244, 1.244), (1.244, 2.244)]),
     "a table": ('table = "cycles.csv"', [(0.305, 0.9), (1.0, 2.0), (2.0, 2.99)]),
     "a length": ('table = "cycles.csv"\nshortest = 0.7', [(1.0, 2.0), (2.0, 2.99)]),
 }
@@ -82,6 +83,34 @@ def test_cycles_begin_by_a_column_a_load_or_a_table(way: str, tmp_path: Path) ->
     table = pd.read_parquet(tmp_path / "out/trials/a/samples.parquet")
     ends = table.groupby("cycle").time.agg(["min", "max"]).to_numpy()
     np.testing.assert_allclose(ends, spans, atol=1e-9)
+
+
+@pytest.mark.parametrize("way", ["start", "during"])
+def test_cycles_by_a_plate_begin_where_its_own_samples_cross_the_threshold(way: str, tmp_path: Path) -> None:
+    """The motion has 50 Hz, the plate 1000 Hz, and it ends before the motion: less of that is analysed."""
+    time, own = np.arange(0, 4, 0.02), np.arange(0, 3.2, 0.001)
+    write_csv(tmp_path / "a.csv", np.column_stack([time, np.sin(time)[:, None] * [1, 0.5, 0.2]]))
+    turns = 2 * np.pi * 1.3
+    forces = np.column_stack([own, 60 * np.sin(turns * own), 80 * np.sin(turns * own), 0 * own])
+    forces[np.sin(turns * own) < 0, 1:] = 0
+    write_csv(tmp_path / "forces.csv", forces, [f"push:link3/force_{axis}" for axis in "xyz"])
+    file, out = tmp_path / "study.toml", tmp_path / "out"
+    trial = '[[trial]]\nlog = "a.csv"\nrobot = "planar3"\nloads = ["forces.csv"]\nto_time = 3.1\n'
+    file.write_text(f'schema = 1\npages = false\n[cycles]\n{way} = "push>40"\n{trial}')
+    assert run_study(file, out, Here()).broken == ()
+    found = pd.read_parquet(out / "trials/a/_cycles.parquet")[["start", "end"]]
+    up = (np.arange(5) + np.arcsin(0.4) / (2 * np.pi)) / 1.3
+    down = (np.arange(5) + 0.5 - np.arcsin(0.4) / (2 * np.pi)) / 1.3
+    ends = np.stack([up[:-1], up[1:]], 1) if way == "start" else np.stack([up, down], 1)
+    expected = ends[ends[:, 1] < 3.1]
+    assert len(expected) == (3 if way == "start" else 4)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-6)  # a thousandth of the plate's own step
+    (told,) = json.loads((out / "study.json").read_text())["cycles"]["begin_and_end"]
+    said = "force of push above 40 N; between the load's own samples, of 1000 Hz, by straight lines"
+    assert told == {"by": said, "trials": ["a"]}
+    file.write_text(file.read_text().replace("to_time = 3.1\n", ""))
+    with pytest.raises(LinkwiseError, match=r"it ends at 3.199 s, .*; analyse less of the motion, by --from"):
+        run_study(file, out, Here())
 
 
 def test_cycles_lie_in_the_range_of_time_that_is_analysed(tmp_path: Path) -> None:

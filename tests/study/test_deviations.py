@@ -100,9 +100,9 @@ REFUSED = "'sd/tau/*', which fits standard deviations alone; they stand beside w
 
 
 def test_deviations_of_power_are_not_integrated() -> None:
-    names = [column.name for column in integral_columns(plan(cycles=Cycles(start="a>1")), COLUMNS)]
+    names = [column.name for column in integral_columns(plan(cycles=Cycles(start={"": "a>1"})), COLUMNS)]
     assert names == [f"{part}/power/hip" for part in ("integral", "integral_positive", "integral_negative")]
-    asked = plan(cycles=Cycles(start="a>1", integrals=("**/hip",)))
+    asked = plan(cycles=Cycles(start={"": "a>1"}, integrals=("**/hip",)))
     assert {column.name for column in integral_columns(asked, COLUMNS)} == {
         *names,
         *(name.replace("power", "tau") for name in names),
@@ -110,7 +110,7 @@ def test_deviations_of_power_are_not_integrated() -> None:
     with pytest.raises(
         LinkwiseError, match="integrals' has 'sd/power/hip', which fits standard deviations alone"
     ):
-        integral_columns(plan(cycles=Cycles(start="a>1", integrals=("sd/power/hip",))), COLUMNS)
+        integral_columns(plan(cycles=Cycles(start={"": "a>1"}, integrals=("sd/power/hip",))), COLUMNS)
 
 
 def test_deviations_by_name_are_refused_in_tests_and_figures() -> None:

@@ -200,3 +200,39 @@ def test_nothing_is_hatched_where_it_is_left_out(drawn_of: Any) -> None:
     axis, _ = drawn_of(PaperFigure(("tau/hip",), "condition", hatched="none"), with_deviations(0.5))
     assert [band.get_hatch() for band in axis.collections] == [None, None]
     assert not axis.figure.legends
+
+
+def of_one_subject(points: int = 3) -> list[TrialSummary]:
+    """The trials, all of one subject."""
+    return [replace(trial, labels=trial.labels | {"subject": "ann"}) for trial in trials(points)]
+
+
+@pytest.mark.parametrize(
+    ("band", "of_slow", "said"),
+    [
+        (
+            "deviation",
+            np.array([[2, 3, 5.5]]) + np.outer([-1, 1], np.sqrt([2, 2, 12.5])),
+            "filled: ± sd over trials of one subject",
+        ),
+        ("range", np.array([[1, 2, 3], [3, 4, 8]]), "filled: range of trials of one subject"),
+    ],
+)
+def test_the_band_of_one_subject_is_over_trials_and_says_so(
+    drawn_of: Any, band: Any, of_slow: Any, said: str
+) -> None:
+    axis, _ = drawn_of(PaperFigure(("tau/hip",), "condition", band=band), of_one_subject())
+    np.testing.assert_allclose(band_of(axis, 0), of_slow)
+    (legend,) = axis.figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [said]
+
+
+def test_means_of_one_subject_are_dots_of_trials_and_say_so(drawn_of: Any) -> None:
+    axis, _ = drawn_of(PaperFigure(("tau/hip",), "condition"), of_one_subject(points=1))
+    dots = [line for line in axis.lines if line.get_label() in LEVELS]
+    for line, curves in zip(dots, LEVELS.values(), strict=True):
+        np.testing.assert_allclose(line.get_ydata(), np.mean(curves, axis=1))
+    (legend,) = axis.figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "dots: trials of one subject; bars: ± sd over them"
+    ]

@@ -10,6 +10,7 @@ from linkwise import LinkwiseError
 from linkwise.own_process import ProcessLimits, in_own_process
 from linkwise.study import run_study
 
+COMPARE = '[[compare]]\nfactor = "condition"\nbetween = ["slow", "fast"]\ncolumns = ["tau/*"]\n'
 BAD: dict[str, tuple[tuple[str, ...], str]] = {
     "unknown key": ((HEAD, "speed = 1\n", TRIALS), "the file has the unknown key 'speed'; known are "),
     "unknown choice": (
@@ -105,6 +106,35 @@ BAD: dict[str, tuple[tuple[str, ...], str]] = {
             "a level twice": ["slow", "slow"],
         }.items()
     },
+    "subjects who are not others": (
+        (HEAD, f"{COMPARE}paired = false\n", TRIALS),
+        "[[compare]] condition: 'paired' is false, and 'slow' and 'fast' have subjects in common, 'S1', 'S2'",
+    ),
+    "a family without a correction": (
+        (HEAD, f'{COMPARE}family = "a"\n', TRIALS),
+        "[[compare]]: the family 'a' is not corrected; add 'correct'",
+    ),
+    "a family corrected in two ways": (
+        (
+            HEAD,
+            f'{COMPARE}family = "a"\ncorrect = "holm"\n',
+            f'{COMPARE}family = "a"\ncorrect = "fdr-bh"\n',
+            TRIALS,
+        ),
+        "[[compare]]: the family 'a' has 'correct' 'holm' at 'alpha' 0.05, and 'fdr-bh' at 0.05",
+    ),
+    "no correction": (
+        (HEAD, f'{COMPARE}correct = "sidak"\n', TRIALS),
+        "[[compare]]: 'correct' is 'sidak'; give 'none' or 'bonferroni' or 'holm' or 'fdr-bh'",
+    ),
+    "a factor that sides make": (
+        (
+            HEAD.replace("condition", "side"),
+            '[cycles]\nstart = { right = "a>1", left = "b>1" }\n',
+            TRIALS.replace("{condition}", "{side}"),
+        ),
+        "the factor 'side' is made by [cycles]",
+    ),
     "another robot": (
         (
             HEAD,

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.studies import CHOICES, HEAD, QUICK, Here, write_study
-from linkwise import LinkwiseError
 from linkwise.study import run_study
 from linkwise.study.band_figure import band_figures
 from linkwise.study.comparisons import Compared, compared
@@ -32,6 +31,7 @@ columns = ["q/joint1"]
 
 [[trial]]
 name = "{subject}-{condition}-{day}"
+subject = "{subject}, {condition}"
 log = "data/{subject}/{condition}_{day}.csv"
 robot = "planar3"
 """
@@ -39,7 +39,7 @@ robot = "planar3"
 
 @pytest.fixture(scope="module")
 def means(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A study without cycles, one of whose subjects was never slow."""
+    """A study without cycles, of others who were slow than were fast, one less."""
     folder: Path = tmp_path_factory.mktemp("means")
     head = HEAD.replace('["condition"]', '["condition", "day"]')
     file = write_study(folder, head, QUICK.replace("tau", "*"), CHOICES, TRIALS, subjects=4)
@@ -148,7 +148,7 @@ def sides(trials: Sequence[TrialSummary], paired: bool) -> list[Any]:
 def test_curves_are_compared_subject_by_subject(paired: bool, alpha: float) -> None:
     spm = pytest.importorskip("spm1d").stats
     trials = trials_of(31)
-    ((found,), told) = compared(Comparison("pace", ("slow", "fast"), ("tau",), paired, alpha), trials)
+    ((found,), told) = compared([Comparison("pace", ("slow", "fast"), ("tau",), paired, alpha)], trials)
     first, second = sides(trials, paired)
     assert (told, [len(side.each) for side in found.sides]) == ((), [len(first), len(second)])
     t = stats.ttest_rel(first, second) if paired else stats.ttest_ind(first, second, equal_var=False)
@@ -156,7 +156,10 @@ def test_curves_are_compared_subject_by_subject(paired: bool, alpha: float) -> N
     field = spm.ttest_paired(first, second) if paired else spm.ttest2(first, second, equal_var=False)
     inferred = field.inference(alpha, two_tailed=True)
     assert found.threshold == pytest.approx(inferred.zstar, rel=1e-9)
-    clusters = [[*np.multiply(c.endpoints, 100 / 30), c.P] for c in inferred.clusters if alpha > c.P]
+    least = np.finfo(float).eps  # spm1d's own p may come to 0, which none is
+    clusters = [
+        [*np.multiply(c.endpoints, 100 / 30), max(c.P, least)] for c in inferred.clusters if alpha > c.P
+    ]
     assert clusters
     np.testing.assert_allclose([[c.start, c.end, c.p] for c in found.clusters], clusters, rtol=1e-9)
 
@@ -168,7 +171,7 @@ def test_means_differ_where_p_is_below_alpha(paired: bool) -> None:
     t = stats.ttest_rel(first, second) if paired else stats.ttest_ind(first, second, equal_var=False)
     for share, is_found in ((0.99, False), (1.01, True)):
         comparison = Comparison("pace", ("slow", "fast"), ("tau",), paired, share * t.pvalue[0])
-        ((found,), _) = compared(comparison, trials)
+        ((found,), _) = compared([comparison], trials)
         assert [*found.statistic, found.p] == pytest.approx([*t.statistic, *t.pvalue], rel=1e-9)
         assert [(c.start, c.end, c.p) for c in found.clusters] == [(0, 100, found.p)] * is_found
 
@@ -176,7 +179,7 @@ def test_means_differ_where_p_is_below_alpha(paired: bool) -> None:
 @pytest.mark.parametrize(("paired", "told"), [(True, "2 subjects in both"), (False, "2 subjects on a side")])
 def test_too_few_subjects_are_told(paired: bool, told: str) -> None:
     few = [one for one in trials_of(1) if one.labels["pace"] != "slow" or one.labels["subject"] in "AD"]
-    made, (reason,) = compared(Comparison("pace", ("slow", "fast"), ("tau",), paired), few)
+    made, (reason,) = compared([Comparison("pace", ("slow", "fast"), ("tau",), paired)], few)
     assert (made, told in reason, "a test needs 3" in reason) == ([], True, True)
 
 
@@ -206,7 +209,7 @@ def test_a_figure_has_the_mean_curves_bands_and_differences_of_its_factor(band: 
     tests = [
         test
         for factor, alpha in (("pace", 0.3), ("like", 0.9))
-        for test in compared(Comparison(factor, ("slow", "fast"), ("tau",), alpha=alpha), trials)[0]
+        for test in compared([Comparison(factor, ("slow", "fast"), ("tau",), alpha=alpha)], trials)[0]
     ]
     assert all(test.clusters for test in tests)
     panel = drawn(PaperFigure(("tau",), "pace", band=band), trials, tests)
@@ -240,5 +243,6 @@ def test_a_figure_of_means_has_a_dot_for_each_subject() -> None:
 
 
 def test_a_column_that_trials_lack_is_told() -> None:
-    with pytest.raises(LinkwiseError, match="'tua', which no column is called; nearest are 'tau'"):
-        compared(Comparison("pace", ("slow", "fast"), ("tua",)), trials_of(1))
+    made, (reason,) = compared([Comparison("pace", ("slow", "fast"), ("tua",))], trials_of(1))
+    assert made == []
+    assert "'tua', which no column is called; nearest are 'tau'" in reason

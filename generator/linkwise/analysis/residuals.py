@@ -103,7 +103,8 @@ class ResidualSums:
         self._squares += np.einsum("rs,rs->r", values, values)
         if self._loads and self._joints:
             q, pose = self._rows.dense("q", block), model_pose(self._robot.model)
-            forces = sum(load.wrench(block[0], q, pose).force for load in self._loads)
+            outside = [one for load in self._loads if not load.is_muscle for one in load.wrenches]
+            forces = sum((one.wrench(block[0], q, pose).force for one in outside), np.zeros((len(q), 3)))
             self._force = max(self._force, float(np.linalg.norm(forces, axis=-1).max(initial=0.0)))
             self._height += float(heights_of_mass(self._robot, q).sum())
 

@@ -33,6 +33,11 @@ MM = 1 / 25.4
 NARROW = 120.0
 """Width in mm below which panels stand below each other."""
 FILLED = {"deviation": "filled: ± sd between subjects", "range": "filled: range of subjects"}
+FILLED_OF_ONE = {
+    "deviation": "filled: ± sd over trials of one subject",
+    "range": "filled: range of trials of one subject",
+}
+DOTS_OF_ONE = "dots: trials of one subject; bars: ± sd over them"
 HATCHED = {
     "within": "hatched: ± sd within a trial,\nby what is uncertain",
     "mean": "hatched: ± sd of the mean,\nspread and uncertainty together",
@@ -136,6 +141,8 @@ def _levels(
         if (values := values_of(found[level], name))
     }
     uncertain = {level: deviations(found[level], name, one) for level, one in levels.items()}
+    if all(len(one.each) == 1 for one in levels.values()):
+        levels = {level: one.over_trials for level, one in levels.items()}
     return levels, _about(figure, name, tests), {k: one for k, one in uncertain.items() if one is not None}
 
 
@@ -158,8 +165,9 @@ def _drawn(figure: PaperFigure, panels: Sequence[BandPanel], words: Mapping[str,
         axes[0].legend(title=drawn(_named(figure, figure.by)), fontsize=8, handlelength=2.5)
     if figure.title:
         drawing.suptitle(drawn(figure.title, 120), x=0.01, ha="left", fontsize=11)
-    if figure.hatched != "none" and any(panel.uncertain for panel in panels):
-        _legend_of_bands(drawing, figure, across)
+    if bands := _kinds_of_bands(figure, panels):
+        handles, texts = zip(*bands, strict=True)
+        drawing.legend(handles, texts, loc="outside lower left", ncols=across, fontsize=8, handlelength=2.5)
     return drawing
 
 
@@ -168,17 +176,25 @@ def _named(figure: PaperFigure, text: str) -> str:
     return figure.names.get(text, text)
 
 
-def _legend_of_bands(drawing: Any, figure: PaperFigure, across: int) -> None:
-    """Say below all panels which band is which."""
+def _kinds_of_bands(figure: PaperFigure, panels: Sequence[BandPanel]) -> list[tuple[Any, str]]:
+    """Return a sample of each kind of band and what it is, where a reader must be told."""
     patch = extra("matplotlib.patches").Patch
-    kinds = (
-        [(patch(facecolor=INK, alpha=0.2, linewidth=0), FILLED[figure.band])] if figure.band in FILLED else []
-    )
-    kinds.append(
-        (patch(fill=False, edgecolor=INK, hatch=HATCHES[0], linewidth=EDGE), HATCHED[figure.hatched])
-    )
-    handles, texts = zip(*kinds, strict=True)
-    drawing.legend(handles, texts, loc="outside lower left", ncols=across, fontsize=8, handlelength=2.5)
+    some = [spread for panel in panels for spread in panel.levels.values() if len(spread.each) > 1]
+    of_one = [spread for spread in some if spread.is_of_trials]
+    is_hatched = figure.hatched != "none" and any(panel.uncertain for panel in panels)
+    kinds = []
+    if figure.band in FILLED and (is_hatched or of_one):
+        text = (FILLED_OF_ONE if of_one else FILLED)[figure.band]
+        if of_one and of_one[0].each.shape[1] == 1:
+            kinds.append(
+                (extra("matplotlib.lines").Line2D([], [], color=INK, marker="o", linewidth=0), DOTS_OF_ONE)
+            )
+        else:
+            kinds.append((patch(facecolor=INK, alpha=0.2, linewidth=0), text))
+    if is_hatched:
+        hatched = patch(fill=False, edgecolor=INK, hatch=HATCHES[0], linewidth=EDGE)
+        kinds.append((hatched, HATCHED[figure.hatched]))
+    return kinds
 
 
 def _panel(axis: Any, panel: BandPanel, figure: PaperFigure, words: Mapping[str, MotionWords]) -> None:

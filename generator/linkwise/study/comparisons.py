@@ -1,32 +1,24 @@
-"""Comparison of two levels of a factor: t tests over whole curves (SPM), or of means."""
+"""Comparison of two levels of a factor by t tests, each column's p corrected for the others of its family."""
 
-import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
-from linkwise.escape import one_line
-from linkwise.extras import extra
+from linkwise.escape import listed
+from linkwise.study.corrections import corrected
 from linkwise.study.deviation_columns import fitting_values
+from linkwise.study.effect_sizes import EffectSize
 from linkwise.study.plan import Comparison
 from linkwise.study.spread import Spread, columns_of_trials, spread, values_of
 from linkwise.study.summary import TrialSummary
+from linkwise.study.t_tests import Cluster, TTest
 
 FEWEST = 3
 """Fewest subjects on a side that a test needs."""
-
-
-@dataclass(frozen=True, eq=False)
-class Cluster:
-    """A part of the cycle, in %, where curves differ, and its p; for means, the whole cycle."""
-
-    start: float
-    end: float
-    p: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,28 +32,74 @@ class Compared:
     statistic: Array
     """t at each point of the cycle, (points,); for means (1,)."""
     threshold: float
-    """|t| above which a curve differs by chance in `alpha` of all cases; NaN for means."""
+    """|t| above which a curve comes by chance as often as `level` says; NaN for means."""
     p: float
-    """p of a test of means; NaN for curves, as each of their parts has its own."""
+    """p of the column: of means, or field-wide, of the largest |t| of curves."""
     clusters: tuple[Cluster, ...]
-    """Parts that differ: each of some width, and of a p of its own below `alpha`."""
+    """Parts that differ: each of some width, and of a p of its own below `level`."""
+    brief: tuple[Cluster, ...] = ()
+    """Parts above the threshold that do not differ, as chance makes some as wide more often."""
+    adjusted: float = float("nan")
+    """p of the column, corrected for the others of its family."""
+    level: float = float("nan")
+    """Level that p is held to: `alpha`, or what the correction makes of it."""
+    family: int = 1
+    """Number of columns that are corrected for."""
+    left_out: tuple[str, ...] = ()
+    """Subjects that are on one side only, and so in no pair."""
+
+    def effect(self, part: Cluster | None = None) -> tuple[float, EffectSize]:
+        """Return where |t| is largest, of a part or of the whole, in % of the cycle, and the effect there.
+
+        Of means, the place is NaN.
+        """
+        count = len(self.statistic)
+        first, second = (side.each for side in self.sides)
+        asked = self.comparison.paired, 1 - self.comparison.alpha
+        if count == 1:
+            return float("nan"), EffectSize.of(first[:, 0], second[:, 0], *asked)
+        place = np.linspace(0, 100, count)
+        inside = np.ones(count, np.bool_) if part is None else (place >= part.start) & (place <= part.end)
+        at = int(np.where(inside, np.abs(self.statistic), -1.0).argmax())
+        return float(place[at]), EffectSize.of(first[:, at], second[:, at], *asked)
+
+
+class _Tested(NamedTuple):
+    """A test of a column before it is corrected for the others."""
+
+    comparison: Comparison
+    column: str
+    unit: str
+    sides: tuple[Spread, Spread]
+    test: TTest
+    left_out: tuple[str, ...]
 
 
 def compared(
-    comparison: Comparison, trials: Sequence[TrialSummary]
+    comparisons: Sequence[Comparison], trials: Sequence[TrialSummary]
 ) -> tuple[list[Compared], tuple[str, ...]]:
     """Return the test of every column that is asked for, and why some could not be made.
 
-    Raises LinkwiseError for unknown columns.
+    Columns that no trial has are among the reasons.
     """
     known = columns_of_trials(trials)
-    made, told = list[Compared](), list[str]()
-    for name in compared_columns(comparison, known):
+    tested, told = list[tuple[int, _Tested]](), list[str]()
+    for number, comparison in enumerate(comparisons):
         try:
-            with within(f"[[compare]] {comparison.factor}, {name}"):
-                made.append(_of_column(comparison, trials, name, known[name]))
+            names = compared_columns(comparison, known)
         except LinkwiseError as error:
             told.append(str(error))
+            continue
+        for name in names:
+            try:
+                with within(f"[[compare]] {comparison.factor}, {name}"):
+                    tested.append((number, _of_column(comparison, trials, name, known[name])))
+            except LinkwiseError as error:
+                told.append(str(error))
+    families: dict[str | int, list[_Tested]] = {}
+    for number, one in tested:
+        families.setdefault(one.comparison.family or number, []).append(one)
+    made = [judged for family in families.values() for judged in _judged(family)]
     return made, tuple(told)
 
 
@@ -73,7 +111,20 @@ def compared_columns(comparison: Comparison, names: Iterable[str]) -> list[str]:
     return fitting_values("[[compare]]", names, comparison.columns)
 
 
-def _of_column(comparison: Comparison, trials: Sequence[TrialSummary], name: str, unit: str) -> Compared:
+def left_out_lines(tests: Sequence[Compared]) -> tuple[str, ...]:
+    """Return a line for each comparison whose pairs leave out subjects."""
+    found: dict[tuple[str, tuple[str, ...], tuple[str, ...]], None] = {}
+    for test in tests:
+        if test.left_out:
+            found[test.comparison.factor, test.comparison.between, test.left_out] = None
+    return tuple(
+        f"[[compare]] {factor}: subjects are paired, and {listed(map(repr, who))} left out, who"
+        f" {'has' if len(who) == 1 else 'have'} not both {first!r} and {second!r}"
+        for factor, (first, second), who in found
+    )
+
+
+def _of_column(comparison: Comparison, trials: Sequence[TrialSummary], name: str, unit: str) -> _Tested:
     sides = []
     for level in comparison.between:
         members = [trial for trial in trials if trial.labels[comparison.factor] == level]
@@ -85,7 +136,9 @@ def _of_column(comparison: Comparison, trials: Sequence[TrialSummary], name: str
         raise LinkwiseError(
             f"{fewest} subjects{' in both' if comparison.paired else ' on a side'}; a test needs {FEWEST}"
         )
-    return _tested(comparison, name, unit, first, second)
+    lone = sorted(set(sides[0].subjects) ^ set(sides[1].subjects)) if comparison.paired else ()
+    test = TTest.of(comparison.paired, first.each, second.each)
+    return _Tested(comparison, name, unit, (first, second), test, tuple(lone))
 
 
 def _paired(first: Spread, second: Spread) -> tuple[Spread, Spread]:
@@ -99,50 +152,30 @@ def _paired(first: Spread, second: Spread) -> tuple[Spread, Spread]:
     return one, other
 
 
-def _tested(comparison: Comparison, name: str, unit: str, first: Spread, second: Spread) -> Compared:
-    about = comparison, name, unit, (first, second)
-    if first.each.shape[1] == 1:
-        t, p = _of_means(comparison.paired, first.each[:, 0], second.each[:, 0])
-        whole = _that_differ(comparison, [Cluster(0.0, 100.0, p)])
-        return Compared(*about, np.array([t]), float("nan"), p, whole)
-    field, found = _of_curves(comparison, first.each, second.each)
-    scale = 100 / (first.each.shape[1] - 1)
-    above = [
-        Cluster(float(c.endpoints[0]) * scale, float(c.endpoints[1]) * scale, float(c.P))
-        for c in found.clusters
-    ]
-    statistic = np.asarray(field.z, dtype=float)
-    differ = _that_differ(comparison, above)
-    return Compared(*about, statistic, float(found.zstar), float("nan"), differ)
-
-
-def _that_differ(comparison: Comparison, parts: Sequence[Cluster]) -> tuple[Cluster, ...]:
-    """Return the parts that have some width and a p below alpha.
-
-    A curve may exceed the threshold so briefly that an excess as brief occurs by chance more often.
-    """
-    return tuple(part for part in parts if part.start < part.end and part.p < comparison.alpha)
-
-
-def _of_means(is_paired: bool, first: Array, second: Array) -> tuple[float, float]:
-    """Return t and p; for unpaired subjects by Welch's test, whose variances need not be equal."""
-    stats = extra("scipy.stats")
-    with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about numbers that are nearly equal, which is reported below
-        test = (
-            stats.ttest_rel(first, second) if is_paired else stats.ttest_ind(first, second, equal_var=False)
+def _judged(family: Sequence[_Tested]) -> Iterable[Compared]:
+    """Yield what tests say, each at the level that its p is held to among those of its family."""
+    asked = family[0].comparison
+    adjusted, levels = corrected(asked.correct, [one.test.p for one in family], asked.alpha)
+    for one, p, level in zip(family, adjusted.tolist(), levels.tolist(), strict=True):
+        threshold, parts = one.test.inferred(level)
+        # A curve may exceed the threshold so briefly that an excess as brief occurs by chance more often.
+        differ = [part.start < part.end and part.p < level for part in parts]
+        above, brief = (
+            tuple(part for part, does in zip(parts, differ, strict=True) if does is wanted)
+            for wanted in (True, False)
         )
-    if not np.isfinite(test.statistic):
-        raise LinkwiseError("subjects do not vary, so that there is nothing to test")
-    return float(test.statistic), float(test.pvalue)
-
-
-def _of_curves(comparison: Comparison, first: Array, second: Array) -> tuple[Any, Any]:
-    """Return the field of t, and the inference from it; for unpaired subjects, variances may differ."""
-    stats = extra("spm1d").stats
-    try:
-        field = stats.ttest_paired(first, second) if comparison.paired else stats.ttest2(first, second)
-        return field, field.inference(comparison.alpha, two_tailed=True)
-    except Exception as error:  # spm1d's own error, for curves that do not vary somewhere
-        reason = one_line(str(error).partition(":")[0], 200) or type(error).__name__
-        raise LinkwiseError(f"spm1d: {reason}; leave the column out") from error
+        yield Compared(
+            one.comparison,
+            one.column,
+            one.unit,
+            one.sides,
+            one.test.statistic,
+            threshold,
+            one.test.p,
+            above,
+            brief if len(one.test.statistic) > 1 else (),
+            p,
+            level,
+            len(family),
+            one.left_out,
+        )

@@ -14,6 +14,7 @@ import numpy as np
 
 from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.job import Job
+from linkwise.analysis.loads import FORCE
 from linkwise.analysis.logs.checks import named_once
 from linkwise.arrays import Array, Index, Mask
 from linkwise.errors import LinkwiseError, within
@@ -22,7 +23,7 @@ from linkwise.study.deviation_columns import RANDOM, WHOLE, is_deviation
 from linkwise.study.kept_curves import kept_curves
 from linkwise.study.ledger import CURVES
 from linkwise.study.paths import opened_here
-from linkwise.study.plan import Cycles, StudyPlan
+from linkwise.study.plan import SIDES, Cycles, StudyPlan, Trial
 from linkwise.study.summary import RunningMoments
 
 AT_ONCE = 1 << 18
@@ -31,29 +32,67 @@ MARGIN = 3
 Span = tuple[float, float]
 
 
-def cycle_spans(cycles: Cycles, job: Job, trial: str) -> list[Span]:
+def cycle_spans(cycles: Cycles, job: Job, trial: Trial) -> list[Span]:
     """Return the beginning and end of each whole cycle in s; raise LinkwiseError where there is none."""
     time = job.analysed.time
     if cycles.table:
-        found = written_cycles(cycles.table).get(trial, [])
+        found = written_cycles(cycles.table, bool(cycles.sides)).get((trial.recording, trial.side), [])
     else:
-        on = _on(job)
-        up, down = (np.flatnonzero(edge) + 1 for edge in (on[1:] & ~on[:-1], ~on[1:] & on[:-1]))
+        up, down = _edges(job)
         if cycles.start:
-            found = [(float(time[a]), float(time[b])) for a, b in pairwise(up)]
+            found = list(pairwise(up.tolist()))
         else:
             ends = (down[down > at] for at in up)
-            pairs = zip(up, ends, strict=True)
-            found = [(float(time[a]), float(time[some[0] - 1])) for a, some in pairs if len(some)]
+            found = [(float(at), float(some[0])) for at, some in zip(up, ends, strict=True) if len(some)]
     lasting = [(a, b) for a, b in found if cycles.shortest <= b - a <= cycles.longest]
     inside = sorted({(a, b) for a, b in lasting if time[0] <= a < b <= time[-1]})
     if not inside:
-        what = cycles.table or cycles.what
+        what = cycles.table or cycles.what(trial.side)
         between = (
             f"none of {len(found)} that last {cycles.shortest:g} to {cycles.longest:g} s" if found else "none"
         )
         raise LinkwiseError(f"no whole cycle by {what!r} between {time[0]:g} and {time[-1]:g} s: {between}")
     return inside
+
+
+def _edges(job: Job) -> tuple[Array, Array]:
+    """Return when the phase that defines the cycles begins, and when it ends, in s, within the movement.
+
+    By a load these are crossings of its own samples. By all else, of the motion's samples the first that is
+    on, and the last.
+    """
+    time, load = job.analysed.time, job.phases[-1].load
+    if load is not None:
+        table = load.wrenches[0].table  # a phase is by no muscle, and other loads are one wrench
+        edges = crossings(table[:, 0], np.linalg.norm(table[:, FORCE], axis=1), job.phases[-1].above)
+        first, last = time[0], time[-1]
+        up, down = (edge[(edge >= first) & (edge <= last)] for edge in edges)
+        return up, down
+    on = _on(job)
+    return time[1:][on[1:] & ~on[:-1]], time[:-1][~on[1:] & on[:-1]]
+
+
+def crossings(time: Array, values: Array, above: float) -> tuple[Array, Array]:
+    """Return when samples (S,) come above a limit, and when they no longer are, by lines between them."""
+    on = values > above
+    edges = []
+    for at in (np.flatnonzero(on[1:] & ~on[:-1]), np.flatnonzero(~on[1:] & on[:-1])):
+        share = (above - values[at]) / (values[at + 1] - values[at])
+        edges.append(time[at] + share * (time[at + 1] - time[at]))
+    return edges[0], edges[1]
+
+
+def told_of_ends(cycles: Cycles, job: Job) -> str:
+    """Return in words at which instants cycles begin and end."""
+    if cycles.table:
+        return "at the times of the table"
+    phase = job.phases[-1]
+    told = phase.told.removeprefix("cycle: ")
+    if phase.load is None:
+        return f"{told}; at samples of the motion"
+    own = phase.load.wrenches[0].table[:, 0]
+    rate = (len(own) - 1) / np.ptp(own) if len(own) > 1 else 0.0
+    return f"{told}; between the load's own samples, of {rate:.6g} Hz, by straight lines"
 
 
 def _on(job: Job) -> Mask:
@@ -70,22 +109,33 @@ def _on(job: Job) -> Mask:
     return np.concatenate(parts)
 
 
-def written_cycles(table: str) -> dict[str, list[Span]]:
-    """Return the cycles of each trial in a table; raise LinkwiseError, with the row, for an invalid one."""
-    found: dict[str, list[Span]] = {}
+def written_cycles(table: str, is_sided: bool = False) -> dict[tuple[str, str], list[Span]]:
+    """Return the cycles of each trial and side in a table; the side is empty where cycles are of none.
+
+    Raises LinkwiseError, with the row, for an invalid one.
+    """
+    found: dict[tuple[str, str], list[Span]] = {}
+    needed = ("trial", "start", "end", *(["side"] if is_sided else []))
     with opened_here(table) as path, path.open(newline="", encoding="utf-8-sig") as file:
         try:
             reader = csv.DictReader(file)
             with within(table):
                 names = named_once(reader.fieldnames or ())
-            if not {"trial", "start", "end"} <= set(names):
-                raise LinkwiseError(f"{table}: name its columns trial, start and end")
+            if not set(needed) <= set(names):
+                raise LinkwiseError(f"{table}: name its columns {', '.join(needed[:-1])} and {needed[-1]}")
             for number, row in enumerate(reader, 2):
                 with within(f"{table}, row {number}"):
-                    found.setdefault(row["trial"], []).append(_span(row["start"], row["end"]))
+                    side = _side(row["side"]) if is_sided else ""
+                    found.setdefault((row["trial"], side), []).append(_span(row["start"], row["end"]))
         except (UnicodeDecodeError, csv.Error) as error:
             raise LinkwiseError(f"{table}: not a table of text in UTF-8: {error}") from error
     return found
+
+
+def _side(text: str | None) -> str:
+    if text not in SIDES:
+        raise LinkwiseError(f"side is {text!r}; give right or left")
+    return text
 
 
 def _span(start: str, end: str) -> Span:
@@ -161,6 +211,7 @@ class CycleSink:
 class TrialCycles:
     """Receiver of samples that passes on each cycle; none without cycles.
 
+    names: of the columns
     write: receives rows (columns, points), their cycle's number and percent of it, (points,) each
     integrals: receives samples of each cycle, as `CycleSink` takes them
     """
@@ -169,17 +220,19 @@ class TrialCycles:
         self,
         plan: StudyPlan,
         job: Job,
+        names: Sequence[str],
         write: Callable[[Array, Index, Array], None],
         integrals: Callable[[Array], None],
     ) -> None:
         self._write, self._integrals = write, integrals
-        self._names = [column.name for column in job.columns]
+        self._names = list(names)
         self._of_motion_alone = job.uncertain.is_of_motion_alone
         self._points = 0 if plan.cycles is None else plan.cycles.points
         self._kept = kept_curves(plan, self._names)
         self._moments = RunningMoments(len(self._kept) * self._points)
         with within(job.source):
-            spans = [] if plan.cycles is None else cycle_spans(plan.cycles, job, plan.trials[0].name)
+            self.ends = "" if plan.cycles is None else told_of_ends(plan.cycles, job)
+            spans = [] if plan.cycles is None else cycle_spans(plan.cycles, job, plan.trials[0])
         squared = [at for at, name in enumerate(self._names) if is_deviation(name)]
         self.sink = CycleSink(spans, self._points, self._take, squared)
 

@@ -1,7 +1,7 @@
 """STUDY.toml, read and checked before any work begins."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import make_dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,22 @@ from linkwise.robot import Options
 from linkwise.robot.readers.toml.table import tables
 from linkwise.study.cycles import written_cycles
 from linkwise.study.deviations import SD_COLUMNS
+from linkwise.study.normalised import check_bodies
 from linkwise.study.paths import is_address, require_there, resolved
 from linkwise.study.patterns import expanded
-from linkwise.study.plan import OF_FILES, SUBJECT, Comparison, Cycles, PaperFigure, StudyPlan, Trial
+from linkwise.study.plan import (
+    OF_FILES,
+    SIDE,
+    SIDES,
+    SUBJECT,
+    Comparison,
+    Cycles,
+    Normalise,
+    PaperFigure,
+    StudyPlan,
+    Trial,
+)
+from linkwise.study.subjects import Subject, read_subjects
 from linkwise.study.summary import STATISTICS
 
 COLUMNS = (
@@ -50,6 +63,8 @@ TOP = [
     "cycles",
     "columns",
     "pages",
+    "normalise",
+    "subjects",
     "compare",
     "figure",
     "trial",
@@ -72,20 +87,23 @@ def read_study(path: Path, trust_python: bool = False) -> StudyPlan:
     with within(str(path)):
         require_file(path)
         data = known_keys("the file", toml_data(path), TOP)
+        folder = path.parent.absolute()  # workers may run in other folders
+        cycles = _cycles(data, folder)
         factors = _factors(data.get("factors", []))
         usual = vars(filled(AnalysisKeys, "[analysis]", data.get("analysis", {})))
-        folder = path.parent.absolute()  # workers may run in other folders
-        trials = tuple(trials_of(data, factors, usual, folder))
+        trials = tuple(of_sides(trials_of(data, factors, usual, folder), cycles))
         plan = StudyPlan(
             given_text(data, "name", path.stem),
             path,
-            factors,
+            _with_side(factors, cycles),
             trials,
             _options(data.get("robot", {}), folder),
-            _cycles(data, folder),
+            cycles,
             toml_value(tuple[str, ...], "'columns'", data.get("columns", ["**"])),
             tuple(filled(Comparison, "[[compare]]", item) for item in tables(data, "compare")),
             tuple(filled(PaperFigure, "[[figure]]", item) for item in tables(data, "figure")),
+            normalise=toml_value(Normalise, "'normalise'", data.get("normalise", "")),
+            bodies=_bodies(data, folder),
             pages=toml_value(bool, "'pages'", data.get("pages", True)),
             trust_python=trust_python,
         )
@@ -128,12 +146,45 @@ def _options(data: Any, folder: Path) -> Options:
 def _cycles(data: Mapping[str, Any], folder: Path) -> Cycles | None:
     if "cycles" not in data:
         return None
-    cycles = filled(Cycles, "[cycles]", data["cycles"])
+    given = data["cycles"]
+    if isinstance(given, dict):
+        by_side = {key: given[key] for key in ("start", "during") if isinstance(given.get(key), str)}
+        usual = {"sides": "apart"} if given.keys() & {"start", "during"} and not by_side else {}
+        given = usual | given | {key: {"": what} for key, what in by_side.items() if what}
+    cycles = filled(Cycles, "[cycles]", given)
     if not cycles.table:
         return cycles
     table = resolved(cycles.table, folder)
     require_there(table)
     return replace(cycles, table=table)
+
+
+def _with_side(factors: tuple[str, ...], cycles: Cycles | None) -> tuple[str, ...]:
+    if cycles is None or cycles.sides != "apart":
+        return factors
+    if any(factor.lower() == SIDE for factor in factors):
+        raise LinkwiseError(f"the factor {SIDE!r} is made by [cycles], whose sides are apart; leave it out")
+    return (*factors, SIDE)
+
+
+def of_sides(trials: Iterable[Trial], cycles: Cycles | None) -> Iterator[Trial]:
+    """Yield the trials, or two of each where cycles are of two sides, in whose names the side stands."""
+    for trial in trials:
+        if cycles is None or not cycles.sides:
+            yield replace(trial, recording=trial.name)
+            continue
+        for side in SIDES:
+            labels = (*trial.labels, *([(SIDE, side)] if cycles.sides == "apart" else []))
+            name = f"{trial.name}-{side}"
+            yield replace(trial, name=name, labels=labels, side=side, recording=trial.name)
+
+
+def _bodies(data: Mapping[str, Any], folder: Path) -> dict[str, Subject]:
+    if "subjects" not in data:
+        return {}
+    table = resolved(given_text(data, "subjects"), folder)
+    require_there(table)
+    return read_subjects(table)
 
 
 def _check(plan: StudyPlan) -> None:
@@ -157,14 +208,48 @@ def _check(plan: StudyPlan) -> None:
         if odd := [level for level in comparison.between if level not in levels]:
             there = listed(map(repr, sorted(levels)))
             raise LinkwiseError(f"no trial has the {comparison.factor} {odd[0]!r}; there are {there}")
+        if not comparison.paired:
+            _check_apart(plan, comparison)
+    _check_families(plan.comparisons)
+    check_bodies(plan)
     for figure in plan.figures:
         if figure.by:
             _levels(plan, figure.by)
 
 
+def _check_apart(plan: StudyPlan, comparison: Comparison) -> None:
+    """Raise LinkwiseError for subjects at both levels of a comparison that takes them for others."""
+    first, second = (
+        {trial.label(SUBJECT) for trial in plan.trials if trial.label(comparison.factor) == level}
+        for level in comparison.between
+    )
+    if both := sorted(first & second):
+        levels = " and ".join(map(repr, comparison.between))
+        raise LinkwiseError(
+            f"[[compare]] {comparison.factor}: 'paired' is false, and {levels} have subjects in common,"
+            f" {listed(map(repr, both))}, whose values go together; leave 'paired' out"
+        )
+
+
+def _check_families(comparisons: Sequence[Comparison]) -> None:
+    """Raise LinkwiseError for comparisons of one family that are not corrected alike."""
+    first: dict[str, Comparison] = {}
+    for one in comparisons:
+        other = first.setdefault(one.family, one)
+        if one.family and (one.correct, one.alpha) != (other.correct, other.alpha):
+            raise LinkwiseError(
+                f"[[compare]]: the family {one.family!r} has 'correct' {other.correct!r} at 'alpha'"
+                f" {other.alpha:g}, and {one.correct!r} at {one.alpha:g}; give all its comparisons the same"
+            )
+        if one.family and one.correct == "none":
+            raise LinkwiseError(
+                f"[[compare]]: the family {one.family!r} is not corrected; add 'correct', such as \"holm\""
+            )
+
+
 def _check_table(plan: StudyPlan, table: str) -> None:
-    names = [trial.name for trial in plan.trials]
-    for name in written_cycles(table):
+    names = list(dict.fromkeys(trial.recording for trial in plan.trials))
+    for name, _ in written_cycles(table, is_sided=bool(plan.cycles and plan.cycles.sides)):
         if name not in names:
             near = listed(map(repr, nearest_first(name, names)))
             raise LinkwiseError(f"{table}: no trial is called {name!r}; nearest are {near}")

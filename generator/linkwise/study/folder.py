@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import gettempdir
-from typing import Literal
+from typing import Any, Literal
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names
@@ -129,11 +129,17 @@ class StudyMark:
     """Names of the files in the folder, besides trials."""
     uncertain: Mapping[str, object]
     """Assumptions about what is uncertain; empty where nothing is."""
+    notes: tuple[str, ...]
+    """What a reader of the files must know."""
+    normalised: Mapping[str, object]
+    """Way in which results are normalised; empty where they are not."""
+    cycles: Mapping[str, object]
+    """Way in which trials are cut into cycles; empty where they are not."""
 
     @classmethod
     def begun(cls, plan: StudyPlan, files: Sequence[str]) -> "StudyMark":
         """Return the mark of a study at work, whose folder has files of a former run."""
-        return cls(plan.name, "begun", plan.factors, _trials(plan), {}, "", tuple(files), {})
+        return cls(plan.name, "begun", plan.factors, _trials(plan), {}, "", tuple(files), {}, (), {}, {})
 
     @classmethod
     def done(
@@ -142,11 +148,11 @@ class StudyMark:
         broken: Sequence[TrialOutcome],
         key: str,
         files: Sequence[str],
-        uncertain: Mapping[str, object],
+        told: Mapping[str, Any],
     ) -> "StudyMark":
-        """Return the mark of a study whose trials are done or broken."""
+        """Return the mark of a study whose trials are done or broken; told are the rest of its entries."""
         reasons = {one.name: one.reason for one in broken}
-        return cls(plan.name, "done", plan.factors, _trials(plan), reasons, key, tuple(files), uncertain)
+        return cls(plan.name, "done", plan.factors, _trials(plan), reasons, key, tuple(files), **told)
 
     @classmethod
     def read(cls, out: Path) -> "StudyMark | None":
@@ -161,7 +167,8 @@ class StudyMark:
         try:
             data = parse_json(read_back(path))
             if isinstance(data, dict):
-                data.setdefault("uncertain", {})  # that of an earlier linkwise has no such entry
+                # That of an earlier linkwise has no such entries.
+                data = {"uncertain": {}, "notes": [], "normalised": {}, "cycles": {}} | data
             mark = decode(cls, data, "")
             for name in mark.files:
                 is_plain = is_inside(name) and "/" not in name

@@ -121,6 +121,8 @@ def trial_key(
     told = [
         trial.name,
         trial.labels,
+        trial.side,
+        trial.recording,
         trial.robot if is_built_in(trial.robot) else "",  # a built-in robot has no file to hash
         {**asdict(trial.choices), **{key: _count(getattr(trial.choices, key)) for key in OF_FILES}},
         plan.options.request(),

@@ -2,7 +2,7 @@
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -42,6 +42,10 @@ class TrialRecord:
     """Bytes of the other files of its folder, by name."""
     uncertain: Mapping[str, object] | None
     """Assumptions about what is uncertain; none where nothing is."""
+    cycles_by: str
+    """Instants at which cycles begin and end, in words; empty without cycles."""
+    turned: tuple[str, ...]
+    """Coordinates that change sign in cycles of the left; none without sides."""
 
     def text(self) -> str:
         """Return the record as JSON."""
@@ -76,6 +80,21 @@ def done_before(plan: StudyPlan, folders: Mapping[str, Path]) -> dict[str, Trial
         ):
             found[trial.name] = record
     return found
+
+
+def cut_by(plan: StudyPlan, records: Sequence[TrialRecord]) -> dict[str, object]:
+    """Return how trials are cut into cycles, as plain data; empty without cycles."""
+    if plan.cycles is None:
+        return {}
+    ends = {by: [one.name for one in records if one.cycles_by == by] for by in {r.cycles_by for r in records}}
+    told: dict[str, object] = {"begin_and_end": [{"by": by, "trials": ends[by]} for by in sorted(ends)]}
+    if plan.cycles.sides:
+        told |= {
+            "sides": plan.cycles.sides,
+            "change_sign_on_the_left": sorted({name for one in records for name in one.turned}),
+            "sign_by": "the robot's geometry" if plan.cycles.turned is None else "the study's file",
+        }
+    return told
 
 
 def outputs_in(folder: Path) -> dict[str, int]:

@@ -12,12 +12,14 @@ from linkwise.escape import printable, script_data
 from linkwise.plotstyle import COLOURS, ON_DARK
 from linkwise.render import render
 from linkwise.study.comparisons import Compared
+from linkwise.study.corrections import CORRECTIONS
 from linkwise.study.deviation_columns import RANDOM, WHOLE, is_deviation
 from linkwise.study.folder import TRIALS
 from linkwise.study.ledger import PAGE, TrialRecord
 from linkwise.study.plan import StudyPlan
 from linkwise.study.spread import columns_of_trials, values_of
 from linkwise.study.summary import TrialSummary
+from linkwise.study.t_tests import Cluster
 from linkwise.study.trial import TrialOutcome
 
 NUMBERS = 3_000_000
@@ -33,8 +35,12 @@ def study_page(
     folders: Mapping[str, Path],
     tests: Sequence[Compared],
     broken: Sequence[TrialOutcome],
+    notes: Sequence[str],
 ) -> str:
-    """Return the page as HTML; its links are relative to the study's folder."""
+    """Return the page as HTML; its links are relative to the study's folder.
+
+    notes: lines that a reader of the page must know
+    """
     columns, left_out = _columns(trials)
     curves = {name for one in trials for name in one.curves}
     beside = [one for name in columns for one in _beside(curves, name)]
@@ -63,6 +69,8 @@ def study_page(
         ],
         "tests": [_test(test) for test in tests],
         "leftOut": left_out,
+        "notes": list(map(printable, notes)),
+        "told": _told(plan, folders),
         "colours": list(COLOURS),
         "coloursDark": list(ON_DARK),
     }
@@ -116,13 +124,55 @@ def _trial(trial: TrialSummary, folder: Path) -> dict[str, object]:
     }
 
 
+def _told(plan: StudyPlan, folders: Mapping[str, Path]) -> list[str]:
+    """Return lines on how results are normalised, and how cycles of both sides go together."""
+    told = []
+    if plan.normalise not in ("", "none"):
+        told.append(f"{NORMALISED[plan.normalise]}; tables and pages of single trials have N·m, N, W and J.")
+    if plan.cycles is not None and plan.cycles.sides:
+        records = [record for folder in folders.values() if (record := TrialRecord.read(folder)) is not None]
+        turned = sorted({printable(name) for record in records for name in record.turned})
+        told.append(
+            "Cycles of the left are mirrored: ipsi is the side of the cycle, contra the other, and"
+            f" {', '.join(turned) or 'no coordinate'} changed sign."
+        )
+    return told
+
+
+NORMALISED = {
+    "mass": "Torques, forces, powers and works are by kg of each subject",
+    "weight*height": (
+        "Torques are in % of body weight times height, forces in % of body weight, powers and works by kg"
+    ),
+}
+
+
 def _test(test: Compared) -> dict[str, object]:
+    counts = [len(side.each) for side in test.sides]
     return {
         "column": printable(test.column),
         "factor": test.comparison.factor,
         "between": list(map(printable, test.comparison.between)),
-        "subjects": min(len(side.each) for side in test.sides),
+        "subjects": counts[:1] if test.comparison.paired else counts,
+        "isPaired": test.comparison.paired,
         "alpha": test.comparison.alpha,
+        "level": test.level,
+        "p": test.adjusted,
+        "correction": CORRECTIONS[test.comparison.correct],
+        "family": test.family,
         "isCurve": len(test.statistic) > 1,
-        "clusters": [[cluster.start, cluster.end, cluster.p] for cluster in test.clusters],
+        "clusters": [_part(test, part) for part in test.clusters],
+        "brief": [_part(test, part) for part in test.brief],
+        "effect": _effect(test, None),
     }
+
+
+def _part(test: Compared, part: Cluster) -> dict[str, object]:
+    return {"start": part.start, "end": part.end, "p": part.p, "effect": _effect(test, part)}
+
+
+def _effect(test: Compared, part: Cluster | None) -> list[float | None]:
+    """Return Hedges' g with its interval, and where in the cycle in %; None where there is no number."""
+    at, effect = test.effect(part)
+    numbers = (effect.effect, effect.effect_low, effect.effect_high, at)
+    return [number if np.isfinite(number) else None for number in numbers]

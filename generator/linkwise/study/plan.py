@@ -14,15 +14,21 @@ from linkwise.escape import column_part
 from linkwise.option import written
 from linkwise.plotstyle import FigureFormat
 from linkwise.robot import Options
+from linkwise.study.corrections import Correction
+from linkwise.study.subjects import Subject
 
 SUBJECT = "subject"
 """Factor that every study has, and the first."""
+RIGHT, LEFT = SIDES = ("right", "left")
+SIDE = "side"
+"""Factor of a study whose cycles are of two sides, apart."""
 OF_FILES = tuple(one.key for one in written(AnalysisChoices) if one.option.is_file)
 """Choices that are paths of files."""
 WIDTHS = {"single": "90 mm", "double": "180 mm"}
 """Widths of figures over one and over two columns of a journal."""
 CAUSES = "causes:"
 """Beginning of what a figure names in place of columns: what loads the joint that follows."""
+Normalise = Literal["", "none", "mass", "weight*height"]
 POINTS = 101
 """Number of points of a cycle, 0 to 100 %."""
 
@@ -31,14 +37,20 @@ POINTS = 101
 class Cycles:
     """Cycles of a trial: `start` begins a cycle each time, `during` is one as long as it lasts.
 
-    Both are written as a phase's WHAT of `linkwise analyze`. `table` is a CSV file of trial, start, end in s.
-    Cycles shorter than `shortest` or longer than `longest`, in s, are left out. `integrals` are patterns of
-    columns that are integrated over each cycle, those of power that tables keep if there are none.
+    Both are written as a phase's WHAT of `linkwise analyze`, by side, "" where cycles are of none. `table` is
+    a CSV file of trial, start, end in s and, with `sides`, side. Cycles shorter than `shortest` or longer
+    than `longest`, in s, are left out. `integrals` are patterns of columns that are integrated over each
+    cycle, those of power that tables keep if there are none.
+
+    `sides` has cycles of the right and of the left: `apart`, by a factor `side`, or `pooled`. `turned` are
+    the coordinates that change sign in those of the left; None finds them by the robot's geometry.
     """
 
-    start: str = ""
-    during: str = ""
+    start: Mapping[str, str] = field(default_factory=dict)
+    during: Mapping[str, str] = field(default_factory=dict)
     table: str = ""
+    sides: Literal["", "apart", "pooled"] = ""
+    turned: tuple[str, ...] | None = None
     points: int = POINTS
     shortest: float = 0.0
     longest: float = math.inf
@@ -52,24 +64,36 @@ class Cycles:
             raise LinkwiseError(f"[cycles]: {limits}; give seconds, the longest the larger")
         if not 2 <= self.points <= 10_001:
             raise LinkwiseError(f"[cycles]: 'points' is {self.points}; give 2 to 10001")
-        if self.what:
-            Phase.of(f"cycle={self.what}")
+        told = set(self.start or self.during)
+        if told and told != (set(SIDES) if self.sides else {""}):
+            raise LinkwiseError(
+                "[cycles]: give 'start' or 'during' as one text, or with 'sides' as { right = …, left = … }"
+            )
+        if self.turned is not None and not self.sides:
+            raise LinkwiseError("[cycles]: 'turned' goes with 'sides'; add sides = \"apart\" or \"pooled\"")
+        for what in (self.start or self.during).values():
+            Phase.of(f"cycle={what}")
 
-    @property
-    def what(self) -> str:
-        """Condition that defines when a cycle is; empty with a table."""
-        return self.start or self.during
+    def what(self, side: str) -> str:
+        """Return the condition that defines when a cycle of a side is; empty with a table."""
+        return (self.start or self.during).get(side, "")
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two levels of a factor that are compared by statistics, in these columns."""
+    """Two levels of a factor that are compared by statistics, in these columns.
+
+    `correct` says how p is corrected for the number of columns: of this comparison, or of all that have the
+    same `family`.
+    """
 
     factor: str
     between: tuple[str, ...]
     columns: tuple[str, ...]
     paired: bool = True
     alpha: float = 0.05
+    correct: Correction = "none"
+    family: str = ""
 
     def __post_init__(self) -> None:
         if len(self.between) != 2 or len(set(self.between)) != 2:
@@ -149,6 +173,10 @@ class Trial:
     robot: str
     choices: AnalysisChoices = field(default_factory=AnalysisChoices)
     """Choices of the analysis, with the paths of its loads as they are opened."""
+    side: str = ""
+    """Side whose cycles it has, empty where cycles are of none."""
+    recording: str = ""
+    """Name by which a table of cycles has it."""
 
     def label(self, factor: str) -> str:
         """Return the trial's level of a factor."""
@@ -170,6 +198,10 @@ class StudyPlan:
     """Patterns of the columns that tables keep."""
     comparisons: tuple[Comparison, ...] = ()
     figures: tuple[PaperFigure, ...] = ()
+    normalise: Normalise = ""
+    """What torques, forces, powers and works of all trials together are divided by; not said if empty."""
+    bodies: Mapping[str, Subject] = field(default_factory=dict)
+    """Mass and height by subject, as far as the study tells them."""
     pages: bool = field(kw_only=True)
     trust_python: bool = field(kw_only=True, repr=False)
     """True if robots that are Python files are run; no result depends on it."""

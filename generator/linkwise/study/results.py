@@ -2,31 +2,43 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-
-import numpy as np
+from typing import NamedTuple
 
 from linkwise.errors import LinkwiseError
 from linkwise.progress import Progress
 from linkwise.study.band_figure import band_figures
-from linkwise.study.comparisons import Cluster, Compared, compared
+from linkwise.study.comparisons import compared, left_out_lines
 from linkwise.study.folder import GROUPS, MEAN_CURVES, STUDY_PAGE, SUMMARIES, TESTS
+from linkwise.study.normalised import normalised, of_several_masses, told_of_bodies
 from linkwise.study.page import study_page
 from linkwise.study.plan import StudyPlan
 from linkwise.study.summary import summaries
 from linkwise.study.tables import curve_rows, group_rows, parquet, summary_rows
+from linkwise.study.tested_rows import rows_of_tests
 from linkwise.study.trial import TrialOutcome
 
 
-def study_files(
-    plan: StudyPlan, folders: Mapping[str, Path], broken: Sequence[TrialOutcome], progress: Progress
-) -> tuple[dict[str, bytes], tuple[str, ...]]:
-    """Return contents by name, and what could not be made.
+class Together(NamedTuple):
+    """What the trials of a study say together."""
 
-    Tables, tests and figures cover the trials that exist.
-    """
-    trials = summaries(plan, folders)
-    if not trials:
-        return {}, ()
+    files: dict[str, bytes]
+    """Contents by name."""
+    lacking: tuple[str, ...]
+    """What could not be made, and why."""
+    notes: tuple[str, ...]
+    """What a reader of the files must know: who is left out of a test, what is averaged as it is."""
+    normalised: dict[str, object]
+    """Way in which results are normalised, empty where they are not."""
+
+
+def together(
+    plan: StudyPlan, folders: Mapping[str, Path], broken: Sequence[TrialOutcome], progress: Progress
+) -> Together:
+    """Return tables, tests and figures of the trials that exist, and what is to be told of them."""
+    own = summaries(plan, folders)
+    if not own:
+        return Together({}, (), (), {})
+    trials = normalised(plan, own)
     progress("together", 0, 3)
     files = {
         SUMMARIES: parquet(summary_rows(trials)),
@@ -35,44 +47,16 @@ def study_files(
     if plan.cycles is not None:
         files[MEAN_CURVES] = parquet(curve_rows(trials, plan.cycles.points))
     progress("together", 1, 3)
-    tests: list[Compared] = []
-    told: list[str] = []
-    for comparison in plan.comparisons:
-        try:
-            made, lacking = compared(comparison, trials)
-        except LinkwiseError as error:
-            made, lacking = [], (str(error),)
-        tests += made
-        told += lacking
+    tests, lacking = compared(plan.comparisons, trials)
+    told = [*lacking]
     if tests:
-        files[TESTS] = parquet(_rows(tests))
+        files[TESTS] = parquet(rows_of_tests(tests))
     progress("together", 2, 3)
     try:
         files |= dict(band_figures(plan.figures, trials, tests))
     except LinkwiseError as error:
         told.append(str(error))
-    files[STUDY_PAGE] = study_page(plan, trials, folders, tests, broken).encode()
+    notes = (*of_several_masses(plan, own), *left_out_lines(tests))
+    files[STUDY_PAGE] = study_page(plan, trials, folders, tests, broken, notes).encode()
     progress("together", 3, 3)
-    return files, tuple(told)
-
-
-def _rows(tests: Sequence[Compared]) -> list[dict[str, object]]:
-    """Return a row for each part of a cycle that differs, and one for a column without such a part."""
-    rows: list[dict[str, object]] = []
-    for test in tests:
-        a, b = test.comparison.between
-        about = {
-            "factor": test.comparison.factor,
-            "first": a,
-            "second": b,
-            "column": test.column,
-            "unit": test.unit,
-            "first_subjects": len(test.sides[0].each),
-            "second_subjects": len(test.sides[1].each),
-            "alpha": test.comparison.alpha,
-            "t": float(test.statistic[np.abs(test.statistic).argmax()]),
-            "threshold": test.threshold,
-        }
-        parts = test.clusters or (Cluster(np.nan, np.nan, test.p),)
-        rows += [about | {"start": part.start, "end": part.end, "p": part.p} for part in parts]
-    return rows
+    return Together(files, tuple(told), notes, told_of_bodies(plan, own))

@@ -17,6 +17,7 @@ from linkwise.pipeline import PYTHON
 from linkwise.progress import Progress
 from linkwise.robot import is_description
 from linkwise.robot.read import most_bytes
+from linkwise.study.normalised import check_mass
 from linkwise.study.paths import is_address, opened_here, require_there, told_of, version_of
 from linkwise.study.plan import StudyPlan
 
@@ -41,6 +42,7 @@ def check_robots(plan: StudyPlan, progress: Progress) -> tuple[str, ...]:
             manifest = Manifest.read(kept.directory)
             if first is not None:
                 _compare(first, robot, manifest)
+            check_mass(plan, robot, () if manifest.tree is None else manifest.tree.links)
         first = first or (robot, manifest)
     progress("robots", len(robots), len(robots))
     return tuple(told)

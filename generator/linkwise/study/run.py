@@ -24,12 +24,13 @@ from linkwise.study.folder import StudyMark, held_study, refuse_unless_study, sw
 from linkwise.study.inputs import trial_here
 from linkwise.study.integrals import integral_columns
 from linkwise.study.kept_curves import lacks_curves
-from linkwise.study.ledger import MARK, TrialRecord, done_before, is_trial
+from linkwise.study.ledger import MARK, TrialRecord, cut_by, done_before, is_trial
 from linkwise.study.paths import removed
 from linkwise.study.plan import StudyPlan
 from linkwise.study.process_pool import ProcessPool
-from linkwise.study.results import study_files
+from linkwise.study.results import together
 from linkwise.study.robots import check_robots
+from linkwise.study.sides import SidedColumns
 from linkwise.study.tables import kept_columns
 from linkwise.study.trial import TrialOutcome, TrialTask, prepared_trial
 
@@ -121,14 +122,20 @@ def _done(
     ):
         if outcomes:
             write_files(out, {MARK: former.text()})
-        return StudyOutcome(plan, done, 0, 0, broken, warnings, there)
-    content, lacking = study_files(plan, {name: folders[name] for name in done}, broken, progress)
+        return StudyOutcome(plan, done, 0, 0, broken, (*warnings, *former.notes), there)
+    made = together(plan, {name: folders[name] for name in done}, broken, progress)
     # What is missing, such as a library, may be there next time; until then it is reported each time.
-    mark = StudyMark.done(plan, broken, "" if lacking else key, list(content), assumptions(records))
-    files = write_files(out, {**content, MARK: mark.text()})
+    entries = {
+        "uncertain": assumptions(records),
+        "notes": made.notes,
+        "normalised": made.normalised,
+        "cycles": cut_by(plan, records),
+    }
+    mark = StudyMark.done(plan, broken, "" if made.lacking else key, list(made.files), entries)
+    files = write_files(out, {**made.files, MARK: mark.text()})
     for file in set(there) - set(files):
         file.unlink(missing_ok=True)
-    samples, told = sum(one.samples for one in outcomes), (*warnings, *lacking)
+    samples, told = sum(one.samples for one in outcomes), (*warnings, *made.lacking, *made.notes)
     return StudyOutcome(plan, done, len(outcomes) - len(broken), samples, broken, told, files)
 
 
@@ -163,7 +170,7 @@ def _columns(plan: StudyPlan, before: Collection[str]) -> tuple[Column, ...]:
             continue
         try:
             with within(f"trial {trial.name!r}"), trial_here(trial) as here, passing_folder() as buffer:
-                return prepared_trial(plan, here, buffer).columns
+                return SidedColumns.of(prepared_trial(plan, here, buffer), plan.cycles, here.side).columns
         except LinkwiseError as reason:
             reasons.append(reason)
     if reasons and not before:

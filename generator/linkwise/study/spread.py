@@ -22,6 +22,14 @@ class Spread:
     each: Array
     """Means of subjects, (subjects, …)."""
 
+    is_of_trials: bool = False
+    """True where one subject's trials stand in place of subjects."""
+
+    @property
+    def over_trials(self) -> "Spread":
+        """The spread over trials, whosever they are, each as if it were of a subject of its own."""
+        return Spread(self.subjects, self.every, self.every, is_of_trials=True)
+
     @property
     def mean(self) -> Array:
         """Mean over subjects."""

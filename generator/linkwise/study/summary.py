@@ -1,5 +1,6 @@
 """Summary of each trial, kept for the combined results of a study; its numbers are running statistics."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -31,6 +32,8 @@ class TrialSummary:
     curves: dict[str, Array]
     """Mean curve of each column, (points,), of deviations the root mean square; empty without cycles."""
     cycles: int
+    mass: float = math.nan
+    """Mass of the trial's robot in kg, without payloads; NaN where it does not say."""
     words: Mapping[str, MotionWords] = field(default_factory=dict)
     """Words of the coordinates of a person's joints, by name."""
 
@@ -42,6 +45,7 @@ class TrialSummary:
             units = dict(zip(names, data["units"].tolist(), strict=True))
             statistics = dict(zip(names, data["statistics"].T, strict=True))
             words = {name: MotionWords(*some) for name, *some in data["words"].tolist()}
+            mass = float(data["mass"])
         curves: dict[str, Array] = {}
         cycles = 0
         if (folder / CURVES).exists():
@@ -50,7 +54,7 @@ class TrialSummary:
                 squared = np.array([is_deviation(name) for name in names])[:, None]
                 curves = dict(zip(names, np.where(squared, np.hypot(mean, std), mean), strict=True))
                 cycles = int(data["cycles"])
-        return cls(name, dict(labels), units, statistics, curves, cycles, words)
+        return cls(name, dict(labels), units, statistics, curves, cycles, mass, words)
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """One trial of a study, from its log to its folder: the work of every engine's workers."""
 
+import math
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -32,8 +33,10 @@ from linkwise.study.ledger import (
     refuse_unless_trial,
     require_seen,
 )
+from linkwise.study.normalised import own_mass
 from linkwise.study.plan import StudyPlan, Trial
 from linkwise.study.robots import opened_robot
+from linkwise.study.sides import SidedColumns
 from linkwise.study.summary import RunningMoments
 from linkwise.study.tables import CYCLE, PERCENT, TrialTable, kept_columns
 
@@ -84,7 +87,10 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         trial = files.enter_context(trial_here(task.trial))
         key = trial_key(plan, task.trial, {}, trial)
         job = prepared_trial(plan, trial, draft)
-        columns, rows = job.columns, len(job.decomposer.rows)
+        seen, rows = SidedColumns.of(job, plan.cycles, trial.side), len(job.decomposer.rows)
+        columns = seen.columns
+        tree = job.decomposer.robot.package.manifest.tree
+        mass = math.nan if tree is None else own_mass(tree.links)
         kept = kept_columns(columns, plan.columns)
         labels = {"trial": trial.name, **dict(trial.labels)}
         every = EverySample(rows, *((job.count, draft) if plan.pages else (0, None)))
@@ -93,13 +99,15 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         places = () if plan.cycles is None else (CYCLE, PERCENT)
         table = files.enter_context(TrialTable(draft / TABLE, labels, [columns[at] for at in kept], places))
         integrals = files.enter_context(CycleIntegrals(plan, columns, labels, draft))
-        cycles = TrialCycles(plan, job, lambda rows, *places: table(rows[kept], *places), integrals)
+        names = [column.name for column in columns]
+        cycles = TrialCycles(plan, job, names, lambda rows, *places: table(rows[kept], *places), integrals)
 
-        if plan.cycles is not None and plan.cycles.what:  # it may be on at single samples: no time, no work
+        if plan.cycles is not None and not plan.cycles.table:
+            # The cycle may be on at single samples: no time, no work.
             job = replace(job, phases=job.phases[:-1])
 
         def sink(whole: Array) -> None:
-            block = job.table_rows(whole)
+            block = seen.rows(job.table_rows(whole))
             moments(block)
             if plan.pages:
                 every(whole)
@@ -112,14 +120,13 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         cycles.finish(draft)
         analysis = job.analysis(done, every.values)
     every_column = (*columns, *integrals.columns)
-    robot = job.decomposer.robot
-    named = [(name, words) for name, words in zip(robot.joints, robot.words, strict=True)]
     np.savez(
         draft / SUMMARY,
         statistics=np.concatenate([moments.table, integrals.statistics], axis=1),
         names=[c.name for c in every_column],
         units=[c.unit for c in every_column],
-        words=np.array([(name, *words) for name, words in named if words is not None]).reshape(-1, 4),
+        words=np.array([(name, *words) for name, words in seen.words.items()]).reshape(-1, 4),
+        mass=mass,
     )
     if plan.pages:
         (draft / PAGE).write_bytes(report(analysis).encode())
@@ -136,6 +143,8 @@ def _worked(task: TrialTask, draft: Path) -> TrialRecord:
         warnings,
         outputs_in(draft),
         analysis.uncertain,
+        cycles.ends,
+        seen.turned,
     )
 
 
@@ -149,6 +158,6 @@ def prepared_trial(plan: StudyPlan, trial: Trial, buffer: Path) -> Job:
     asked = trial.choices.request(robot, trial.robot)
     robot = with_contacts(robot, asked.contacts)
     outputs = replace(asked.outputs, page=plan.pages)
-    if plan.cycles is not None and plan.cycles.what:
-        outputs = replace(outputs, phases=(*outputs.phases, Phase.of(f"cycle={plan.cycles.what}")))
+    if plan.cycles is not None and (what := plan.cycles.what(trial.side)):
+        outputs = replace(outputs, phases=(*outputs.phases, Phase.of(f"cycle={what}")))
     return prepared(Path(trial.log), robot, replace(asked, outputs=outputs), silent, buffer)
