@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 from urllib.parse import unquote
 
-from linkwise.analysis.motion_words import MotionWords
+from linkwise.analysis.motion_words import MotionWords, shown_joints
 
 TITLES = {
     "q": "{0}",
@@ -61,13 +61,4 @@ def column_title(name: str, words: Mapping[str, MotionWords]) -> ColumnTitle:
     joints = [unquote(part) for part in parts]
     own = words.get(joints[0])
     signs = "" if own is None or kind.startswith("power") else own.signs
-    return ColumnTitle(template.format(*(_joint(joint, words) for joint in joints)), signs)
-
-
-def _joint(name: str, words: Mapping[str, MotionWords]) -> str:
-    """Return what a joint is called: of several coordinates of one joint, each by its motion."""
-    own = words.get(name)
-    if own is None:
-        return name
-    alike = [other for key, other in words.items() if key != name and other.joint == own.joint]
-    return f"{own.joint} {own.positive}" if alike else own.joint
+    return ColumnTitle(template.format(*shown_joints(joints, words)), signs)

@@ -8,7 +8,8 @@ the left; a model of one side has OpenSim's directions, x forward and y up.
 """
 
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -111,6 +112,20 @@ class _Moves(NamedTuple):
     """Axis of a positive turn, or direction of a positive slide, (3,)."""
     place: Array
     """Place of the axis, (3,)."""
+
+
+def shown_joints(names: Sequence[str], words: Mapping[str, MotionWords]) -> tuple[str, ...]:
+    """Return what joints are called in figures: "right hip", or "right hip flexion" where it has other turns.
+
+    names: names of coordinates; words: words of all coordinates that have some, by name
+    """
+    count = Counter(one.joint for one in words.values())
+    found = []
+    for name in names:
+        own = words.get(name)
+        is_one = own is not None and count[own.joint] > 1
+        found.append(name if own is None else f"{own.joint} {own.positive}" if is_one else own.joint)
+    return tuple(found)
 
 
 def words_of(

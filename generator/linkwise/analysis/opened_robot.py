@@ -19,7 +19,7 @@ from linkwise_runtime.structure import PassiveJoint, Structure
 
 from linkwise.analysis.constrained_model import ConstrainedModel
 from linkwise.analysis.contacts.ground import GroundContacts
-from linkwise.analysis.motion_words import MotionWords, words_of
+from linkwise.analysis.motion_words import MotionWords, shown_joints, words_of
 from linkwise.analysis.samples import FollowingJoint
 from linkwise.analysis.settings import Payload
 from linkwise.arrays import Array
@@ -197,6 +197,17 @@ class OpenedRobot:
     def words(self) -> tuple[MotionWords | None, ...]:
         """Words of each joint of a person and of its directions; None for other joints."""
         return words_of(self.joints, self.package.manifest.tree, self.up)
+
+    @property
+    def figure_joints(self) -> tuple[str, ...]:
+        """Names of all joints for figures: in words where these are of a person."""
+        known = {name: said for name, said in zip(self.joints, self.words, strict=True) if said is not None}
+        return shown_joints(self.joints, known) if known else self.plot_joints
+
+    def with_signs(self, unit: str, i: int) -> str:
+        """Return a label of an axis: a unit, and in words what is above and below zero for joint i."""
+        said = self.words[i]
+        return unit if said is None else f"{unit}\n{said.signs}"
 
     @property
     def plot_links(self) -> tuple[str, ...]:

@@ -131,7 +131,7 @@ class _Tally:
 
 def cause_numbers(result: AnalysisResult, i: int) -> CauseNumbers:
     """Return the numbers of joint i over all samples; raise LinkwiseError for a phase without any."""
-    causes = causes_of(result, result.robot.plot_joints, drawn)
+    causes = causes_of(result, result.robot.figure_joints, drawn)
     labels, rows = _rows(result, causes, sizes(result, causes, [i])[:, 0])
     asked = shown_phases(result, i)
     every, *tallies = [_Tally(len(rows)) for _ in range(1 + len(asked))]

@@ -37,7 +37,7 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
     numbers = cause_numbers(result, i)
     phases = numbers.phases
     height = (0.17 * len(phases) + 0.13) * len(numbers.labels)
-    figure = new_figure(8.4, 3.3 + height)
+    figure = new_figure(3.3 + height)
     grid = figure.add_gridspec(2, 2, height_ratios=(1.3, height))
     over_time = figure.add_subplot(grid[0, :])
     means = figure.add_subplot(grid[1, 0])
@@ -52,7 +52,7 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
         handlelength=1.5,
         borderaxespad=0.3,
     )
-    write_title(figure, result, f"What loads {drawn(result.robot.joints[i], 40)}")
+    write_title(figure, result, f"What loads {drawn(result.robot.figure_joints[i], 40)}")
     told = [phase.told for phase in asked_phases(result, i)]
     note = " · ".join(
         ["motion: acceleration and velocity together; size: mean of the magnitude", *told, foot(result)]
@@ -86,7 +86,7 @@ def _over_time(panel: Any, result: AnalysisResult, i: int, numbers: CauseNumbers
     draw_band(panel, bands[0], INK)
     zero_line(panel)
     panel.set_title("all causes together")
-    panel.set_ylabel(result.robot.torque_units[i])
+    panel.set_ylabel(result.robot.with_signs(result.robot.torque_units[i], i))
     time_axis(panel, result)
     return bands
 

@@ -48,7 +48,7 @@ def contacts(result: AnalysisResult, _: int) -> "Figure":
     places = [(c, axis) for c in range(len(joints)) for axis in shown]
     forces = [_rows_of(result, "force", *place) for place in places]
     bands = Bands(result, [*forces, *(result.rows.numbers("tau", joint=i) for i in loaded)])
-    figure = new_figure(WIDTH * len(ground.names) + 1.4, HEIGHT * count + 1.3)
+    figure = new_figure(HEIGHT * count + 1.3, WIDTH * len(ground.names) + 1.4)
     panels = figure.subplots(count, len(ground.names), sharex=True, sharey="row", squeeze=False)
     for c, name in enumerate(ground.names):
         panels[0, c].set_title(drawn(name))
@@ -184,7 +184,7 @@ def _rows_of(result: AnalysisResult, quantity: str, contact: int, axis: int) -> 
 
 def _draw_torque(panel: Any, result: AnalysisResult, contact: int, i: int) -> None:
     _shade(panel, result, contact)
-    name, unit = drawn(result.robot.plot_joints[i]), result.robot.torque_units[i]
+    name, unit = drawn(result.robot.figure_joints[i]), result.robot.torque_units[i]
     found, measured = (result.rows.numbers(kind, joint=i) for kind in ("tau", "tau_as_loads"))
     _draw_rows(panel, result, found, color=INK, linewidth=1.6, label="found from the motion")
     _draw_rows(panel, result, measured, color="#C21E56", linestyle="dotted", label="by what was measured")

@@ -31,14 +31,14 @@ def cutoff(result: AnalysisResult, _: int) -> "Figure":
     sweep = result.cutoff_sweep
     assert sweep is not None, "`check_figure` sees to it"
     joints = _chosen(result, sweep)
-    figure = new_figure(8.4, 1.0 + 1.9 * len(joints))
+    figure = new_figure(1.0 + 1.9 * len(joints))
     panels = figure.subplots(len(joints), 2, squeeze=False, sharex=True)
     for (left, right), i in zip(panels, joints, strict=True):
         _joint(result, sweep, i, left, right)
     for panel in panels[-1]:
         panel.set_xlabel("cutoff (Hz)")
     write_title(figure, result, "What the cutoff does")
-    left_out = [drawn(result.robot.plot_joints[i]) for i in result.robot.driven if i not in joints]
+    left_out = [drawn(result.robot.figure_joints[i]) for i in result.robot.driven if i not in joints]
     write_note(
         figure,
         "Sizes are over the whole movement; the upright line is at the cutoff of"
@@ -77,7 +77,7 @@ def _joint(result: AnalysisResult, sweep: CutoffSweep, i: int, left: Any, right:
         panel.axvline(sweep.cutoffs[sweep.own], color=INK, linewidth=0.8, zorder=0)
         panel.set_ylim(bottom=0.0)
         _frequencies(panel, sweep)
-    left.set_title(f"{drawn(result.robot.plot_joints[i])}: root mean square")
+    left.set_title(f"{drawn(result.robot.figure_joints[i])}: root mean square")
     right.set_title("largest magnitude")
     left.set_ylabel(columns[whole].unit)
     right.legend(loc="upper left", bbox_to_anchor=(1.01, 1.05), fontsize=7, handlelength=3)
@@ -99,7 +99,7 @@ def _label(result: AnalysisResult, sweep: CutoffSweep, column: Column) -> str:
         cause = drawn(sweep.cause(column))
         cause = f"own {cause}" if column.quantity in PASSIVE else cause
     else:
-        cause = f"{what} of {drawn(robot.plot_joints[column.cause])}"
+        cause = f"{what} of {drawn(robot.figure_joints[column.cause])}"
     return cause if column.link is None else f"{cause} through {drawn(robot.plot_links[column.link])}"
 
 

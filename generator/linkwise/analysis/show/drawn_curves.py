@@ -16,6 +16,10 @@ from linkwise.plotstyle import drawn
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+PAGE = 180 / 25.4
+"""Usual width of a figure in inches: that of a journal's page, so that letters are printed as they are."""
+LETTERS = 16.5
+"""Letters of a note that fit in an inch."""
 PIECES = 1500
 """Most pieces of a figure's curve, about a pixel each."""
 
@@ -83,7 +87,7 @@ def _thinned(time: Array, values: Array, size: int) -> tuple[Array, Array, Array
     return time[place], points, middle, pieces.min(axis=-1), pieces.max(axis=-1)
 
 
-def new_figure(width: float, height: float) -> "Figure":
+def new_figure(height: float, width: float = PAGE) -> "Figure":
     """Return a matplotlib figure of this size in inches, which places its panels itself."""
     figure: Figure = extra("matplotlib.figure").Figure(figsize=(width, height), layout="constrained")
     return figure
@@ -106,8 +110,9 @@ def write_title(figure: Any, result: AnalysisResult, *what: str) -> None:
     figure.suptitle(told, x=0.01, ha="left", fontsize=11)
 
 
-def write_note(figure: Any, *notes: str, width: int = 140) -> None:
+def write_note(figure: Any, *notes: str) -> None:
     """Write notes below a figure, each from a line of its own on."""
+    width = int(LETTERS * figure.get_figwidth())
     told = "\n".join(textwrap.fill(note, width) for note in notes)
     figure.supxlabel(told, x=0.01, ha="left", fontsize=7, color="#5A6270")
 

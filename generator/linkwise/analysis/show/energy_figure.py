@@ -51,7 +51,7 @@ def energy(result: AnalysisResult, phase: int) -> "Figure":
     every = segments_of(result.robot)
     work = work_of_segments(result, every, phase)
     lanes = SegmentLanes.of(result, every, work.size)
-    figure = new_figure(10.4, 2.3 + (1.3 if lanes.is_jointed else 0.8) * len(lanes.shown))
+    figure = new_figure(2.3 + (1.3 if lanes.is_jointed else 0.8) * len(lanes.shown), 10.4)
     grid = figure.add_gridspec(2, 2, height_ratios=(len(lanes.shown), 0.36), width_ratios=(2.4, 1))
     left = figure.add_subplot(grid[0, 0])
     right = figure.add_subplot(grid[0, 1], sharey=left)

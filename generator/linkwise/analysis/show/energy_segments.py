@@ -161,5 +161,5 @@ def _others(result: AnalysisResult, net: Mapping[str, Array], is_jointed: bool) 
 
 def joints_label(robot: OpenedRobot, segment: Segment) -> str:
     """Return the names of the joints of a segment: the first and the last of several."""
-    names = [robot.plot_joints[i] for i in segment.joints]
+    names = [robot.figure_joints[i] for i in segment.joints]
     return names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}"

@@ -50,7 +50,7 @@ def _components(result: AnalysisResult, point: int, angular: bool) -> dict[int, 
 
 
 def _sources(result: AnalysisResult, point: int, components: Sequence[int]) -> list[SourceCurve]:
-    every, names = result.robot.driven, result.robot.plot_joints
+    every, names = result.robot.driven, result.robot.figure_joints
 
     def source(
         kind: Kind, label: str, *quantities: str, number: int = 0, **where: int | Sequence[int]

@@ -45,12 +45,12 @@ def paper(result: AnalysisResult, i: int) -> "Figure":
     """Draw coordinates, τ_i, and for joint i τ_ij, τp_ij(q̇_j) and τp_ij(q̈_j), by j's own coordinate."""
     robot, panels = result.robot, _panels(result, i)
     carried = (*robot.plot_links, *result.load_labels)
-    some = _legend_of("Joints", robot.plot_joints, panels[0])
+    some = _legend_of("Joints", robot.figure_joints, panels[0])
     others = _legend_of("Links and loads" if result.loads else "Links", carried, panels[2])
     named = (some, others)
     legends = [_legend_rows(names) for _, names in named]
     heights = [PANEL] * len(panels) + [LINE * (rows + 1) for rows in legends]
-    figure = new_figure(7.6, sum(heights) + 0.9)
+    figure = new_figure(sum(heights) + 0.9)
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     axes = [figure.add_subplot(grid[0])]
     axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(1, len(panels))]
@@ -63,7 +63,7 @@ def paper(result: AnalysisResult, i: int) -> "Figure":
     for row, (title, names) in enumerate(named, len(panels)):
         _legend(figure.add_subplot(grid[row]), title, names)
     figure.suptitle(f"{drawn(robot.name, 60)} · {drawn(result.source, 60)}", x=0.01, ha="left", fontsize=11)
-    write_note(figure, _left_out(result), foot(result), width=125)
+    write_note(figure, _left_out(result), foot(result))
     return figure
 
 
@@ -170,7 +170,7 @@ def _legend_of(title: str, names: Sequence[str], panel: _Panel) -> tuple[str, li
 
 def _legend_columns(names: Sequence[str]) -> int:
     """Return how many names fit side by side."""
-    return max(1, min(6, 100 // (max(len(drawn(name)) for name in names) + 6)))
+    return max(1, min(6, 93 // (max(len(drawn(name)) for name in names) + 6)))
 
 
 def _legend_rows(names: Sequence[str]) -> int:
@@ -199,7 +199,7 @@ def _legend(axis: Any, title: str, names: Sequence[str]) -> None:
 def _left_out(result: AnalysisResult) -> str:
     """Return a note on what the last two panels do not show."""
     own, robot = own_joints(result), result.robot
-    others = [robot.plot_joints[at] for at in robot.driven if at not in own]
+    others = [robot.figure_joints[at] for at in robot.driven if at not in own]
     text = "The last two panels show each link's own joint only; the table and the page have every joint."
     if result.uncertain is not None:
         text += " Bands are one standard deviation to either side."

@@ -36,11 +36,11 @@ MANY = 12
 def power(result: AnalysisResult, _: int) -> "Figure":
     """Draw curves of P_i = τ_i q̇_i in W, and bars of joints' and contacts' work on links and loads in J."""
     robot = result.robot
-    joints = [drawn(robot.plot_joints[i]) for i in robot.moving_itself]
+    joints = [drawn(robot.figure_joints[i]) for i in robot.moving_itself]
     ground = () if robot.contacts is None else robot.contacts.names
     givers = [*joints, *(drawn(f"ground at {name}") for name in ground)]
     height = 0.9 + (0.34 if len(givers) <= MANY else 0.26) * len(givers)
-    figure = new_figure(8.4, 3.4 + height)
+    figure = new_figure(3.4 + height)
     curves, bars = figure.subplots(2, 1, height_ratios=(2.4, height))
     bands = _curves(curves, result, joints)
     targets = [drawn(name) for name in (*robot.plot_links, *result.load_labels)]
@@ -53,7 +53,7 @@ def power(result: AnalysisResult, _: int) -> "Figure":
     bars.grid(axis="y", visible=False)
     _legend(bars, "link or load" if result.loads else "link")
     write_title(figure, result)
-    still = [drawn(robot.plot_joints[i]) for i in robot.driven if i not in robot.moving_itself]
+    still = [drawn(robot.figure_joints[i]) for i in robot.driven if i not in robot.moving_itself]
     left_out = [f"Left out, as nothing drives these: {listed(still)}."] if still else []
     write_note(figure, *left_out, *bands.notes, foot(result))
     return figure

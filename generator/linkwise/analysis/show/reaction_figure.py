@@ -44,7 +44,7 @@ def _components(result: AnalysisResult, number: int) -> list[int]:
 
 def _sources(result: AnalysisResult, number: int, parts: Sequence[int]) -> list[SourceCurve]:
     """Return the sum and the sources, motions with the largest mean force and moment first."""
-    robot, names = result.robot, result.robot.plot_joints
+    robot, names = result.robot, result.robot.figure_joints
 
     def source(kind: Kind, label: str, *quantities: str, at: int = 0, **where: Any) -> SourceCurve:
         rows = (result.rows.numbers(*quantities, bearing=number, wrench=part, **where) for part in parts)

@@ -11,7 +11,7 @@ from linkwise.analysis.certain_signs import DEVIATIONS
 from linkwise.analysis.joint_causes import Cause, causes_of, certainty, largest_first, sizes
 from linkwise.analysis.result import AnalysisResult
 from linkwise.analysis.show.bands import ADDED
-from linkwise.analysis.show.drawn_curves import largest_few, new_figure, write_title
+from linkwise.analysis.show.drawn_curves import LETTERS, PAGE, largest_few, new_figure, write_title
 from linkwise.arrays import Array, Mask
 from linkwise.escape import printable
 from linkwise.extras import extra
@@ -77,7 +77,7 @@ def share_parts(result: AnalysisResult) -> tuple[list[SharePart], list[SharePart
     Motions are grouped if there are more joints than `MANY`.
     """
     robot = result.robot
-    causes = causes_of(result, robot.plot_joints, drawn)
+    causes = causes_of(result, robot.figure_joints, drawn)
     certain = certainty(result, causes)
     found = list(map(_Sized, causes, sizes(result, causes), certain.deviation, certain.unsure))
     moving = [one for one in found if one.cause.is_motion]
@@ -130,7 +130,7 @@ def _each(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
 
 def _few(result: AnalysisResult, found: Sequence[_Sized]) -> list[SharePart]:
     """Return parts for many joints: each one's own motion, the largest other one, and the sum of the rest."""
-    driven, names = result.robot.driven, result.robot.plot_joints
+    driven, names = result.robot.driven, result.robot.figure_joints
     by, spreads, unsure = (
         np.array([getattr(one, what) for one in found]).T for what in ("sizes", "spreads", "unsure")
     )
@@ -155,7 +155,7 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     notes = _notes(result, every)
     rows = -(-len(every) // 3)
     row = 0.42 if len(movement) > 3 else 0.3
-    figure = new_figure(8.4, 1.1 + row * len(robot.driven) + 0.2 * rows + 0.13 * len(notes))
+    figure = new_figure(1.1 + row * len(robot.driven) + 0.2 * rows + 0.13 * len(notes))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 3))
     bars = _bars(left, every)
     _bars(right, movement)
@@ -193,7 +193,7 @@ MUSCLES = 8
 """Muscles that have parts of their own; those of all others are added up."""
 UNSURE = "no certain sign"
 UNSURE_HATCH = "\\\\\\\\\\\\"
-WIDE = 140
+WIDE = int(LETTERS * PAGE)
 """Letters of a line of notes."""
 SHOWN = 8
 """Causes without a certain sign that are listed."""
@@ -209,7 +209,9 @@ def _loaded(result: AnalysisResult) -> list[str]:
     """Return the names of the joints that are drawn, residuals last."""
     robot = result.robot
     kinds = ["" if i in robot.moving_itself else "residual " for i in robot.joints_apart]
-    return [f"{kind}{drawn(robot.plot_joints[i])}" for kind, i in zip(kinds, robot.joints_apart, strict=True)]
+    return [
+        f"{kind}{drawn(robot.figure_joints[i])}" for kind, i in zip(kinds, robot.joints_apart, strict=True)
+    ]
 
 
 def _notes(result: AnalysisResult, parts: Sequence[SharePart]) -> list[str]:

@@ -133,7 +133,7 @@ def figure_of(
 
 
 def _drawn(result: AnalysisResult, shown: SourcedPanels) -> "Figure":
-    figure = new_figure(8.4, 1.2 + 1.6 * len(shown.panels))
+    figure = new_figure(1.2 + 1.6 * len(shown.panels))
     panels = figure.subplots(len(shown.panels), 1, sharex=True, squeeze=False)[:, 0]
     joints, loads = len(result.robot.driven), len(result.load_labels)
     curves, bands, count = shown.curves(result), shown.bands(result), len(shown.panels)

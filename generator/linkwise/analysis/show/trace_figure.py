@@ -20,7 +20,7 @@ def trace_panels(result: AnalysisResult, number: int) -> SourcedPanels:
     """Return panels for what velocities ask of a joint that was asked for, and for its own velocity."""
     assert result.traced is not None
     joint = result.robot.joints.index(result.traced["joints"][number])
-    name, unit = result.robot.plot_joints[joint], result.robot.units[joint]
+    name, unit = result.robot.figure_joints[joint], result.robot.units[joint]
     torques = result.rows.numbers("tau_from", joint=joint)
     weight = ""
     if result.traced["weight"] == "borne":
@@ -70,7 +70,7 @@ def _named(result: AnalysisResult, source: str, rows: tuple[Index, ...]) -> Sour
     kind, _, rest = source.partition(BETWEEN)
     if kind in (TORQUE, *PASSIVE) and rest in robot.joints:
         joint = robot.joints.index(rest)
-        label = f"{kind} of {robot.plot_joints[joint]}"
+        label = f"{kind} of {robot.figure_joints[joint]}"
         if kind == TORQUE:
             return SourceCurve("joint", label, robot.driven.index(joint), rows)
         return SourceCurve("passive", label, 0, rows)
@@ -83,7 +83,7 @@ def _named(result: AnalysisResult, source: str, rows: tuple[Index, ...]) -> Sour
         return SourceCurve("start", "motion at the start", 0, rows)
     if kind == RESIDUAL:
         own = robot.joints.index(rest) + 1 if rest else 0
-        label = f"residual of {robot.plot_joints[own - 1]}" if rest else "what measured torques leave"
+        label = f"residual of {robot.figure_joints[own - 1]}" if rest else "what measured torques leave"
         return SourceCurve("named", label, max(1, len(robot.share_names)) + own, rows)
     name = rest if kind == SHARE else source
     return SourceCurve("named", name, list(robot.share_names).index(name), rows)
