@@ -9,6 +9,7 @@ from helpers.motion_logs import LEG, smooth, write_csv, write_mot
 from linkwise import Contact, Load, generate, read_system, write_package
 from linkwise.analysis import analyze
 from linkwise.analysis.contacts import Contacts
+from linkwise.analysis.loads import Loads
 from linkwise.errors import LinkwiseError
 
 NAMES = [f"{side}ground_force_{what}" for side in ("", "1_") for what in ("vx", "vy", "vz", "px", "py", "pz")]
@@ -226,3 +227,9 @@ def test_what_is_noticed_in_files_of_contacts_loads_is_told_too(leg: Path) -> No
     contacts = Contacts((Contact("foot"),), loads=(write_loads(leg, RIGHT, off),))
     result = analyze(leg / "walk.csv", leg / "leg", contacts=contacts)
     assert result.load_warnings == ("grf.xml: force 'off' is switched off there, and left out",)
+
+
+def test_a_file_of_loads_that_is_given_twice_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "plates.xml"
+    with pytest.raises(LinkwiseError, match=r"plates.xml is given 2 times, as loads; give it once"):
+        Loads.of([path, tmp_path / "beside" / ".." / "plates.xml"])

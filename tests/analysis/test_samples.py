@@ -117,7 +117,11 @@ def test_angles_of_many_turns_want_their_unit_told(tmp_path):
 @pytest.mark.parametrize(
     ("columns", "reading", "message"),
     [
-        (("time", "joint1", "joint2"), {}, "no column for joint 'joint3' .found none.; name it with --map C"),
+        (
+            ("time", "joint1", "joint2"),
+            {},
+            "no column for joint 'joint3' .found none.; hold what the log leaves out with --lock joint3=V",
+        ),
         (("time", *JOINTS, "emg"), {}, "no joint for column 'emg'; .* --ignore-extra"),
         (("stamp", *JOINTS), {}, "no column 'time' .* --time COLUMN"),
         (("time", *JOINTS), {"mapping": (("a", "joint1"),)}, "the log has no column 'a'"),
@@ -168,7 +172,9 @@ def test_each_joint_that_is_wanted_stands_beside_the_nearest_columns_of_the_log(
     assert str(told.value) == (
         "no column for joint 'hip_flexion_r' (found '/jointset/hip/hip_flex_r/value', 'AnkleAngleR'), "
         "'knee_angle_r' (found 'knee_angle_left', 'AnkleAngleR'), "
-        "'ankle_angle_r' (found 'AnkleAngleR', 'knee_angle_left'); name it with --map COLUMN=hip_flexion_r"
+        "'ankle_angle_r' (found 'AnkleAngleR', 'knee_angle_left'); name it with --map COLUMN=hip_flexion_r, "
+        "or hold what the log leaves out with --lock hip_flexion_r=VALUE --lock knee_angle_r=VALUE "
+        "--lock ankle_angle_r=VALUE, in rad or m"
     )
 
 

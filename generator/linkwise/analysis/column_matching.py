@@ -97,8 +97,9 @@ def _refuse_missing(what: str, joints: Sequence[str], free: Sequence[str]) -> No
     if joints:
         near = with_nearest(joints, [column for column in free if not column.endswith(SPEED)])
         held = " ".join(f"--lock {joint}=VALUE" for joint in joints[:MOST_FOUND])
-        mend = f", or hold what the log leaves out with {held}, in rad or m" if what == "joint" else ""
-        raise LinkwiseError(f"no column for {what} {near}; name it with --map COLUMN={joints[0]}{mend}")
+        mends = [f"name it with --map COLUMN={joints[0]}"] if free or what != "joint" else []
+        mends += [f"hold what the log leaves out with {held}, in rad or m"] if what == "joint" else []
+        raise LinkwiseError(f"no column for {what} {near}; {', or '.join(mends)}")
 
 
 def _refuse_extra(columns: Sequence[str], source: Mapping[str, str]) -> None:
