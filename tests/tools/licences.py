@@ -15,7 +15,20 @@ from helpers.installation import needs_of
 
 PAGE = Path(__file__).parents[2] / "docs/licences.md"
 MARK = "<!-- from here on by `make licences` -->\n"
-USERS = ("", "torch", "onnx", "mjcf", "motion", "logs", "identify", "names", "markers", "study", "ray", "opensim")
+USERS = (
+    "",
+    "torch",
+    "onnx",
+    "mjcf",
+    "motion",
+    "logs",
+    "identify",
+    "names",
+    "markers",
+    "study",
+    "ray",
+    "opensim",
+)
 BINDING = ("spm",)
 """Extras whose packages bind the programs that use them; `all` brings none of these."""
 DEVELOPERS = ("docs", "test", "lint")
