@@ -63,7 +63,7 @@ class Walk:
         return analyze(log, kept_package(self.file), processing=SMOOTH, markers=choices)
 
     def load(self) -> Load:
-        """What the plate gives to the foot, at its centre of pressure."""
+        """Load of the plate on the foot, at its centre of pressure."""
         return Load("plate 1", "foot", self.force, self.free, self.centre, self.time, point_in="world")
 
     def c3d(self, path: Path, sign: float = 1.0, screen: bool = True, names: list[str] | None = None) -> None:

@@ -1,4 +1,4 @@
-"""What muscles leave of the joint torques that inverse dynamics asks for."""
+"""Remainders of the joint torques that inverse dynamics asks for, once muscles have given theirs."""
 
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -18,7 +18,7 @@ AXES = {"X": 0, "Y": 1, "Z": 2}
 
 @dataclass(frozen=True, eq=False)
 class PlateWrench:
-    """What a plate gives to a body: force, and moment about `place`, (S, 3) each, and that place (3,)."""
+    """Wrench of a plate on a body: force, and moment about `place`, (S, 3) each, and that place (3,)."""
 
     force: Array
     moment: Array

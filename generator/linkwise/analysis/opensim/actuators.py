@@ -5,7 +5,7 @@ each body and its generalized forces on coordinates are the actuator's: path poi
 coordinate and that exist for some angles only, and surfaces that a path wraps over, are in them.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -91,13 +91,8 @@ def actuator_wrenches(
     osim: the module of OpenSim; coordinates: value (S,) of each coordinate, in rad or m
     sources: force (S,) of each actuator of a source, by its name
     """
-    model = _alone(osim, given)
-    state = model.initSystem()
-    own = _scalar_actuators(osim, model)
+    model, own, state = _alone(osim, given)
     paths = {name: _moving_points(osim, one) for name, one in own.items() if _is_path(osim, one)}
-    for actuator in own.values():
-        actuator.overrideActuation(state, True)
-        actuator.setOverrideActuation(state, 0.0)
     each = [model.getCoordinateSet().get(name) for name in coordinates]
     speeds = _speeds(model, state)
     values = np.array([*coordinates.values()])
@@ -115,24 +110,26 @@ def actuator_wrenches(
             for name, force in source.items():
                 own[name].setOverrideActuation(state, float(force[s]))
             wrenches[x, s] = _on_bodies(model, state, [*bodies.values()])
-            for name, force in source.items():
-                own[name].setOverrideActuation(state, 0.0 if name in paths else float(force[s]))
-                if paths.get(name):
-                    for coordinate, effort in _of_moving(osim, own[name], state):
-                        efforts[x, s, places.index(coordinate)] += float(force[s]) * effort
+            for name in filter(paths.__contains__, source):
+                own[name].setOverrideActuation(state, 0.0)
+                for coordinate, effort in _of_moving(osim, own[name], state) if paths[name] else ():
+                    efforts[x, s, places.index(coordinate)] += float(source[name][s]) * effort
             if not paths.keys() >= source.keys():
                 model.realizeDynamics(state)
                 efforts[x, s] += model.getMobilityForces(state).to_numpy()[[*speeds.values()]]
             for name in source:
                 own[name].setOverrideActuation(state, 0.0)
-    found = [
-        SourceWrenches(
-            {name: on[:, b] for b, name in enumerate(bodies) if on[:, b].any()},
-            {name: effort[:, k] for k, name in enumerate(speeds) if effort[:, k].any()},
-        )
-        for on, effort in zip(wrenches, efforts, strict=True)
-    ]
-    return ActuatorWrenches(tuple(found), {name: origins[:, b] for b, name in enumerate(bodies)})
+    each_body = {name: origins[:, b] for b, name in enumerate(bodies)}
+    found = (_source(bodies, speeds, on, effort) for on, effort in zip(wrenches, efforts, strict=True))
+    return ActuatorWrenches(tuple(found), each_body)
+
+
+def _source(bodies: Iterable[str], speeds: Iterable[str], on: Array, efforts: Array) -> SourceWrenches:
+    """Return what is not zero of wrenches (S, bodies, 6) and generalized forces (S, coordinates)."""
+    return SourceWrenches(
+        {name: on[:, b] for b, name in enumerate(bodies) if on[:, b].any()},
+        {name: efforts[:, k] for k, name in enumerate(speeds) if efforts[:, k].any()},
+    )
 
 
 def _opened(osim: Any, given: ActuatorFile) -> Any:
@@ -153,8 +150,11 @@ def _opened(osim: Any, given: ActuatorFile) -> Any:
     return model
 
 
-def _alone(osim: Any, given: ActuatorFile) -> Any:
-    """Return the model without gravity and other forces, whose coordinates take any value."""
+def _alone(osim: Any, given: ActuatorFile) -> tuple[Any, dict[str, Any], Any]:
+    """Return the model without gravity and other forces, its actuators at 0, and its state.
+
+    Its coordinates take any value.
+    """
     model = _opened(osim, given)
     model.setGravity(osim.Vec3(0.0, 0.0, 0.0))
     own = _scalar_actuators(osim, model)
@@ -164,7 +164,11 @@ def _alone(osim: Any, given: ActuatorFile) -> Any:
         coordinate.set_locked(False)
         coordinate.set_clamped(False)
         coordinate.set_prescribed(False)
-    return model
+    state = model.initSystem()
+    for actuator in own.values():
+        actuator.overrideActuation(state, True)
+        actuator.setOverrideActuation(state, 0.0)
+    return model, own, state
 
 
 def _scalar_actuators(osim: Any, model: Any) -> dict[str, Any]:

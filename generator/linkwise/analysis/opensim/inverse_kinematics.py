@@ -55,14 +55,9 @@ def inverse_kinematics(
     tool.setModel(opened)
     tool.set_IKTaskSet(_tasks(osim, tasks, names))
     tool.setMarkerDataFileName(str(markers))
-    tool.set_accuracy(ACCURACY)
     tool.setStartTime(float(time[0]))
     tool.setEndTime(float(time[-1]))
-    tool.setOutputMotionFileName(str(folder / MOTION))
-    tool.setResultsDir(str(folder))
-    tool.set_report_marker_locations(True)
-    tool.set_report_errors(False)
-    tool.run()
+    _run(tool, folder)
     files = sorted(folder.glob(f"*{LOCATIONS}"))
     if not files or not (folder / MOTION).is_file():
         raise LinkwiseError(f"{markers.name}: OpenSim's inverse kinematics ends without a motion")
@@ -81,6 +76,16 @@ def inverse_kinematics(
         tuple(name for name in own if name not in there),
         tuple(name for name in there if name not in own),
     )
+
+
+def _run(tool: Any, folder: Path) -> None:
+    """Have a tool write the motion, and where the model's markers are in it, into a folder."""
+    tool.set_accuracy(ACCURACY)
+    tool.setOutputMotionFileName(str(folder / MOTION))
+    tool.setResultsDir(str(folder))
+    tool.set_report_marker_locations(True)
+    tool.set_report_errors(False)
+    tool.run()
 
 
 def _recorded(osim: Any, markers: Path) -> tuple[Array, list[str], Array]:
