@@ -52,7 +52,11 @@ def causes(result: AnalysisResult, i: int) -> "Figure":
         handlelength=1.5,
         borderaxespad=0.3,
     )
-    write_title(figure, result, f"What loads {drawn(result.robot.figure_joints[i], 40)}")
+    write_title(
+        figure,
+        result,
+        f"What loads {'the ' if result.robot.words[i] else ''}{drawn(result.robot.figure_joints[i], 40)}",
+    )
     told = [phase.told for phase in asked_phases(result, i)]
     note = " · ".join(
         ["motion: acceleration and velocity together; size: mean of the magnitude", *told, foot(result)]

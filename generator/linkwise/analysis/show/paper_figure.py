@@ -71,7 +71,7 @@ def _panels(result: AnalysisResult, i: int) -> tuple[_Panel, ...]:
     robot = result.robot
     units = " or ".join(dict.fromkeys(robot.units))
     loads = " or ".join(dict.fromkeys(robot.torque_units))
-    on = f"on {drawn(robot.joints[i])} ({robot.torque_units[i]})"
+    on = f"on {drawn(robot.figure_joints[i])} ({robot.torque_units[i]})"
     rows, number = result.rows, i + 1
 
     def lines(name: str, axis: str, first: int = 0, **where: int) -> list[tuple[int, int]]:

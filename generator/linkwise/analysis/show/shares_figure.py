@@ -161,8 +161,8 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     _bars(right, movement)
     out = f"{robot.potential} and loads" if result.loads else robot.potential
     told = len(robot.share_names) == 1  # several are in the legend
-    left.set_title(f"everything, {out} too" if told else "everything")
-    right.set_title(f"the movement alone, without {out}" if told else "the movement alone")
+    left.set_title(f"everything,\n{out} too" if told else "everything")
+    right.set_title(f"the movement alone,\nwithout {out}" if told else "the movement alone")
     left.set_yticks(range(len(robot.driven)), _loaded(result))
     for axis in (left, right) if len(robot.moving_itself) < len(robot.driven) else ():
         axis.axhline(len(robot.moving_itself) - 0.5, color=INK, linewidth=0.9)
