@@ -38,7 +38,7 @@ class Residual:
 
     @property
     def line(self) -> str:
-        """What a terminal says."""
+        """Text of it for a terminal."""
         told = f"{self.joint} {self.peak:.3g} {self.unit} (rms {self.rms:.3g}"
         if self.limit is None:
             return f"{told})"
