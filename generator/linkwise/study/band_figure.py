@@ -13,7 +13,7 @@ from linkwise.analysis.column_titles import column_title
 from linkwise.analysis.motion_words import MotionWords
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.escape import file_name, file_names, listed
+from linkwise.escape import column_part, file_name, file_names
 from linkwise.extras import extra
 from linkwise.plotstyle import INK, colour, dash, drawn, saved, styled
 from linkwise.study.causes_figure import drawn_causes
@@ -83,7 +83,11 @@ def band_figures(
         with styled() as matplotlib:
             matplotlib.rcParams["hatch.linewidth"] = EDGE
             for kind in figure.formats:
-                drawing = _drawn(figure, panels, words) if panels else drawn_causes(figure, trials, tests)
+                drawing = (
+                    _drawn(figure, panels, words)
+                    if panels
+                    else drawn_causes(figure, converted(figure, trials), tests, words)
+                )
                 yield f"{name}.{kind}", saved(drawing, kind)
 
 
@@ -98,11 +102,9 @@ def panels_of(
     figure: PaperFigure, trials: Sequence[TrialSummary], tests: Sequence[Compared]
 ) -> list[BandPanel]:
     """Return a panel for each column of a figure."""
+    trials = converted(figure, trials)
     known = columns_of_trials(trials)
     asked = figure_columns(figure, known)
-    if figure.unit:
-        trials = in_unit(trials, asked, figure.unit)
-        known = columns_of_trials(trials)
     panels = [BandPanel(name, known[name], *_levels(figure, trials, name, tests)) for name in asked]
     if figure.hatched in ("mean", "new") and not any(panel.uncertain for panel in panels):
         raise LinkwiseError(
@@ -110,6 +112,14 @@ def panels_of(
             " key 'uncertain', or leave it out"
         )
     return panels
+
+
+def converted(figure: PaperFigure, trials: Sequence[TrialSummary]) -> Sequence[TrialSummary]:
+    """Return trials with what a figure shows in its unit."""
+    if not figure.unit:
+        return trials
+    wholes = [f"tau/{column_part(joint)}" for joint in figure.joints]
+    return in_unit(trials, [*figure_columns(figure, columns_of_trials(trials)), *wholes], figure.unit)
 
 
 def figure_columns(figure: PaperFigure, names: Iterable[str]) -> list[str]:
@@ -132,12 +142,9 @@ def _levels(
     found: dict[str, list[TrialSummary]] = {}
     for trial in trials:
         found.setdefault(trial.labels[figure.by] if figure.by else "", []).append(trial)
-    if odd := [level for level in figure.order if level not in found]:
-        there = listed(map(repr, found))
-        raise LinkwiseError(f"[[figure]]: 'order' has {odd[0]!r}, which no trial is; there are {there}")
     levels = {
         level: spread(found[level], values)
-        for level in dict.fromkeys((*figure.order, *found))
+        for level in figure.in_order(found)
         if (values := values_of(found[level], name))
     }
     uncertain = {level: deviations(found[level], name, one) for level, one in levels.items()}
@@ -162,18 +169,13 @@ def _drawn(figure: PaperFigure, panels: Sequence[BandPanel], words: Mapping[str,
     for axis in axes[len(panels) :]:
         axis.set_axis_off()
     if len(panels[0].levels) > 1:
-        axes[0].legend(title=drawn(_named(figure, figure.by)), fontsize=8, handlelength=2.5)
+        axes[0].legend(title=drawn(figure.named(figure.by)), fontsize=8, handlelength=2.5)
     if figure.title:
         drawing.suptitle(drawn(figure.title, 120), x=0.01, ha="left", fontsize=11)
     if bands := _kinds_of_bands(figure, panels):
         handles, texts = zip(*bands, strict=True)
         drawing.legend(handles, texts, loc="outside lower left", ncols=across, fontsize=8, handlelength=2.5)
     return drawing
-
-
-def _named(figure: PaperFigure, text: str) -> str:
-    """Return what a column or level is called in a figure."""
-    return figure.names.get(text, text)
 
 
 def _kinds_of_bands(figure: PaperFigure, panels: Sequence[BandPanel]) -> list[tuple[Any, str]]:
@@ -199,7 +201,7 @@ def _kinds_of_bands(figure: PaperFigure, panels: Sequence[BandPanel]) -> list[tu
 
 def _panel(axis: Any, panel: BandPanel, figure: PaperFigure, words: Mapping[str, MotionWords]) -> None:
     for number, (key, found) in enumerate(panel.levels.items()):
-        level = _named(figure, key)
+        level = figure.named(key)
         if found.each.shape[1] == 1:
             _dots(axis, number, level, found)
         else:
@@ -210,7 +212,7 @@ def _panel(axis: Any, panel: BandPanel, figure: PaperFigure, words: Mapping[str,
     axis.set_title(drawn(figure.names.get(panel.column, told.title), 58), fontsize=9)
     axis.set_ylabel(told.unit(panel.unit))
     if next(iter(panel.levels.values())).each.shape[1] == 1:
-        axis.set_xticks(range(len(panel.levels)), [drawn(_named(figure, one)) for one in panel.levels])
+        axis.set_xticks(range(len(panel.levels)), [drawn(figure.named(one)) for one in panel.levels])
         return
     axis.set_xlabel("% of the cycle")
     axis.set_xlim(0, 100)

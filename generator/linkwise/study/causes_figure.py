@@ -1,6 +1,6 @@
 """A study's figures of what loads a joint: several causes in a panel with bands, conditions side by side."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from linkwise.analysis.joint_causes import largest_first
+from linkwise.analysis.motion_words import MotionWords
 from linkwise.analysis.net_causes import NET, label_of
 from linkwise.analysis.show.drawn_curves import largest_few
 from linkwise.arrays import Array
@@ -75,11 +76,17 @@ class CausePanels:
         return found | ({REST: [names[at] for at in rest]} if rest else {})
 
 
-def drawn_causes(figure: PaperFigure, trials: Sequence[TrialSummary], tests: Sequence[Compared]) -> Any:
+def drawn_causes(
+    figure: PaperFigure,
+    trials: Sequence[TrialSummary],
+    tests: Sequence[Compared],
+    words: Mapping[str, MotionWords],
+) -> Any:
     """Return the figure of causes: a row for each joint, in it a panel for each condition."""
     rows = [CausePanels.of(figure, joint, trials) for joint in figure.joints]
-    levels = list(dict.fromkeys(level for row in rows for level in row.levels))
-    size = (WIDE * max(len(levels), 1) + 1.6, HIGH * len(rows))
+    levels = figure.in_order(level for row in rows for level in row.levels)
+    wide = WIDE * max(len(levels), 1) + 1.6 if figure.width is None else figure.width / 25.4
+    size = wide, HIGH * len(rows) + (0.3 if figure.title else 0.0)
     drawing = extra("matplotlib.figure").Figure(figsize=size, layout="constrained")
     axes = drawing.subplots(len(rows), len(levels), squeeze=False, sharey="row")
     labels = list(dict.fromkeys(label for row in rows for label in row.curves))
@@ -91,9 +98,12 @@ def drawn_causes(figure: PaperFigure, trials: Sequence[TrialSummary], tests: Seq
                 continue
             _panel(axis, row, level, figure, looks)
             _marks(axis, row, level, figure, tests, looks)
-        panels[0].set_ylabel(row.unit)
+        said = words.get(row.joint)
+        panels[0].set_ylabel(row.unit if said is None else f"{row.unit}\n{said.signs}")
         handles, names = next(axis for axis in panels if axis.lines).get_legend_handles_labels()
         panels[-1].legend(handles, names, fontsize=7, loc="upper left", bbox_to_anchor=(1.02, 1.0))
+    if figure.title:
+        drawing.suptitle(drawn(figure.title, 120), x=0.01, ha="left", fontsize=11)
     drawing.supxlabel(
         "A coordinate's motion is its acceleration and velocity together."
         + (" Bars below: where the test finds a difference, in the cause's colour." if tests else ""),
@@ -134,7 +144,8 @@ def _panel(axis: Any, row: CausePanels, level: str, figure: PaperFigure, looks: 
         if figure.band != "none" and len(found.each) > 1:
             axis.fill_between(percent, low, high, color=look["color"], alpha=0.13, linewidth=0)
     axis.axhline(0, color=INK, linewidth=0.5)
-    axis.set_title(" · ".join(drawn(one, 40) for one in (row.joint, level) if one), fontsize=9)
+    told = (figure.named(one) for one in (row.joint, level) if one)
+    axis.set_title(" · ".join(drawn(one, 40) for one in told), fontsize=9)
     if found.each.shape[1] > 1:
         axis.set_xlabel("% of the cycle")
         axis.set_xlim(0, 100)

@@ -1,7 +1,7 @@
 """Content of a study, as its file describes it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -10,7 +10,7 @@ from linkwise.analysis.choices import AnalysisChoices
 from linkwise.analysis.net_causes import NET
 from linkwise.analysis.phases import Phase
 from linkwise.errors import LinkwiseError
-from linkwise.escape import column_part
+from linkwise.escape import column_part, listed
 from linkwise.option import written
 from linkwise.plotstyle import FigureFormat
 from linkwise.robot import Options
@@ -150,6 +150,18 @@ class PaperFigure:
         """Width in mm; None where it follows from the panels, or `size` has none."""
         number = WIDTHS.get(self.size, self.size).removesuffix("mm").strip()
         return float(number) if number.replace(".", "", 1).isdecimal() else None
+
+    def named(self, text: str) -> str:
+        """Return what a column, a level or a joint is called."""
+        return self.names.get(text, text)
+
+    def in_order(self, levels: Iterable[str]) -> list[str]:
+        """Return levels, those first that `order` names; raise LinkwiseError where it names others."""
+        there = list(dict.fromkeys(levels))
+        if odd := [level for level in self.order if level not in there]:
+            known = listed(map(repr, there))
+            raise LinkwiseError(f"[[figure]]: 'order' has {odd[0]!r}, which no trial is; there are {known}")
+        return list(dict.fromkeys((*self.order, *there)))
 
     @property
     def joints(self) -> tuple[str, ...]:
