@@ -174,8 +174,8 @@ def test_it_leads_to_each_trial_and_tells_the_broken_one(page: Any) -> None:
     assert rows[-1].startswith("S3-slow-2 S3 slow 2")
     assert "no column for joint" in rows[-1]
     tests = [row.text for row in page.find_elements("css selector", "#tests tbody tr")]
-    assert tests[0].startswith("tau/joint1 condition: slow – fast 3 ")
-    assert tests[-1].startswith("tau/joint2 day: 2 – 1 3 ")
+    assert tests[0].startswith("tau/joint1 condition: slow – fast 3, paired ")
+    assert tests[-1].startswith("tau/joint2 day: 2 – 1 3, paired ")
     link = table.find_element("link text", "S2-fast-1")
     opened(page, link.get_attribute("href"))
     assert page.title == "planar3 · fast_1.csv"
