@@ -13,7 +13,7 @@ from linkwise.analysis.column_titles import column_title
 from linkwise.analysis.motion_words import MotionWords
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.escape import column_part, file_name, file_names
+from linkwise.escape import file_name, file_names
 from linkwise.extras import extra
 from linkwise.plotstyle import INK, colour, dash, drawn, saved, styled
 from linkwise.study.causes_figure import drawn_causes
@@ -118,8 +118,8 @@ def converted(figure: PaperFigure, trials: Sequence[TrialSummary]) -> Sequence[T
     """Return trials with what a figure shows in its unit."""
     if not figure.unit:
         return trials
-    wholes = [f"tau/{column_part(joint)}" for joint in figure.joints]
-    return in_unit(trials, [*figure_columns(figure, columns_of_trials(trials)), *wholes], figure.unit)
+    columns = figure_columns(figure, columns_of_trials(trials))
+    return in_unit(trials, [*columns, *figure.wholes], figure.unit)
 
 
 def figure_columns(figure: PaperFigure, names: Iterable[str]) -> list[str]:

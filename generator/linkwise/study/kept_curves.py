@@ -13,7 +13,7 @@ from linkwise.study.summary import trial_arrays
 
 def kept_curves(plan: StudyPlan, names: Sequence[str]) -> list[int]:
     """Return the numbers of the columns whose curve is kept, with the deviations of these; time is one."""
-    figures = (pattern for figure in plan.figures for pattern in figure.columns)
+    figures = (pattern for figure in plan.figures for pattern in (*figure.patterns, *figure.wholes))
     tests = (pattern for comparison in plan.comparisons for pattern in comparison.columns)
     found = {"time"}
     for pattern in dict.fromkeys((*plan.columns, *figures, *tests)):

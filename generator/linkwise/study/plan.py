@@ -173,6 +173,11 @@ class PaperFigure:
         """Patterns of the columns that it is drawn of."""
         return tuple(f"{NET}/{column_part(joint)}/*" for joint in self.joints) or self.columns
 
+    @property
+    def wholes(self) -> tuple[str, ...]:
+        """Columns of the torques on the joints whose causes are drawn."""
+        return tuple(f"tau/{column_part(joint)}" for joint in self.joints)
+
 
 @dataclass(frozen=True)
 class Trial:
