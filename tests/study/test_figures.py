@@ -138,10 +138,10 @@ def test_a_size_is_a_width(size: str) -> None:
 def test_eps_has_opaque_bands_and_no_date() -> None:
     asked = PaperFigure(("tau/hip",), "condition", formats=("eps", "svg"))
     first, again = (dict(band_figures([asked], trials(), ())) for _ in range(2))
-    assert list(first) == ["tau-hip.svg", "tau-hip.eps"]
+    assert list(first) == ["tau-hip.eps", "tau-hip.svg"]
     assert first == again
     assert b"CreationDate" not in first["tau-hip.eps"]
-    assert b"fill-opacity: 0.2" in first["tau-hip.svg"]  # drawn before all is made opaque
+    assert b"fill-opacity: 0.2" in first["tau-hip.svg"]
 
 
 def test_bars_are_the_tests_of_its_own_factor_and_column(drawn_of: Any) -> None:

@@ -44,7 +44,7 @@ class MotionWords(NamedTuple):
         return f"{self.joint}, {self.signs}"
 
 
-class _Joint(NamedTuple):
+class PersonJoint(NamedTuple):
     """A joint of a person, and what a turn of what is behind it is called."""
 
     words: tuple[str, ...]
@@ -74,17 +74,17 @@ PELVIS: Ways = {
     "right": ("to the right", "to the left"),
 }
 JOINTS = {
-    "hip": _Joint(("hip",), DOWN, {"sagittal": BEND, **LIMB}),
-    "knee": _Joint(("knee",), DOWN, {"sagittal": BEND[::-1], **LIMB}),
-    "ankle": _Joint(("ankle",), FORWARD, {"sagittal": ("dorsiflexion", "plantarflexion"), **FOOT}),
-    "subtalar joint": _Joint(("subtalar",), FORWARD, FOOT),
-    "toes": _Joint(("mtp", "toe", "toes"), FORWARD, {"sagittal": BEND[::-1]}),
-    "shoulder": _Joint(("shoulder", "arm"), DOWN, {"sagittal": BEND, **LIMB}),
-    "elbow": _Joint(("elbow",), DOWN, {"sagittal": BEND}),
-    "forearm": _Joint(("pro", "pronation"), DOWN, {"long": ("pronation", "supination")}),
-    "lumbar spine": _Joint(("lumbar", "back", "waist", "torso", "trunk"), UP, SPINE),
-    "neck": _Joint(("neck", "head"), UP, SPINE),
-    "pelvis": _Joint(("pelvis",), UP, PELVIS),
+    "hip": PersonJoint(("hip",), DOWN, {"sagittal": BEND, **LIMB}),
+    "knee": PersonJoint(("knee",), DOWN, {"sagittal": BEND[::-1], **LIMB}),
+    "ankle": PersonJoint(("ankle",), FORWARD, {"sagittal": ("dorsiflexion", "plantarflexion"), **FOOT}),
+    "subtalar joint": PersonJoint(("subtalar",), FORWARD, FOOT),
+    "toes": PersonJoint(("mtp", "toe", "toes"), FORWARD, {"sagittal": BEND[::-1]}),
+    "shoulder": PersonJoint(("shoulder", "arm"), DOWN, {"sagittal": BEND, **LIMB}),
+    "elbow": PersonJoint(("elbow",), DOWN, {"sagittal": BEND}),
+    "forearm": PersonJoint(("pro", "pronation"), DOWN, {"long": ("pronation", "supination")}),
+    "lumbar spine": PersonJoint(("lumbar", "back", "waist", "torso", "trunk"), UP, SPINE),
+    "neck": PersonJoint(("neck", "head"), UP, SPINE),
+    "pelvis": PersonJoint(("pelvis",), UP, PELVIS),
 }
 """Joints by their own word."""
 SIDES = {"r": "right", "right": "right", "l": "left", "left": "left"}
@@ -210,7 +210,7 @@ def _words(pieces: Sequence[str], moves: _Moves | None, directions: Array) -> Mo
     return MotionWords(f"{side} {word}".strip(), *((first, second) if positive else (second, first)))
 
 
-def _turn(axis: Array, joint: _Joint) -> tuple[Way, bool] | None:
+def _turn(axis: Array, joint: PersonJoint) -> tuple[Way, bool] | None:
     """Return the motion of a turn about an axis, and whether a positive one is the first of its names.
 
     axis: in the directions of the body
@@ -227,7 +227,7 @@ def _turn(axis: Array, joint: _Joint) -> tuple[Way, bool] | None:
     return way, bool(np.cross(axis, joint.points)[1 if joint.points is FORWARD else 0] > 0.0)
 
 
-def _slide(axis: Array, joint: _Joint) -> tuple[Way, bool] | None:
+def _slide(axis: Array, joint: PersonJoint) -> tuple[Way, bool] | None:
     ways: tuple[Way, ...] = ("forward", "up", "right")
     at = int(np.abs(axis).argmax())
     return (ways[at], bool(axis[at] > 0.0)) if ways[at] in joint.motions and abs(axis[at]) > ALONG else None

@@ -28,9 +28,6 @@ class Outputs:
         "--figure",
         is_key=False,
     )
-    figure_format: FigureFormat = option(
-        "png", "Format of the figures; png if not given", needs="--figure", is_key=False
-    )
     page: bool = option(True, "Write report.html", is_key=False)
     phases: tuple[Phase, ...] = option(
         (),
@@ -78,6 +75,9 @@ class Outputs:
         "world or a body; may be repeated",
         "--reaction",
         metavar="JOINT[,AXES]",
+    )
+    figure_format: FigureFormat = option(
+        "png", "Format of the figures; png if not given", needs="--figure", is_key=False
     )
     trace: TraceChoices = field(default_factory=TraceChoices)
 

@@ -19,7 +19,7 @@ FACTORS = {
     },
     **{(unit, f"k{unit}"): THOUSANDTH for unit in ("N", "N·m", "W", "J")},
 }
-"""What a value in the first unit is multiplied by to be in the second."""
+"""Factors that take a value from the first unit to the second."""
 
 
 def in_unit(trials: Sequence[TrialSummary], columns: Sequence[str], unit: str) -> list[TrialSummary]:

@@ -34,7 +34,7 @@ from linkwise.study.plan import (
     StudyPlan,
     Trial,
 )
-from linkwise.study.subjects import Subject, read_subjects
+from linkwise.study.subjects import SubjectBody, read_subjects
 from linkwise.study.summary import STATISTICS
 
 COLUMNS = (
@@ -179,7 +179,7 @@ def of_sides(trials: Iterable[Trial], cycles: Cycles | None) -> Iterator[Trial]:
             yield replace(trial, name=name, labels=labels, side=side, recording=trial.name)
 
 
-def _bodies(data: Mapping[str, Any], folder: Path) -> dict[str, Subject]:
+def _bodies(data: Mapping[str, Any], folder: Path) -> dict[str, SubjectBody]:
     if "subjects" not in data:
         return {}
     table = resolved(given_text(data, "subjects"), folder)

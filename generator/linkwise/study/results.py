@@ -19,14 +19,14 @@ from linkwise.study.trial import TrialOutcome
 
 
 class Together(NamedTuple):
-    """What the trials of a study say together."""
+    """Files of all trials of a study together."""
 
     files: dict[str, bytes]
     """Contents by name."""
     lacking: tuple[str, ...]
-    """What could not be made, and why."""
+    """Lines on what could not be made, and why."""
     notes: tuple[str, ...]
-    """What a reader of the files must know: who is left out of a test, what is averaged as it is."""
+    """Lines for readers of the files: who is left out of a test, what is averaged as it is."""
     normalised: dict[str, object]
     """Way in which results are normalised, empty where they are not."""
 
