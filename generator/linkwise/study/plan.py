@@ -12,7 +12,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.option import written
 from linkwise.robot import Options
 from linkwise.study.corrections import Correction
-from linkwise.study.subjects import Subject
+from linkwise.study.subjects import SubjectSize
 
 SUBJECT = "subject"
 """Factor that every study has, and the first."""
@@ -153,8 +153,8 @@ class StudyPlan:
     comparisons: tuple[Comparison, ...] = ()
     figures: tuple[PaperFigure, ...] = ()
     normalise: Normalise = ""
-    """What torques, forces, powers and works of all trials together are divided by; not said if empty."""
-    bodies: Mapping[str, Subject] = field(default_factory=dict)
+    """Size by which torques, forces, powers and works of all trials are divided; not said if empty."""
+    bodies: Mapping[str, SubjectSize] = field(default_factory=dict)
     """Mass and height by subject, as far as the study tells them."""
     pages: bool = field(kw_only=True)
     trust_python: bool = field(kw_only=True, repr=False)
