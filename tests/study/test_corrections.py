@@ -23,7 +23,7 @@ STATSMODELS = {
     "holm": [0.063, 0.006, 0.055, 0.2, 0.055, 0.08],
     "fdr-bh": [0.0315, 0.006, 0.026, 0.2, 0.026, 0.048],
 }
-"""P as statsmodels 0.15 corrects it, `multipletests`."""
+"""Adjusted P by `multipletests` of statsmodels 0.15."""
 
 
 @pytest.mark.parametrize("correction", STATSMODELS)

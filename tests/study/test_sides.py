@@ -46,7 +46,7 @@ MIDDLE = ["tx", "ty", "tz", "tilt", "list", "turn"]
 LEG = ["flex", "spread", "twist", "knee"]
 JOINTS = [*MIDDLE, *(f"{name}_{side}" for side in "rl" for name in LEG)]
 TURNED = {"tz", "list", "turn", "twist_r", "twist_l"}
-"""Coordinates that a mirror in the plane of x and y turns round, by the axes above: `spread` points aside on both."""
+"""Coordinates that a mirror in the plane of x and y turns round, by the axes above; `spread` is none."""
 STUDY = """schema = 1
 name = "walks"
 pages = false

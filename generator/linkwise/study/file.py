@@ -1,25 +1,19 @@
 """STUDY.toml, read and checked before any work begins."""
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import make_dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from linkwise_runtime.chosen_names import nearest_first
-
 from linkwise.analysis.choices import AnalysisChoices
 from linkwise.bounded_file import toml_data
 from linkwise.errors import LinkwiseError, within
-from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.option import chosen, written
 from linkwise.package.decode import filled, known_keys, toml_value
 from linkwise.robot import Options
 from linkwise.robot.readers.toml.table import tables
-from linkwise.study.cycles import written_cycles
 from linkwise.study.deviations import SD_COLUMNS
-from linkwise.study.normalised import check_bodies
 from linkwise.study.paths import is_address, require_there, resolved
 from linkwise.study.patterns import expanded
 from linkwise.study.plan import (
@@ -34,7 +28,8 @@ from linkwise.study.plan import (
     StudyPlan,
     Trial,
 )
-from linkwise.study.subjects import SubjectBody, read_subjects
+from linkwise.study.plan_checks import check_plan
+from linkwise.study.subjects import SubjectSize, read_subjects
 from linkwise.study.summary import STATISTICS
 
 COLUMNS = (
@@ -107,7 +102,7 @@ def read_study(path: Path, trust_python: bool = False) -> StudyPlan:
             pages=toml_value(bool, "'pages'", data.get("pages", True)),
             trust_python=trust_python,
         )
-        _check(plan)
+        check_plan(plan)
     return replace(plan, trials=tuple(_with_nets(trial, plan.nets) for trial in plan.trials))
 
 
@@ -179,86 +174,12 @@ def of_sides(trials: Iterable[Trial], cycles: Cycles | None) -> Iterator[Trial]:
             yield replace(trial, name=name, labels=labels, side=side, recording=trial.name)
 
 
-def _bodies(data: Mapping[str, Any], folder: Path) -> dict[str, SubjectBody]:
+def _bodies(data: Mapping[str, Any], folder: Path) -> dict[str, SubjectSize]:
     if "subjects" not in data:
         return {}
     table = resolved(given_text(data, "subjects"), folder)
     require_there(table)
     return read_subjects(table)
-
-
-def _check(plan: StudyPlan) -> None:
-    """Raise LinkwiseError for trials of one name, missing files, and levels that no trial has."""
-    if not plan.trials:
-        raise LinkwiseError("there is no trial; add [[trial]] with a log and a robot")
-    counts = Counter(trial.name for trial in plan.trials)
-    if twice := [name for name, count in counts.items() if count > 1]:
-        raise LinkwiseError(
-            f"two trials are called {twice[0]!r}; name each, with fields of its pattern: {{field}}"
-        )
-    for trial in plan.trials:
-        with within(f"trial {trial.name!r}"):
-            require_there(trial.log, or_folder=True)
-            for path in trial.choices.files:
-                require_there(path)
-    if plan.cycles is not None and plan.cycles.table:
-        _check_table(plan, plan.cycles.table)
-    for comparison in plan.comparisons:
-        levels = _levels(plan, comparison.factor)
-        if odd := [level for level in comparison.between if level not in levels]:
-            there = listed(map(repr, sorted(levels)))
-            raise LinkwiseError(f"no trial has the {comparison.factor} {odd[0]!r}; there are {there}")
-        if not comparison.paired:
-            _check_apart(plan, comparison)
-    _check_families(plan.comparisons)
-    check_bodies(plan)
-    for figure in plan.figures:
-        if figure.by:
-            _levels(plan, figure.by)
-
-
-def _check_apart(plan: StudyPlan, comparison: Comparison) -> None:
-    """Raise LinkwiseError for subjects at both levels of a comparison that takes them for others."""
-    first, second = (
-        {trial.label(SUBJECT) for trial in plan.trials if trial.label(comparison.factor) == level}
-        for level in comparison.between
-    )
-    if both := sorted(first & second):
-        levels = " and ".join(map(repr, comparison.between))
-        raise LinkwiseError(
-            f"[[compare]] {comparison.factor}: 'paired' is false, and {levels} have subjects in common,"
-            f" {listed(map(repr, both))}, whose values go together; leave 'paired' out"
-        )
-
-
-def _check_families(comparisons: Sequence[Comparison]) -> None:
-    """Raise LinkwiseError for comparisons of one family that are not corrected alike."""
-    first: dict[str, Comparison] = {}
-    for one in comparisons:
-        other = first.setdefault(one.family, one)
-        if one.family and (one.correct, one.alpha) != (other.correct, other.alpha):
-            raise LinkwiseError(
-                f"[[compare]]: the family {one.family!r} has 'correct' {other.correct!r} at 'alpha'"
-                f" {other.alpha:g}, and {one.correct!r} at {one.alpha:g}; give all its comparisons the same"
-            )
-        if one.family and one.correct == "none":
-            raise LinkwiseError(
-                f"[[compare]]: the family {one.family!r} is not corrected; add 'correct', such as \"holm\""
-            )
-
-
-def _check_table(plan: StudyPlan, table: str) -> None:
-    names = list(dict.fromkeys(trial.recording for trial in plan.trials))
-    for name, _ in written_cycles(table, is_sided=bool(plan.cycles and plan.cycles.sides)):
-        if name not in names:
-            near = listed(map(repr, nearest_first(name, names)))
-            raise LinkwiseError(f"{table}: no trial is called {name!r}; nearest are {near}")
-
-
-def _levels(plan: StudyPlan, factor: str) -> set[str]:
-    if factor not in plan.factors:
-        raise LinkwiseError(f"{factor!r} is not a factor; there are {listed(map(repr, plan.factors))}")
-    return {trial.label(factor) for trial in plan.trials}
 
 
 def trials_of(

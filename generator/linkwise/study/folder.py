@@ -130,7 +130,7 @@ class StudyMark:
     uncertain: Mapping[str, object]
     """Assumptions about what is uncertain; empty where nothing is."""
     notes: tuple[str, ...]
-    """Lines for readers of the files."""
+    """Lines that a reader of the files must know."""
     normalised: Mapping[str, object]
     """Way in which results are normalised; empty where they are not."""
     cycles: Mapping[str, object]

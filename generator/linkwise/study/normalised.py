@@ -15,7 +15,7 @@ from linkwise_runtime.rule.joint_tree import TreeLink
 
 from linkwise.errors import LinkwiseError
 from linkwise.study.plan import SUBJECT, StudyPlan
-from linkwise.study.subjects import SubjectBody
+from linkwise.study.subjects import SubjectSize
 from linkwise.study.summary import TrialSummary
 
 GRAVITY = 9.80665
@@ -33,7 +33,7 @@ class Scale(NamedTuple):
     unit: str
 
 
-def scale_of(unit: str, normalise: str, body: SubjectBody) -> Scale:
+def scale_of(unit: str, normalise: str, body: SubjectSize) -> Scale:
     """Return how a column of a unit is normalised; angles and all else stay as they are."""
     found = LOAD.fullmatch(unit)
     if found is None or normalise in ("", "none"):
@@ -53,13 +53,13 @@ def normalised(plan: StudyPlan, trials: Sequence[TrialSummary]) -> list[TrialSum
     return [_normalised(one, plan.normalise, body_of(plan, one)) for one in trials]
 
 
-def body_of(plan: StudyPlan, trial: TrialSummary) -> SubjectBody:
+def body_of(plan: StudyPlan, trial: TrialSummary) -> SubjectSize:
     """Return mass and height of a trial's subject, NaN where they are not known."""
-    told = plan.bodies.get(trial.labels[SUBJECT], SubjectBody())
+    told = plan.bodies.get(trial.labels[SUBJECT], SubjectSize())
     return replace(told, mass=trial.mass) if math.isnan(told.mass) else told
 
 
-def _normalised(trial: TrialSummary, normalise: str, body: SubjectBody) -> TrialSummary:
+def _normalised(trial: TrialSummary, normalise: str, body: SubjectSize) -> TrialSummary:
     scales = {name: scale_of(unit, normalise, body) for name, unit in trial.units.items()}
     return replace(
         trial,
@@ -76,7 +76,7 @@ def _scale(scales: Mapping[str, Scale], name: str) -> Scale:
 
 def normalised_unit(unit: str, normalise: str) -> str:
     """Return the unit of a column as it is normalised."""
-    return scale_of(unit, normalise, SubjectBody(1.0, 1.0)).unit
+    return scale_of(unit, normalise, SubjectSize(1.0, 1.0)).unit
 
 
 def of_several_masses(plan: StudyPlan, trials: Sequence[TrialSummary]) -> tuple[str, ...]:
@@ -112,7 +112,7 @@ def check_bodies(plan: StudyPlan) -> None:
     """Raise LinkwiseError for subjects without a height that the study asks for."""
     for trial in plan.trials if plan.normalise == "weight*height" else ():
         subject = trial.label(SUBJECT)
-        if math.isnan(plan.bodies.get(subject, SubjectBody()).height):
+        if math.isnan(plan.bodies.get(subject, SubjectSize()).height):
             raise LinkwiseError(
                 f"normalise = {plan.normalise!r}: there is no height of {subject!r}; give the study"
                 " 'subjects', a CSV file of subject, height in m and, where it is not the robot's, mass in kg"
@@ -124,7 +124,7 @@ def check_mass(plan: StudyPlan, robot: str, links: Iterable[TreeLink]) -> None:
     if plan.normalise in ("", "none") or own_mass(links) > 0:
         return
     for trial in plan.trials:
-        told = plan.bodies.get(trial.label(SUBJECT), SubjectBody()).mass
+        told = plan.bodies.get(trial.label(SUBJECT), SubjectSize()).mass
         if trial.robot == robot and math.isnan(told):
             raise LinkwiseError(
                 f"normalise = {plan.normalise!r}: the robot does not say its mass; give the study"

@@ -15,7 +15,7 @@ from linkwise.option import written
 from linkwise.plotstyle import FigureFormat
 from linkwise.robot import Options
 from linkwise.study.corrections import Correction
-from linkwise.study.subjects import SubjectBody
+from linkwise.study.subjects import SubjectSize
 
 SUBJECT = "subject"
 """Factor that every study has, and the first."""
@@ -216,8 +216,8 @@ class StudyPlan:
     comparisons: tuple[Comparison, ...] = ()
     figures: tuple[PaperFigure, ...] = ()
     normalise: Normalise = ""
-    """Divisor of torques, forces, powers and works of all trials together; not said if empty."""
-    bodies: Mapping[str, SubjectBody] = field(default_factory=dict)
+    """Size by which torques, forces, powers and works of all trials are divided; not said if empty."""
+    bodies: Mapping[str, SubjectSize] = field(default_factory=dict)
     """Mass and height by subject, as far as the study tells them."""
     pages: bool = field(kw_only=True)
     trust_python: bool = field(kw_only=True, repr=False)

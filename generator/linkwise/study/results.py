@@ -19,14 +19,14 @@ from linkwise.study.trial import TrialOutcome
 
 
 class Together(NamedTuple):
-    """Files of all trials of a study together."""
+    """Combined results of the trials of a study."""
 
     files: dict[str, bytes]
     """Contents by name."""
     lacking: tuple[str, ...]
-    """Lines on what could not be made, and why."""
+    """Reasons of what could not be made."""
     notes: tuple[str, ...]
-    """Lines for readers of the files: who is left out of a test, what is averaged as it is."""
+    """Lines that a reader of the files must know: who is left out of a test, what is averaged as it is."""
     normalised: dict[str, object]
     """Way in which results are normalised, empty where they are not."""
 

@@ -13,19 +13,19 @@ LIMITS = {"mass": (0.01, 1e4, "kg"), "height": (0.2, 3.0, "m")}
 
 
 @dataclass(frozen=True)
-class SubjectBody:
+class SubjectSize:
     """Mass of a person in kg and height in m; NaN where it is not told."""
 
     mass: float = math.nan
     height: float = math.nan
 
 
-def read_subjects(table: str) -> dict[str, SubjectBody]:
+def read_subjects(table: str) -> dict[str, SubjectSize]:
     """Return mass and height by subject from a CSV file of subject, mass and height, either of them or both.
 
     Raises LinkwiseError, with the row, for an invalid one.
     """
-    found: dict[str, SubjectBody] = {}
+    found: dict[str, SubjectSize] = {}
     with opened_here(table) as path, path.open(newline="", encoding="utf-8-sig") as file, within(table):
         try:
             reader = csv.DictReader(file)
@@ -39,7 +39,7 @@ def read_subjects(table: str) -> dict[str, SubjectBody]:
                         raise LinkwiseError(
                             f"subject {subject!r} is there twice" if subject else "the subject is missing"
                         )
-                    found[subject] = SubjectBody(
+                    found[subject] = SubjectSize(
                         **{name: _number(name, row[name]) for name in LIMITS if name in names}
                     )
         except (UnicodeDecodeError, csv.Error) as error:

@@ -28,7 +28,7 @@ class Cluster:
 
 
 class Inference(NamedTuple):
-    """Finding of a test at a level: where curves are above the threshold."""
+    """Inference from a test at a level: where curves are above the threshold."""
 
     threshold: float
     """|t| that a whole curve exceeds anywhere with the chance of the level; NaN for means."""
