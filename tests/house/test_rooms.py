@@ -15,6 +15,7 @@ HOUSE = ROOT / "generator"
 ROOMS = (
     "cli",
     "study",
+    "citations",
     "package_cache",
     "pipeline",
     "kernel_choice",

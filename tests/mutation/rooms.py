@@ -72,8 +72,16 @@ ROOMS: dict[str, Room] = {
         tuple(
             f"{HOUSE}{name}.py"
             for name in (
-                *("__init__", "__main__", "package_cache", "pipeline", "kernel_choice", "plotstyle"),
-                *("render", "extras", "option", "arrays"),
+                *(
+                    "__init__",
+                    "__main__",
+                    "citations",
+                    "package_cache",
+                    "pipeline",
+                    "kernel_choice",
+                    "plotstyle",
+                ),
+                *("citations", "render", "extras", "option", "arrays"),
                 *("progress", "bounded_file", "input_file", "generator_fingerprint"),
                 *("errors", "escape", "own_process", "own_runtime"),
             )

@@ -135,11 +135,13 @@ class StudyMark:
     """Way in which results are normalised; empty where they are not."""
     cycles: Mapping[str, object]
     """Way in which trials are cut into cycles; empty where they are not."""
+    methods: Mapping[str, object]
+    """Methods of the trials' analyses for which others are to be named."""
 
     @classmethod
     def begun(cls, plan: StudyPlan, files: Sequence[str]) -> "StudyMark":
         """Return the mark of a study at work, whose folder has files of a former run."""
-        return cls(plan.name, "begun", plan.factors, _trials(plan), {}, "", tuple(files), {}, (), {}, {})
+        return cls(plan.name, "begun", plan.factors, _trials(plan), {}, "", tuple(files), {}, (), {}, {}, {})
 
     @classmethod
     def done(
@@ -168,7 +170,7 @@ class StudyMark:
             data = parse_json(read_back(path))
             if isinstance(data, dict):
                 # That of an earlier linkwise has no such entries.
-                data = {"uncertain": {}, "notes": [], "normalised": {}, "cycles": {}} | data
+                data = {"uncertain": {}, "notes": [], "normalised": {}, "cycles": {}, "methods": {}} | data
             mark = decode(cls, data, "")
             for name in mark.files:
                 is_plain = is_inside(name) and "/" not in name

@@ -11,6 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Protocol
 
+from linkwise.analysis.markers import SUFFIXES
 from linkwise.analysis.result_rows import Column
 from linkwise.errors import LinkwiseError, within
 from linkwise.generator_fingerprint import fingerprint
@@ -130,6 +131,7 @@ def _done(
         "notes": made.notes,
         "normalised": made.normalised,
         "cycles": cut_by(plan, records),
+        "methods": methods_of(plan),
     }
     mark = StudyMark.done(plan, broken, "" if made.lacking else key, list(made.files), entries)
     files = write_files(out, {**made.files, MARK: mark.text()})
@@ -137,6 +139,16 @@ def _done(
         file.unlink(missing_ok=True)
     samples, told = sum(one.samples for one in outcomes), (*warnings, *made.lacking, *made.notes)
     return StudyOutcome(plan, done, len(outcomes) - len(broken), samples, broken, told, files)
+
+
+def methods_of(plan: StudyPlan) -> dict[str, object]:
+    """Return how trials were analysed, as far as others are to be named for it."""
+    choices = [trial.choices for trial in plan.trials]
+    return {
+        "derivatives": sorted({one.processing.derivative for one in choices}),
+        "markers": any(Path(trial.log).suffix.lower() in SUFFIXES for trial in plan.trials),
+        "muscles": any(one.muscles is not None for one in choices),
+    }
 
 
 def _key(plan: StudyPlan, records: Sequence[TrialRecord], broken: Sequence[TrialOutcome]) -> str:

@@ -1,0 +1,22 @@
+"""The command `cite`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from linkwise.citations import citations, record_of
+from linkwise.escape import printable
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def cite(
+    result: Annotated[Path, typer.Argument(help="Folder that analyze, study or generate wrote")],
+) -> None:
+    """Print the references of what a result used, as BibTeX."""
+    path, record = record_of(result)
+    print(f"% {printable(str(path))}")
+    for citation in {one.key: one for one in citations(record)}.values():
+        print(f"\n{citation.bibtex}")
