@@ -155,13 +155,21 @@ def _compare(shown: str, printed: str, place: str) -> None:
 
 
 def main() -> None:
-    """Run the pages, or those named, and copy the pictures that they make to where they are shown."""
-    for page in [Path(name).resolve() for name in sys.argv[1:]] or PAGES:
-        with tempfile.TemporaryDirectory() as folder:
-            print(page.relative_to(ROOT))
-            run_page(page, Path(folder))
-            for made, shown in pictures(page):
-                shutil.copyfile(Path(folder, made), shown)
+    """Run the pages, or those named, and copy the pictures that they make to where they are shown.
+
+    Each of several has a process of its own, as a page may register a back end.
+    """
+    named = [Path(name).resolve() for name in sys.argv[1:]]
+    if len(named) != 1:
+        for page in named or PAGES:
+            subprocess.run([sys.executable, __file__, str(page)], check=True)
+        return
+    (page,) = named
+    with tempfile.TemporaryDirectory() as folder:
+        print(page.relative_to(ROOT), flush=True)
+        run_page(page, Path(folder))
+        for made, shown in pictures(page):
+            shutil.copyfile(Path(folder, made), shown)
 
 
 if __name__ == "__main__":
