@@ -67,6 +67,22 @@ def test_curves_are_pandas_means_of_what_all_links_and_orders_sum_to(
     }
 
 
+@pytest.mark.parametrize("cycles", [CYCLES, ""])
+def test_bands_of_one_subject_are_over_its_trials_and_say_so(
+    cycles: str, drawn: list[Any], tmp_path: Path
+) -> None:
+    kept = 'pages = false\ncolumns = ["tau/joint1"]\n'
+    study = write_study(tmp_path, HEAD, kept, CHOICES, cycles, FIGURE, TRIALS, subjects=1)
+    assert not run_study(study, tmp_path / "out", Here()).broken
+    assert drawn[0].get_supxlabel().endswith("\nBands: ± sd over trials of one subject.")
+    table = pd.read_parquet(tmp_path / "out" / "trials")
+    trials = table.groupby(["condition", "trial", *(["percent"] if cycles else [])], observed=True)
+    spread = trials["tau/joint1"].mean().loc["slow"].groupby("percent" if cycles else lambda _: 0)
+    edges = drawn[0].axes[1].collections[0].get_paths()[0].vertices[:, 1]  # slow, all causes together
+    expected = (spread.mean() - spread.std()).min(), (spread.mean() + spread.std()).max()
+    np.testing.assert_allclose((edges.min(), edges.max()), expected, rtol=0, atol=1e-6)
+
+
 def test_without_cycles_means_stand_beside_each_other(drawn: list[Any], tmp_path: Path) -> None:
     study = write_study(tmp_path, HEAD, "pages = false\n", CHOICES, FIGURE, TRIALS)
     assert not run_study(study, tmp_path / "out", Here()).broken

@@ -147,6 +147,18 @@ def test_subjects_of_different_mass_are_not_averaged_without_a_word(tmp_path: Pa
     assert run_study(file, out, Here()).warnings == ()
 
 
+def test_a_subject_that_the_table_does_not_have_is_told(tmp_path: Path) -> None:
+    """A misspelt name would have one subject by the mass of its model among those by their own."""
+    (tmp_path / "who.csv").write_text("subject,mass\nS1,6.5\ns2,11\nS3,\n", encoding="utf-8")
+    file = study_of(tmp_path, 'normalise = "mass"\nsubjects = "who.csv"\n')
+    (line,) = run_study(file, tmp_path / "out", Here()).warnings
+    assert line == (
+        "'subjects' lacks 'S2', normalised by the mass of the robot of each trial; it has 's2', of whom there"
+        " is no trial"
+    )
+    assert json.loads((tmp_path / "out/study.json").read_text())["notes"] == [line]
+
+
 BAD = {
     "no height": (
         'normalise = "weight*height"\n',

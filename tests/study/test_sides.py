@@ -160,6 +160,25 @@ def test_pooled_cycles_of_both_sides_are_of_one_subject(walks: Path) -> None:
     assert set(curves.trials) == {4}
 
 
+def test_net_torques_by_cause_are_asked_for_by_the_names_that_tell_a_side(walks: Path) -> None:
+    """Tables, tests and figures name `ipsi`, and trials compute the right and the left of it."""
+    folder = walks.parent
+    named = (
+        STUDY.replace('["**"]', '["tau_by/knee_ipsi/flex_*", "tau_qd*/knee_ipsi/*/flex_*"]') + BY_PLATES,
+        '[[figure]]\ncolumns = ["causes:knee_ipsi"]\nby = "side"\nformats = ["svg"]\n',
+        '[[compare]]\nfactor = "side"\nbetween = ["right", "left"]\ncolumns = ["tau_by/knee_ipsi/*"]\n',
+    )
+    (folder / "nets.toml").write_text("".join((*named, TRIALS)), encoding="utf-8")
+    assert run_study(folder / "nets.toml", folder / "nets", Here()).broken == ()
+    for side in ("right", "left"):
+        table = samples(folder / "nets", f"as-is-{side}")
+        parts = (f"{order}/knee_ipsi/shank_ipsi/flex_ipsi" for order in ("tau_qdd", "tau_qd"))
+        whole = sum(table[part] for part in parts)
+        np.testing.assert_allclose(table["tau_by/knee_ipsi/flex_ipsi"], whole, atol=1e-9)
+        assert np.ptp(whole) > 0.5
+    assert (folder / "nets/causes-knee_ipsi.svg").exists()
+
+
 def test_what_is_turned_may_be_said_and_cycles_come_from_a_table(walks: Path) -> None:
     folder = walks.parent
     rows = "as-is,right,0.5,1.5", "as-is,left,1,2", "mirrored,right,1,2", "mirrored,left,0.5,1.5"

@@ -22,7 +22,7 @@ from linkwise.study.deviation_columns import fitting_values
 from linkwise.study.deviations import Deviations, deviations
 from linkwise.study.figure_units import in_unit
 from linkwise.study.plan import PaperFigure
-from linkwise.study.spread import Spread, columns_of_trials, spread, values_of
+from linkwise.study.spread import OF_ONE, Spread, columns_of_trials, spread, values_of
 from linkwise.study.summary import TrialSummary, words_of_trials
 
 MOST = 12
@@ -33,10 +33,6 @@ MM = 1 / 25.4
 NARROW = 120.0
 """Width in mm below which panels stand below each other."""
 FILLED = {"deviation": "filled: ± sd between subjects", "range": "filled: range of subjects"}
-FILLED_OF_ONE = {
-    "deviation": "filled: ± sd over trials of one subject",
-    "range": "filled: range of trials of one subject",
-}
 DOTS_OF_ONE = "dots: trials of one subject; bars: ± sd over them"
 HATCHED = {
     "within": "hatched: ± sd within a trial,\nby what is uncertain",
@@ -186,7 +182,7 @@ def _kinds_of_bands(figure: PaperFigure, panels: Sequence[BandPanel]) -> list[tu
     is_hatched = figure.hatched != "none" and any(panel.uncertain for panel in panels)
     kinds = []
     if figure.band in FILLED and (is_hatched or of_one):
-        text = (FILLED_OF_ONE if of_one else FILLED)[figure.band]
+        text = f"filled: {OF_ONE[figure.band]}" if of_one else FILLED[figure.band]
         if of_one and of_one[0].each.shape[1] == 1:
             kinds.append(
                 (extra("matplotlib.lines").Line2D([], [], color=INK, marker="o", linewidth=0), DOTS_OF_ONE)

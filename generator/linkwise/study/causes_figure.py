@@ -16,8 +16,8 @@ from linkwise.escape import column_part
 from linkwise.extras import extra
 from linkwise.plotstyle import GRAVITY, INK, colour, dash, drawn
 from linkwise.study.comparisons import Compared
-from linkwise.study.plan import PaperFigure
-from linkwise.study.spread import Spread, columns_of_trials, spread, values_of
+from linkwise.study.plan import SUBJECT, PaperFigure
+from linkwise.study.spread import OF_ONE, Spread, columns_of_trials, spread, values_of
 from linkwise.study.summary import TrialSummary
 
 MOST = 5
@@ -60,7 +60,15 @@ class CausePanels:
             name: np.sum([np.zeros_like(one), *(some[name] for some in several if name in some)], axis=0)
             for name, one in whole.items()
         }
-        return spread(trials, sums)
+        found = spread(trials, sums)
+        return found.over_trials if self.is_of_one else found
+
+    @cached_property
+    def is_of_one(self) -> bool:
+        """True if each condition is of one subject and some of several trials, over which bands then are."""
+        several = self.levels.values()
+        is_of_one = all(len({one.labels[SUBJECT] for one in some}) == 1 for some in several)
+        return is_of_one and any(len(some) > 1 for some in several)
 
     @cached_property
     def curves(self) -> dict[str, list[str]]:
@@ -104,12 +112,16 @@ def drawn_causes(
         panels[-1].legend(handles, names, fontsize=7, loc="upper left", bbox_to_anchor=(1.02, 1.0))
     if figure.title:
         drawing.suptitle(drawn(figure.title, 120), x=0.01, ha="left", fontsize=11)
-    drawing.supxlabel(
-        "A coordinate's motion is its acceleration and velocity together."
-        + (" Bars below: where the test finds a difference, in the cause's colour." if tests else ""),
-        fontsize=7,
-    )
+    drawing.supxlabel("\n".join(_told(figure, rows, tests)), fontsize=7)
     return drawing
+
+
+def _told(figure: PaperFigure, rows: Sequence[CausePanels], tests: Sequence[Compared]) -> Iterator[str]:
+    """Yield lines for below a figure: what its curves, marks and bands are of, where a reader must be told."""
+    bars = " Bars below: where the test finds a difference, in the cause's colour." if tests else ""
+    yield f"A coordinate's motion is its acceleration and velocity together.{bars}"
+    if figure.band != "none" and any(row.is_of_one for row in rows):
+        yield f"Bands: {OF_ONE[figure.band]}."
 
 
 def _looks(labels: Sequence[str]) -> Iterator[dict[str, Any]]:

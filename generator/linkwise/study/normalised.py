@@ -14,6 +14,7 @@ from typing import NamedTuple
 from linkwise_runtime.rule.joint_tree import TreeLink
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.study.plan import SUBJECT, StudyPlan
 from linkwise.study.subjects import SubjectSize
 from linkwise.study.summary import TrialSummary
@@ -90,6 +91,20 @@ def of_several_masses(plan: StudyPlan, trials: Sequence[TrialSummary]) -> tuple[
     return (
         f"subjects have {min(known):.4g} to {max(known):.4g} kg, and torques of all are averaged in N·m; give"
         ' the study normalise = "mass" or "weight*height", or "none" if that is meant',
+    )
+
+
+def of_their_robots(plan: StudyPlan, trials: Sequence[TrialSummary]) -> tuple[str, ...]:
+    """Return a line where the table of subjects has masses, and lacks subjects whose robots then tell theirs."""
+    there = dict.fromkeys(trial.labels[SUBJECT] for trial in trials)
+    lacking = [name for name in there if name not in plan.bodies]
+    is_of_mass = any(not math.isnan(body.mass) for body in plan.bodies.values())
+    if plan.normalise in ("", "none") or not is_of_mass or not lacking:
+        return ()
+    others = [name for name in plan.bodies if name not in there]
+    told = f"; it has {listed(map(repr, others))}, of whom there is no trial" if others else ""
+    return (
+        f"'subjects' lacks {listed(map(repr, lacking))}, normalised by the mass of the robot of each trial{told}",
     )
 
 

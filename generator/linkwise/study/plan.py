@@ -1,6 +1,7 @@
 """Content of a study, as its file describes it."""
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +23,8 @@ SUBJECT = "subject"
 RIGHT, LEFT = SIDES = ("right", "left")
 SIDE = "side"
 """Factor of a study whose cycles are of two sides, apart."""
+OF_EITHER = re.compile("[Ii]psi|[Cc]ontra")
+"""Words for the side whose cycle it is and for the other, in names of columns."""
 OF_FILES = tuple(one.key for one in written(AnalysisChoices) if one.option.is_file)
 """Choices that are paths of files."""
 WIDTHS = {"single": "90 mm", "double": "180 mm"}
@@ -225,8 +228,15 @@ class StudyPlan:
 
     @property
     def nets(self) -> tuple[str, ...]:
-        """Patterns of net torques by cause that tables, tests, figures or integrals are of, each once."""
+        """Patterns of net torques by cause that tables, tests, figures or integrals are of, each once.
+
+        Trials compute them by the robot's own names: in a study of both sides, any name fits where one has
+        `ipsi` or `contra`.
+        """
         every = [*self.columns, *(() if self.cycles is None else self.cycles.integrals)]
         every += [one for some in self.comparisons for one in some.columns]
         every += [one for figure in self.figures for one in figure.patterns]
-        return tuple(dict.fromkeys(one for one in every if one.removeprefix("sd/").startswith(NET)))
+        nets = [one for one in every if one.removeprefix("sd/").startswith(NET)]
+        if self.cycles is not None and self.cycles.sides:
+            nets = [OF_EITHER.sub("*", one) for one in nets]
+        return tuple(dict.fromkeys(nets))

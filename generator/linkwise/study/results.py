@@ -9,7 +9,7 @@ from linkwise.progress import Progress
 from linkwise.study.band_figure import band_figures
 from linkwise.study.comparisons import compared, left_out_lines
 from linkwise.study.folder import GROUPS, MEAN_CURVES, STUDY_PAGE, SUMMARIES, TESTS
-from linkwise.study.normalised import normalised, of_several_masses, told_of_bodies
+from linkwise.study.normalised import normalised, of_several_masses, of_their_robots, told_of_bodies
 from linkwise.study.page import study_page
 from linkwise.study.plan import StudyPlan
 from linkwise.study.summary import summaries
@@ -56,7 +56,7 @@ def together(
         files |= dict(band_figures(plan.figures, trials, tests))
     except LinkwiseError as error:
         told.append(str(error))
-    notes = (*of_several_masses(plan, own), *left_out_lines(tests))
+    notes = (*of_several_masses(plan, own), *of_their_robots(plan, own), *left_out_lines(tests))
     files[STUDY_PAGE] = study_page(plan, trials, folders, tests, broken, notes).encode()
     progress("together", 3, 3)
     return Together(files, tuple(told), notes, told_of_bodies(plan, own))

@@ -10,6 +10,11 @@ from linkwise.study.plan import SUBJECT
 from linkwise.study.summary import STATISTICS, TrialSummary
 
 MEAN = STATISTICS.index("mean")
+OF_ONE = {
+    "deviation": "± sd over trials of one subject",
+    "range": "range of trials of one subject",
+}
+"""Kinds of bands where trials of one subject stand in place of subjects."""
 
 
 @dataclass(frozen=True, eq=False)
