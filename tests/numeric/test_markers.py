@@ -66,6 +66,16 @@ class Walk:
         """Load of the plate on the foot, at its centre of pressure."""
         return Load("plate 1", "foot", self.force, self.free, self.centre, self.time, point_in="world")
 
+    def trc(self, path: Path, markers: np.ndarray, at: np.ndarray) -> None:
+        """Write markers (S, M, 3) at instants (S,) in m; NaN for what is not seen."""
+        table = osim.TimeSeriesTableVec3()
+        table.setColumnLabels(self.names)
+        for time, places in zip(at, markers, strict=True):
+            table.appendRow(float(time), osim.RowVectorVec3([osim.Vec3(*map(float, x)) for x in places]))
+        table.addTableMetaDataString("DataRate", f"{1 / (at[1] - at[0]):.6g}")
+        table.addTableMetaDataString("Units", "m")
+        osim.TRCFileAdapter.write(table, str(path))
+
     def c3d(self, path: Path, sign: float = 1.0, screen: bool = True, names: list[str] | None = None) -> None:
         """Write markers in mm and a plate of type 2, in a laboratory whose z is up; sign: of its forces."""
         file, points, count = ezc3d.c3d(), file_points(self.markers), len(self.time)
@@ -156,6 +166,28 @@ def test_errors_of_markers_are_told(walk: Walk, tmp_path: Path) -> None:
     assert largest["error"] == pytest.approx(0.03, rel=0.05)
 
 
+def test_distances_are_of_the_same_instant_at_a_rate_whose_step_is_rounded(
+    walk: Walk, tmp_path: Path
+) -> None:
+    """A sixtieth of a second has no end in decimals, and the motion's file has some of them."""
+    walk.trc(tmp_path / "walk.trc", walk.markers, np.arange(len(walk.time)) / 60)
+    told = walk.followed(tmp_path / "walk.trc").record()["markers"]
+    assert told["largest"]["error"] < 1e-5
+    assert np.abs(np.diff(walk.markers, axis=0)).max() > 0.01, "from one instant to the next"
+
+
+def test_a_marker_that_is_never_seen_is_lacking(walk: Walk, tmp_path: Path) -> None:
+    unseen = walk.markers.copy()
+    unseen[:, 2] = np.nan
+    unseen[20:30, 5] = np.nan
+    walk.trc(tmp_path / "unseen.trc", unseen, walk.time)
+    result = walk.followed(tmp_path / "unseen.trc")
+    told = json.loads(json.dumps(result.record()["markers"], allow_nan=False))
+    assert told["lacking"] == [walk.names[2]]
+    assert {one["marker"] for one in told["each"]} == {*walk.names} - {walk.names[2]}
+    assert np.abs(result.q - walk.known().q).max() < 1e-4
+
+
 def test_weights_are_those_of_a_file(walk: Walk, tmp_path: Path) -> None:
     tasks = osim.IKTaskSet()
     for name in walk.names:
@@ -178,13 +210,7 @@ def test_weights_are_those_of_a_file(walk: Walk, tmp_path: Path) -> None:
 
 
 def test_a_trc_file_is_analysed_by_the_command(walk: Walk, tmp_path: Path) -> None:
-    table = osim.TimeSeriesTableVec3()
-    table.setColumnLabels(walk.names)
-    for time, places in zip(walk.time, walk.markers, strict=True):
-        table.appendRow(float(time), osim.RowVectorVec3([osim.Vec3(*map(float, at)) for at in places]))
-    table.addTableMetaDataString("DataRate", "100")
-    table.addTableMetaDataString("Units", "m")
-    osim.TRCFileAdapter.write(table, str(tmp_path / "walk.trc"))
+    walk.trc(tmp_path / "walk.trc", walk.markers, walk.time)
     out = tmp_path / "out"
     told = run_linkwise(
         *("analyze", tmp_path / "walk.trc", "--robot", walk.file, "--out", out, "--cutoff", "8", "--no-page"),
@@ -207,6 +233,16 @@ def test_what_does_not_say_all_is_refused_in_a_line(walk: Walk, tmp_path: Path) 
         walk.followed(walk.folder / "walk.c3d", "foot")
     with pytest.raises(LinkwiseError, match="go with a log of markers"):
         walk.followed(walk.folder / "known.sto", "1=foot")
+    with pytest.raises(LinkwiseError, match=r"--plate-threshold and --c3d-axes go with a log of markers"):
+        walk.followed(walk.folder / "known.sto", threshold=5.0)
+    walk.trc(tmp_path / "short.trc", walk.markers[:2], walk.time[:2])
+    with pytest.raises(LinkwiseError, match=r"go with a \.c3d file; .*short\.trc has neither"):
+        walk.followed(tmp_path / "short.trc", threshold=5.0)
+    with pytest.raises(LinkwiseError, match=r"short\.trc, inverse kinematics of it: 2 samples"):
+        walk.followed(tmp_path / "short.trc")
+    walk.c3d(tmp_path / "two.c3d", names=["a:heel", "b:heel", *walk.names[2:]])
+    with pytest.raises(LinkwiseError, match="several markers have one name, 'a:heel', 'b:heel'"):
+        walk.followed(tmp_path / "two.c3d")
     with pytest.raises(LinkwiseError, match=r"give its \.osim file as --robot"):
         analyze(walk.folder / "walk.c3d", kept_package(walk.file))
     (tmp_path / "broken.c3d").write_bytes(b"\x00" * 600)

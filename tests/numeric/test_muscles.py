@@ -204,11 +204,94 @@ def test_a_reserve_of_another_file_is_a_generalized_force(leg: Leg) -> None:
     assert any(RESERVE in warning and "left out" in warning for warning in without.load_warnings)
 
 
+def test_moment_arms_by_functions_give_torques(tmp_path: Path) -> None:
+    model, zero = osim.Model(), osim.Vec3(0)
+    arm = osim.Body("arm", 1.0, osim.Vec3(0, -0.2, 0), osim.Inertia(0.02, 0.005, 0.02))
+    pin = osim.PinJoint("pin", model.getGround(), zero, zero, arm, zero, zero)
+    pin.updCoordinate().setName("elbow")
+    model.addBody(arm)
+    model.addJoint(pin)
+    path = osim.FunctionBasedPath()
+    path.setLengthFunction(osim.PolynomialFunction(osim.Vector.createFromMat(np.array([0.1, -0.05, 0.3]))))
+    path.append_coordinate_paths("/jointset/pin/elbow")
+    muscle = osim.PathActuator()
+    muscle.setName("biceps")
+    muscle.set_path(path)
+    model.addForce(muscle)
+    model.finalizeConnections()
+    model.printToXML(str(tmp_path / "arm.osim"))
+    time = np.arange(40) / 100
+    angle, pull = 0.5 * np.sin(5 * time), 100 + 20 * np.cos(3 * time)
+    write_sto(tmp_path / "motion.sto", ("elbow",), time, angle[:, None])
+    write_sto(tmp_path / "force.sto", ("biceps",), time, pull[:, None])
+    muscles = Muscles(tmp_path / "force.sto", tmp_path / "arm.osim")
+    result = analyze(tmp_path / "motion.sto", kept_package(tmp_path / "arm.osim"), muscles=muscles)
+    shortening = -(0.2 * angle - 0.05)
+    assert relative_error(result.load_torque[:, 0, 0], -pull * shortening) <= 1e-12
+    assert any("functions give the moment arms of biceps" in warning for warning in result.load_warnings)
+
+
+def test_reserves_of_ball_and_free_joints_give_the_power_of_opensims_speeds(tmp_path: Path) -> None:
+    """Speeds of these joints are angular velocities, which are not the rates of the coordinates."""
+    model, zero = osim.Model(), osim.Vec3(0)
+    bodies = [osim.Body(n, 2.0, osim.Vec3(0.1, 0, 0), osim.Inertia(0.2, 0.2, 0.3)) for n in ("box", "top")]
+    free = osim.FreeJoint("free", model.getGround(), zero, zero, bodies[0], zero, zero)
+    ball = osim.BallJoint("ball", bodies[0], osim.Vec3(0, 0.3, 0), zero, bodies[1], zero, zero)
+    for body, joint in zip(bodies, (free, ball), strict=True):
+        model.addBody(body)
+        model.addJoint(joint)
+    model.finalizeConnections()
+    there = model.getCoordinateSet()
+    names = tuple(there.get(at).getName() for at in range(there.getSize()))
+    for name in names:
+        reserve = osim.CoordinateActuator(name)
+        reserve.setName(f"reserve_{name}")
+        model.addForce(reserve)
+    model.finalizeConnections()
+    model.printToXML(str(tmp_path / "box.osim"))
+    time = np.arange(60) / 100
+    q = 0.4 + 0.4 * np.sin(3 * time[:, None] + np.arange(9))
+    given = 5 + np.arange(9) + np.cos(2 * time[:, None] + np.arange(9))
+    write_sto(tmp_path / "motion.sto", names, time, q)
+    write_sto(tmp_path / "force.sto", tuple(f"reserve_{name}" for name in names), time, given)
+    muscles = Muscles(tmp_path / "force.sto", tmp_path / "box.osim")
+    result = analyze(tmp_path / "motion.sto", kept_package(tmp_path / "box.osim"), muscles=muscles)
+    rates = result.qd[:, [result.robot.joints.index(name) for name in names]]
+    ours = -(result.load_torque.sum(axis=2) * result.qd).sum(axis=1)
+    state, wanted = model.initSystem(), []
+    for s in range(len(time)):
+        ends = []
+        for step in (-STEP, STEP):
+            for at, name in enumerate(names):
+                there.get(name).setValue(state, float(q[s, at] + step * rates[s, at]), False)
+            model.realizePosition(state)
+            ends.append([_turn(joint, state) for joint in (free, ball)])
+        turning = [_rate(before, after) for before, after in zip(*ends, strict=True)]
+        wanted.append(given[s] @ [*turning[0], *rates[s, 3:6], *turning[1]])
+    assert relative_error(ours, np.array(wanted)) <= LIMIT
+
+
+def _turn(joint: Any, state: Any) -> np.ndarray:
+    """Rotation (3, 3) of a joint's child in its parent."""
+    whole = joint.getChildFrame().findTransformBetween(state, joint.getParentFrame())
+    turn = whole.R()  # refers to `whole`, which therefore has a name
+    entries = turn.asMat33()
+    return np.array([[entries.get(row, column) for column in range(3)] for row in range(3)])
+
+
+def _rate(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Angular velocity (3,), in the parent's axes, of rotations 2 STEP apart."""
+    spin = (after - before) @ ((after + before) / 2).T / (2 * STEP)
+    return np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2
+
+
 @pytest.mark.parametrize(
     ("groups", "said"),
     [
         (("front",), "write it as NAME=MUSCLE"),
-        (("front=biceps",), "no actuator is named so"),
+        (("front=biceps",), "no actuator is named 'biceps'"),
+        (("front=a,bicepps*",), r"no actuator is named 'bicepps\*'"),
+        (("b=a",), "an actuator that is in no group has that name"),
         (("front=a", "back=*"), "'a' is in 'front' already"),
         (("front=a", "front=b"), "another group has that name"),
     ],

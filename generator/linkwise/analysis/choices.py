@@ -10,7 +10,7 @@ from linkwise.analysis.contacts import Contacts, WhileColumn
 from linkwise.analysis.contacts.pressed import PRESSED
 from linkwise.analysis.cutoff_range import CutoffRange
 from linkwise.analysis.loads import Load, Loads, Muscles
-from linkwise.analysis.markers import PLATE_THRESHOLD, MarkerChoices
+from linkwise.analysis.markers import MarkerChoices
 from linkwise.analysis.opened_robot import OpenedRobot, named_body
 from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.settings import Payload, Processing, Reading
@@ -159,9 +159,10 @@ class AnalysisChoices:
 
     def markers(self, model: Path) -> MarkerChoices:
         """Return how a log of markers is read; model: the path of the robot's own file."""
-        least = PLATE_THRESHOLD if self.plate_threshold is None else self.plate_threshold
         tasks = None if self.ik_tasks is None else Path(self.ik_tasks)
-        return MarkerChoices(model, tasks, self.plate, self.c3d_axes or "", least, self.loads_cutoff)
+        return MarkerChoices(
+            model, tasks, self.plate, self.c3d_axes or "", self.plate_threshold, self.loads_cutoff
+        )
 
     def payloads(self, robot: OpenedRobot) -> tuple[Payload, ...]:
         """Return the point masses that a robot carries."""

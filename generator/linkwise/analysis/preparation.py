@@ -55,7 +55,11 @@ def prepared(
         made = followed(log, asked.markers, asked.loads, Path(folder), progress)
         if made is None:
             return _prepared(log, robot, asked, progress, buffer)
-        job = _prepared(made.log, robot, replace(asked, loads=made.loads), progress, buffer)
+        try:
+            job = _prepared(made.log, robot, replace(asked, loads=made.loads), progress, buffer)
+        except LinkwiseError as error:  # its own folder is gone when this is read
+            told = str(error).replace(str(made.log), f"{log}, inverse kinematics of it")
+            raise LinkwiseError(told) from error
         warnings = (*job.samples.warnings, *made.told)
         return replace(job, source=log.name, markers=made, samples=replace(job.samples, warnings=warnings))
 

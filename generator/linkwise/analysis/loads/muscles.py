@@ -28,7 +28,7 @@ from linkwise.analysis.opensim.actuators import (
     actuator_names,
     actuator_wrenches,
 )
-from linkwise.analysis.opensim.own_opensim import asked_of_opensim
+from linkwise.robot.readers.osim.own_opensim import asked_of_opensim
 from linkwise.analysis.samples import finite_blocks
 from linkwise.analysis.settings import Reading
 from linkwise.arrays import Array
@@ -51,7 +51,7 @@ def placed_muscles(
     Raises LinkwiseError for files that do not fit each other, the robot or the motion, and without OpenSim.
     """
     file = ActuatorFile(wanted.model, wanted.force_sets)
-    names = asked_of_opensim(lambda osim: actuator_names(osim, file), str(wanted.model))
+    names = asked_of_opensim(lambda osim: actuator_names(osim, file), f"{wanted.model}: OpenSim")
     log = open_log(wanted.forces)
     with within(str(wanted.forces)):
         numbers, told = _columns(log.columns, names)
@@ -65,11 +65,17 @@ def placed_muscles(
         told += ("no force exceeds 1: if these are activations, give the file of forces",)
     values = _coordinates(wanted, robot, names.coordinates, q)
     each = [{name: forces[name] for name in members} for members in sources.values()]
-    found = asked_of_opensim(lambda osim: actuator_wrenches(osim, file, values, each), str(wanted.model))
+    found = asked_of_opensim(
+        lambda osim: actuator_wrenches(osim, file, values, each), f"{wanted.model}: OpenSim"
+    )
     _require_same_bodies(wanted, robot, q, found)
     kinds: dict[str, Literal["muscle", "actuator"]] = {
         name: "muscle" if names.paths.issuperset(members) else "actuator" for name, members in sources.items()
     }
+    pressing = zip(kinds.items(), found.sources, strict=True)
+    by_functions = [n for (n, kind), one in pressing if kind == "muscle" and one.efforts and not one.wrenches]
+    if by_functions:
+        told += (f"functions give the moment arms of {listed(by_functions)}: no joint is pressed together",)
     warnings = tuple(f"{wanted.forces.name}: {one}" for one in (*log.warnings, *told))
     return tuple(
         _placed(name, one, robot, time, q, kind, (wanted.forces.name, warnings))
@@ -93,18 +99,27 @@ def grouped(
             raise LinkwiseError(
                 f"{GROUPS} {text}: write it as NAME=MUSCLE,MUSCLE; {known or 'the model has no groups'}"
             )
-        wanted = patterns.split(",") if sign else of_model[name]
-        members = tuple(one for one in actuators if any(fnmatchcase(one, p.strip()) for p in wanted))
-        if not members:
-            near = listed(nearest_first(patterns or name, actuators))
-            raise LinkwiseError(f"{GROUPS} {text}: no actuator is named so; the file has forces of {near}")
+        wanted = [p.strip() for p in patterns.split(",")] if sign else of_model[name]
+        members = tuple(one for one in actuators if any(fnmatchcase(one, p) for p in wanted))
+        idle = [p for p in wanted if sign and not any(fnmatchcase(one, p) for one in actuators)]
+        if idle or not members:
+            asked = idle[0] if idle else name
+            raise LinkwiseError(
+                f"{GROUPS} {text}: no actuator is named {asked!r}; the file has forces of"
+                f" {listed(nearest_first(asked, actuators))}"
+            )
         for one in members:
             if owner.setdefault(one, name) != name:
                 raise LinkwiseError(f"{GROUPS} {text}: {one!r} is in {owner[one]!r} already")
         if name in found:
             raise LinkwiseError(f"{GROUPS} {text}: another group has that name")
         found[name] = members
-    return found | {one: (one,) for one in actuators if one not in owner}
+    alone = {one: (one,) for one in actuators if one not in owner}
+    for name in found.keys() & alone.keys():
+        raise LinkwiseError(
+            f"{GROUPS} {name}: an actuator that is in no group has that name; rename the group, or add it"
+        )
+    return found | alone
 
 
 def _columns(columns: Sequence[str], names: ActuatorNames) -> tuple[dict[str, int], tuple[str, ...]]:

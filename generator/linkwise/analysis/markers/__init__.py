@@ -15,7 +15,7 @@ class MarkerChoices:
 
     `tasks` is a file of OpenSim's inverse kinematics, a setup or its tasks, with weights. `plates` are
     written NUMBER=BODY, `axes` X,UP: axes of the laboratory that are the model's x, and up. Wrenches of
-    plates whose force is below `threshold` in N count as nothing.
+    plates whose force is below `threshold` in N, 20 if not given, count as nothing.
 
     Raises LinkwiseError for what is not written so.
     """
@@ -24,16 +24,26 @@ class MarkerChoices:
     tasks: Path | None = None
     plates: tuple[str, ...] = ()
     axes: str = ""
-    threshold: float = PLATE_THRESHOLD
+    threshold: float | None = None
     cutoff: float | None = None
     """Cutoff in Hz of the low-pass filter of plates; None for none."""
 
     def __post_init__(self) -> None:
-        if not 0 <= self.threshold < float("inf"):
-            raise LinkwiseError(f"--plate-threshold {self.threshold:g}: give a force in N, 0 or more")
+        if not 0 <= self.least < float("inf"):
+            raise LinkwiseError(f"--plate-threshold {self.least:g}: give a force in N, 0 or more")
         numbers = [number for number, _ in self.bodies]
         if len(set(numbers)) < len(numbers):
             raise LinkwiseError("--plate: a plate is given twice; it is under one body")
+
+    @property
+    def least(self) -> float:
+        """Force in N below which a plate counts as bare."""
+        return PLATE_THRESHOLD if self.threshold is None else self.threshold
+
+    @property
+    def is_of_plates(self) -> bool:
+        """True if something is said that only a file with plates and a laboratory's axes has."""
+        return bool(self.plates or self.axes or self.threshold is not None)
 
     @property
     def bodies(self) -> tuple[tuple[int, str], ...]:

@@ -14,6 +14,8 @@ from linkwise.input_file import require_file
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 AXES = {"X": 0, "Y": 1, "Z": 2}
+OF_PRESSURE = 1
+"""Type of plates whose channels are a force, its centre of pressure, and a free moment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +69,13 @@ def _recorded(file: Any, axes: str) -> RecordedC3D:
         raise LinkwiseError(
             f"{len(kept)} markers with a name in {len(places)} frames; there is no motion in it"
         )
+    names = [labels[at].rpartition(":")[2].strip() for at in kept]
+    twice = [labels[at] for at, name in zip(kept, names, strict=True) if names.count(name) > 1]
+    if twice:
+        raise LinkwiseError(
+            f"several markers have one name, {listed(map(repr, twice[:4]))}, where what stands before the colon"
+            " is left out; keep those of one subject, or rename them"
+        )
     told = axes or ",".join(_text(point, name) for name in ("X_SCREEN", "Y_SCREEN"))
     turn = _turn(told, "--c3d-axes" if axes else "POINT:X_SCREEN and Y_SCREEN")
     rate = float(file["parameters"]["POINT"]["RATE"]["value"][0])
@@ -74,12 +83,14 @@ def _recorded(file: Any, axes: str) -> RecordedC3D:
     scale = _metres(_text(point, "UNITS"), "POINT:UNITS")
     found = places[:, kept] * scale
     found[(found == 0.0).all(axis=2)] = np.nan  # as some programs write what is not seen
-    plates = tuple(_plate(one, turn) for one in file["data"].get("platform", ()))
+    kinds = file["parameters"].get("FORCE_PLATFORM", {}).get("TYPE", {}).get("value", ())
+    given = file["data"].get("platform", ())
+    plates = tuple(_plate(one, int(kind), turn) for one, kind in zip(given, kinds, strict=False))
     every = float(file["header"]["analogs"]["frame_rate"] or rate)
     count = len(plates[0].force) if plates else 0
     return RecordedC3D(
         begin + np.arange(len(places)) / rate,
-        tuple(labels[at] for at in kept),
+        tuple(names),
         found @ turn.T,
         begin + np.arange(count) / every,
         plates,
@@ -87,8 +98,12 @@ def _recorded(file: Any, axes: str) -> RecordedC3D:
     )
 
 
-def _plate(given: Any, turn: Array) -> PlateWrench:
-    """Return the wrench about the middle of a plate, which unlike a centre of pressure is always there."""
+def _plate(given: Any, kind: int, turn: Array) -> PlateWrench:
+    """Return the wrench about the middle of a plate, which unlike a centre of pressure is always there.
+
+    kind: the plate's type. Files have of type 1 the centre of pressure and the free moment; the moment that
+    ezc3d 1.7 makes of these has the wrong sign.
+    """
     scale = _metres(str(given["unit_position"]), "a plate's corners")
     moments = {"Nm": 1.0, "N.m": 1.0, "Nmm": 1e-3, "N.mm": 1e-3}.get(str(given["unit_moment"]))
     if moments is None or str(given["unit_force"]) != "N":
@@ -96,8 +111,13 @@ def _plate(given: Any, turn: Array) -> PlateWrench:
             f"plates are in {given['unit_force']} and {given['unit_moment']}; N and Nmm are read"
         )
     force = np.nan_to_num(np.asarray(given["force"], dtype=float)).T @ turn.T
-    moment = np.nan_to_num(np.asarray(given["moment"], dtype=float)).T @ turn.T * moments
     place = turn @ np.asarray(given["corners"], dtype=float).mean(axis=1) * scale
+    if kind == OF_PRESSURE:
+        centre = np.nan_to_num(np.asarray(given["center_of_pressure"], dtype=float).T @ turn.T * scale)
+        free = np.nan_to_num(np.asarray(given["Tz"], dtype=float)).T @ turn.T * moments
+        moment = np.cross(centre - place, force) + free
+    else:
+        moment = np.nan_to_num(np.asarray(given["moment"], dtype=float)).T @ turn.T * moments
     # The ground presses and does not pull: a force that points down is that on the plate.
     is_turned = float(force[:, 1].sum()) < 0.0
     sign = -1.0 if is_turned else 1.0

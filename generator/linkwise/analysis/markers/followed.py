@@ -12,7 +12,7 @@ from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.markers import SUFFIXES, MarkerChoices
 from linkwise.analysis.markers.c3d import RecordedC3D, read_c3d
 from linkwise.analysis.opensim.inverse_kinematics import MOTION, FollowedMarkers, inverse_kinematics
-from linkwise.analysis.opensim.own_opensim import asked_of_opensim
+from linkwise.robot.readers.osim.own_opensim import asked_of_opensim
 from linkwise.analysis.settings import Lowpass
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
@@ -86,8 +86,10 @@ def followed(
     ezc3d or the files lack.
     """
     if log.suffix.lower() not in SUFFIXES:
-        if asked is not None and (asked.tasks or asked.plates or asked.axes):
-            raise LinkwiseError(f"--ik-tasks, --plate and --c3d-axes go with a log of markers; {log} is none")
+        if asked is not None and (asked.tasks or asked.is_of_plates):
+            raise LinkwiseError(
+                f"--ik-tasks, --plate, --plate-threshold and --c3d-axes go with a log of markers; {log} is none"
+            )
         return None
     if asked is None or asked.model.suffix.lower() != ".osim":
         raise LinkwiseError(f"{log}: markers are those of a model of OpenSim; give its .osim file as --robot")
@@ -100,11 +102,13 @@ def followed(
         told.append(f"{recorded.axes} of the laboratory are x of the model, and up")
         given, notes = _plates(log, asked, recorded)
         loads, told = replace(loads, given=(*loads.given, *given)), [*told, *notes]
-    elif asked.plates or asked.axes:
-        raise LinkwiseError(f"--plate and --c3d-axes go with a .c3d file; {log} has neither plates nor axes")
+    elif asked.is_of_plates:
+        raise LinkwiseError(
+            f"--plate, --plate-threshold and --c3d-axes go with a .c3d file; {log} has neither plates nor axes"
+        )
     progress("inverse kinematics", 0, 1)
     found = asked_of_opensim(
-        lambda osim: inverse_kinematics(osim, asked.model, markers, asked.tasks, folder), str(log)
+        lambda osim: inverse_kinematics(osim, asked.model, markers, asked.tasks, folder), f"{log}: OpenSim"
     )
     progress("inverse kinematics", 1, 1)
     for names, what in ((found.lacking, "not in the recording"), (found.unknown, "not in the model")):
@@ -126,13 +130,13 @@ def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tup
     for number, plate in enumerate(recorded.plates, 1):
         most = float(np.linalg.norm(plate.force, axis=1).max(initial=0.0))
         if number not in bodies:
-            if most > asked.threshold:
+            if most > asked.least:
                 told.append(f"plate {number} bears up to {most:.4g} N and is left out; --plate {number}=BODY")
             continue
         if plate.is_turned:
             told.append(f"plate {number}: its forces point down, as on the plate, and are turned round")
         wrench = np.column_stack([plate.force, plate.moment])
-        wrench[np.linalg.norm(plate.force, axis=1) < asked.threshold] = 0.0
+        wrench[np.linalg.norm(plate.force, axis=1) < asked.least] = 0.0
         if asked.cutoff is not None:
             rate = 1.0 / float(np.diff(recorded.plate_time[:2])[0])
             lowpass(wrench, rate, Lowpass(asked.cutoff), flag="--loads-cutoff")
@@ -152,7 +156,7 @@ def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tup
 
 def _write_trc(path: Path, recorded: RecordedC3D) -> None:
     count, rate = len(recorded.time), 1.0 / float(np.diff(recorded.time).mean())
-    names = [name.rpartition(":")[2].replace("\t", " ") for name in recorded.names]
+    names = [name.replace("\t", " ") for name in recorded.names]
 
     def lines() -> Iterator[str]:
         yield f"PathFileType\t4\t(X/Y/Z)\t{path.name}"

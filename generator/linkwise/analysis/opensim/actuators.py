@@ -92,15 +92,15 @@ def actuator_wrenches(
     sources: force (S,) of each actuator of a source, by its name
     """
     model, own, state = _alone(osim, given)
-    paths = {name: _moving_points(osim, one) for name, one in own.items() if _is_path(osim, one)}
+    paths = {name: _moving_points(osim, one) for name, one in own.items() if _has_points(osim, one)}
     each = [model.getCoordinateSet().get(name) for name in coordinates]
-    speeds = _speeds(model, state)
+    there = _places(model, state)
     values = np.array([*coordinates.values()])
     bodies = {GROUND: 0} | {one.getName(): one.getMobilizedBodyIndex() for one in _all(model.getBodySet())}
     shape = len(sources), values.shape[1]
-    wrenches, efforts = np.zeros((*shape, len(bodies), 6)), np.zeros((*shape, len(speeds)))
+    wrenches, efforts = np.zeros((*shape, len(bodies), 6)), np.zeros((*shape, len(there)))
     origins = np.zeros((values.shape[1], len(bodies), 3))
-    places = [*speeds]
+    places = [*there]
     for s in range(values.shape[1]):
         for coordinate, value in zip(each, values[:, s].tolist(), strict=True):
             coordinate.setValue(state, value, False)
@@ -115,20 +115,19 @@ def actuator_wrenches(
                 for coordinate, effort in _of_moving(osim, own[name], state) if paths[name] else ():
                     efforts[x, s, places.index(coordinate)] += float(source[name][s]) * effort
             if not paths.keys() >= source.keys():
-                model.realizeDynamics(state)
-                efforts[x, s] += model.getMobilityForces(state).to_numpy()[[*speeds.values()]]
+                efforts[x, s] += _on_coordinates(osim, model, state)[[*there.values()]]
             for name in source:
                 own[name].setOverrideActuation(state, 0.0)
     each_body = {name: origins[:, b] for b, name in enumerate(bodies)}
-    found = (_source(bodies, speeds, on, effort) for on, effort in zip(wrenches, efforts, strict=True))
+    found = (_source(bodies, there, on, effort) for on, effort in zip(wrenches, efforts, strict=True))
     return ActuatorWrenches(tuple(found), each_body)
 
 
-def _source(bodies: Iterable[str], speeds: Iterable[str], on: Array, efforts: Array) -> SourceWrenches:
+def _source(bodies: Iterable[str], coordinates: Iterable[str], on: Array, efforts: Array) -> SourceWrenches:
     """Return what is not zero of wrenches (S, bodies, 6) and generalized forces (S, coordinates)."""
     return SourceWrenches(
         {name: on[:, b] for b, name in enumerate(bodies) if on[:, b].any()},
-        {name: efforts[:, k] for k, name in enumerate(speeds) if efforts[:, k].any()},
+        {name: efforts[:, k] for k, name in enumerate(coordinates) if efforts[:, k].any()},
     )
 
 
@@ -180,6 +179,12 @@ def _is_path(osim: Any, actuator: Any) -> bool:
     return osim.PathActuator.safeDownCast(actuator) is not None
 
 
+def _has_points(osim: Any, actuator: Any) -> bool:
+    """Return whether it pulls at points of bodies, not by moment arms that functions give."""
+    path = osim.PathActuator.safeDownCast(actuator)
+    return path is not None and osim.FunctionBasedPath.safeDownCast(path.getPath()) is None
+
+
 def _on_bodies(model: Any, state: Any, bodies: Sequence[int]) -> list[list[float]]:
     """Return the moment about the origin and the force on each body that the actuators give together."""
     model.realizeDynamics(state)
@@ -220,14 +225,28 @@ def _of_moving(osim: Any, actuator: Any, state: Any) -> Iterator[tuple[str, floa
             yield from ((one.getName(), float(effort)) for one, effort in zip(by, each, strict=True))
 
 
-def _speeds(model: Any, state: Any) -> dict[str, int]:
-    """Return the place of each coordinate's speed among those of the system."""
+def _places(model: Any, state: Any) -> dict[str, int]:
+    """Return the place of each coordinate's value among those of the system."""
     found = {}
     for one in _all(model.getCoordinateSet()):
-        one.setSpeedValue(state, 1.0)
-        found[one.getName()] = int(np.flatnonzero(state.getU().to_numpy())[0])
-        one.setSpeedValue(state, 0.0)
+        before = state.getQ().to_numpy().copy()
+        one.setValue(state, one.getValue(state) + 1.0, False)
+        found[one.getName()] = int(np.flatnonzero(state.getQ().to_numpy() != before)[0])
+        one.setValue(state, float(before[found[one.getName()]]), False)
     return found
+
+
+def _on_coordinates(osim: Any, model: Any, state: Any) -> Array:
+    """Return the generalized forces on the rates of all coordinates that the actuators give together.
+
+    OpenSim's are on speeds u, which of a Ball or Free joint are the angular velocity: with q' = N u, the
+    power f u = (N^-T f) q'.
+    """
+    model.realizeDynamics(state)
+    found, every = osim.Vector(state.getNQ(), 0.0), model.getMobilityForces(state)
+    model.getMatterSubsystem().multiplyByNInv(state, True, every, found)
+    forces: Array = found.to_numpy().copy()
+    return forces
 
 
 def _origin(model: Any, name: str, state: Any) -> Array:

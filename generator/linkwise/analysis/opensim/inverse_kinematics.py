@@ -29,7 +29,7 @@ class FollowedMarkers:
     apart: Array
     """Distances (S, M) in m; NaN where a marker was not seen."""
     lacking: tuple[str, ...]
-    """Markers of the model that the recording lacks."""
+    """Markers of the model that the recording lacks, or never sees."""
     unknown: tuple[str, ...]
     """Markers of the recording that the model lacks."""
 
@@ -45,11 +45,15 @@ def inverse_kinematics(
     opened.initSystem()
     own = [opened.getMarkerSet().get(at).getName() for at in range(opened.getMarkerSet().getSize())]
     time, there, places = _recorded(osim, markers)
-    names = [name for name in own if name in there]
+    twice = [name for name in dict.fromkeys(there) if there.count(name) > 1]
+    if twice:
+        raise LinkwiseError(f"{markers.name}: several markers are named {listed(twice)}; rename them")
+    seen = [name for name, path in zip(there, places.swapaxes(0, 1), strict=True) if np.isfinite(path).any()]
+    names = [name for name in own if name in seen]
     if len(names) < 3:
         raise LinkwiseError(
             f"{markers.name}: {len(names)} of its markers are in {model}, which has {listed(own[:8])}; the"
-            f" recording has {listed(there[:8])}; name them alike"
+            f" recording has {listed(seen[:8])}; name them alike"
         )
     tool = osim.InverseKinematicsTool()
     tool.setModel(opened)
@@ -66,14 +70,14 @@ def inverse_kinematics(
     used = [name for name in names if f"{name}_tx" in labels]
     at = [[labels.index(f"{name}_t{axis}") for axis in "xyz"] for name in used]
     when = np.asarray(found.getIndependentColumn(), dtype=float)
-    row = np.searchsorted(time, when - 1e-9)
+    row = np.searchsorted((time[1:] + time[:-1]) / 2, when)  # the file's times are rounded
     given = places[row][:, [there.index(name) for name in used]]
     return FollowedMarkers(
         (folder / MOTION).read_bytes(),
         when,
         tuple(used),
         np.linalg.norm(rows[:, np.array(at)] - given, axis=2),
-        tuple(name for name in own if name not in there),
+        tuple(name for name in own if name not in seen),
         tuple(name for name in there if name not in own),
     )
 

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.bounded_file import MIB
-from linkwise.errors import LinkwiseError, within
-from linkwise.extras import extra
-from linkwise.own_process import Ended, ProcessLimits, in_own_process
+from linkwise.errors import within
+from linkwise.own_process import ProcessLimits
+from linkwise.robot.readers.osim.own_opensim import asked_of_opensim
 
 LIMITS = ProcessLimits(seconds=300, memory=2048 * MIB)
 
@@ -19,17 +19,10 @@ def converted(path: Path) -> bytes:
     to mend that, and where it does not read the file.
     """
     with within("OpenSim itself brings it to a version that is read; open and save it there, or here"):
-        osim = extra("opensim")
-    try:
-        return in_own_process(lambda: _written(osim, path.resolve()), LIMITS)
-    except (Ended, RuntimeError, MemoryError) as error:
-        why = " ".join(str(error).split())
-        raise LinkwiseError(f"OpenSim does not bring it to one that is read: {why}") from None
+        return asked_of_opensim(lambda osim: _written(osim, path.resolve()), limits=LIMITS)
 
 
 def _written(osim: Any, path: Path) -> bytes:
-    osim.Logger.removeFileSink()  # it would write opensim.log into the working directory
-    osim.Logger.setLevelString("Off")
     with tempfile.TemporaryDirectory() as folder:
         whole = Path(folder) / "model.osim"
         osim.Model(str(path)).printToXML(str(whole))
