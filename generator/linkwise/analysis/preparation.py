@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from linkwise.analysis.asked_trace import AskedTrace, restart_times
 from linkwise.analysis.borne_joints import borne_joints
@@ -18,6 +18,7 @@ from linkwise.analysis.job import Job
 from linkwise.analysis.loads.muscles import placed_muscles
 from linkwise.analysis.loads.read import placed_loads
 from linkwise.analysis.logs import Log, open_log
+from linkwise.analysis.markers import SUFFIXES
 from linkwise.analysis.markers.followed import followed
 from linkwise.analysis.measured_torques import measured_torques, torque_columns
 from linkwise.analysis.opened_robot import OpenedRobot, told_apart
@@ -35,6 +36,7 @@ from linkwise.analysis.uncertain_file import read_uncertain
 from linkwise.analysis.uncertain_inputs import UncertainInputs, uncertain_inputs
 from linkwise.analysis.uncertain_motion import LONGEST
 from linkwise.errors import LinkwiseError, within
+from linkwise.output import passing_folder
 from linkwise.progress import Progress
 
 
@@ -51,8 +53,9 @@ def prepared(
 
     buffer: a directory that keeps the samples in a disk buffer, not in memory
     """
-    with TemporaryDirectory() as folder:
-        made = followed(log, asked.markers, asked.loads, Path(folder), progress)
+    is_of_markers = log.suffix.lower() in SUFFIXES
+    with passing_folder() if is_of_markers else nullcontext(log.parent) as folder:
+        made = followed(log, asked.markers, asked.loads, folder, progress)
         if made is None:
             return _prepared(log, robot, asked, progress, buffer)
         try:

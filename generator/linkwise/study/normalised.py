@@ -95,7 +95,7 @@ def of_several_masses(plan: StudyPlan, trials: Sequence[TrialSummary]) -> tuple[
 
 
 def of_their_robots(plan: StudyPlan, trials: Sequence[TrialSummary]) -> tuple[str, ...]:
-    """Return a line where the table of subjects has masses, and lacks subjects whose robots then tell theirs."""
+    """Return a line where the table of subjects has masses, and robots tell those of others."""
     there = dict.fromkeys(trial.labels[SUBJECT] for trial in trials)
     lacking = [name for name in there if name not in plan.bodies]
     is_of_mass = any(not math.isnan(body.mass) for body in plan.bodies.values())
@@ -104,7 +104,7 @@ def of_their_robots(plan: StudyPlan, trials: Sequence[TrialSummary]) -> tuple[st
     others = [name for name in plan.bodies if name not in there]
     told = f"; it has {listed(map(repr, others))}, of whom there is no trial" if others else ""
     return (
-        f"'subjects' lacks {listed(map(repr, lacking))}, normalised by the mass of the robot of each trial{told}",
+        f"'subjects' lacks {listed(map(repr, lacking))}, normalised by the mass of each trial's robot{told}",
     )
 
 

@@ -1,11 +1,10 @@
 """Models of versions that are not read here, brought to the latest one by OpenSim itself."""
 
-import tempfile
 from pathlib import Path
-from typing import Any
 
 from linkwise.bounded_file import MIB
 from linkwise.errors import within
+from linkwise.output import passing_folder
 from linkwise.own_process import ProcessLimits
 from linkwise.robot.readers.osim.own_opensim import asked_of_opensim
 
@@ -18,12 +17,10 @@ def converted(path: Path) -> bytes:
     OpenSim reads it in a process of its own. Raises LinkwiseError where OpenSim is not installed, saying how
     to mend that, and where it does not read the file.
     """
-    with within("OpenSim itself brings it to a version that is read; open and save it there, or here"):
-        return asked_of_opensim(lambda osim: _written(osim, path.resolve()), limits=LIMITS)
-
-
-def _written(osim: Any, path: Path) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        whole = Path(folder) / "model.osim"
-        osim.Model(str(path)).printToXML(str(whole))
+    with (
+        within("OpenSim itself brings it to a version that is read; open and save it there, or here"),
+        passing_folder() as folder,
+    ):
+        whole = folder / "model.osim"
+        asked_of_opensim(lambda osim: osim.Model(str(path.resolve())).printToXML(str(whole)), limits=LIMITS)
         return whole.read_bytes()
