@@ -28,13 +28,13 @@ from linkwise.analysis.opensim.actuators import (
     actuator_names,
     actuator_wrenches,
 )
-from linkwise.robot.readers.osim.own_opensim import asked_of_opensim
 from linkwise.analysis.samples import finite_blocks
 from linkwise.analysis.settings import Reading
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.progress import Progress
+from linkwise.robot.readers.osim.own_opensim import asked_of_opensim
 
 GROUPS = "--muscle-group"
 APART = 1e-5

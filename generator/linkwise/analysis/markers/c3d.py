@@ -73,8 +73,8 @@ def _recorded(file: Any, axes: str) -> RecordedC3D:
     twice = [labels[at] for at, name in zip(kept, names, strict=True) if names.count(name) > 1]
     if twice:
         raise LinkwiseError(
-            f"several markers have one name, {listed(map(repr, twice[:4]))}, where what stands before the colon"
-            " is left out; keep those of one subject, or rename them"
+            f"several markers have one name, {listed(map(repr, twice[:4]))}, where what stands before the"
+            " colon is left out; keep those of one subject, or rename them"
         )
     told = axes or ",".join(_text(point, name) for name in ("X_SCREEN", "Y_SCREEN"))
     turn = _turn(told, "--c3d-axes" if axes else "POINT:X_SCREEN and Y_SCREEN")

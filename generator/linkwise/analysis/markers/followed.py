@@ -12,13 +12,13 @@ from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.markers import SUFFIXES, MarkerChoices
 from linkwise.analysis.markers.c3d import RecordedC3D, read_c3d
 from linkwise.analysis.opensim.inverse_kinematics import MOTION, FollowedMarkers, inverse_kinematics
-from linkwise.robot.readers.osim.own_opensim import asked_of_opensim
 from linkwise.analysis.settings import Lowpass
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.progress import Progress
+from linkwise.robot.readers.osim.own_opensim import asked_of_opensim
 
 HEAD = (
     *("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units"),
@@ -88,7 +88,8 @@ def followed(
     if log.suffix.lower() not in SUFFIXES:
         if asked is not None and (asked.tasks or asked.is_of_plates):
             raise LinkwiseError(
-                f"--ik-tasks, --plate, --plate-threshold and --c3d-axes go with a log of markers; {log} is none"
+                f"--ik-tasks, --plate, --plate-threshold and --c3d-axes go with a log of markers;"
+                f" {log} is none"
             )
         return None
     if asked is None or asked.model.suffix.lower() != ".osim":
@@ -104,7 +105,8 @@ def followed(
         loads, told = replace(loads, given=(*loads.given, *given)), [*told, *notes]
     elif asked.is_of_plates:
         raise LinkwiseError(
-            f"--plate, --plate-threshold and --c3d-axes go with a .c3d file; {log} has neither plates nor axes"
+            f"--plate, --plate-threshold and --c3d-axes go with a .c3d file; {log} has neither plates"
+            " nor axes"
         )
     progress("inverse kinematics", 0, 1)
     found = asked_of_opensim(
