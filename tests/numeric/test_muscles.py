@@ -301,6 +301,22 @@ def test_groups_that_are_not_clear_are_refused(groups: tuple[str, ...], said: st
         grouped(groups, ("a", "b"), {"legs": ("a",)})
 
 
+def test_a_muscle_that_the_model_does_not_apply_is_told(leg: Leg, tmp_path: Path) -> None:
+    model = osim.Model(str(leg.file))
+    model.updForceSet().get("straight").set_appliesForce(False)
+    model.finalizeConnections()
+    model.printToXML(str(tmp_path / "off.osim"))
+    package = kept_package(tmp_path / "off.osim")
+    for force, said in ((leg.folder / "force.sto", True), (tmp_path / "others.sto", False)):
+        write_sto(tmp_path / "others.sto", MUSCLES[1:], leg.time, leg.tension[:, 1:])
+        muscles = Muscles(force, tmp_path / "off.osim")
+        told = analyze(leg.folder / "motion.sto", package, muscles=muscles).load_warnings
+        assert any("does not apply straight" in warning for warning in told) == said
+        assert not any("no column for" in warning for warning in told)
+    shown = run_linkwise("inspect", tmp_path / "off.osim", "--details", folder=tmp_path)
+    assert "a Thelen2003Muscle that the model does not apply" in shown.stdout
+
+
 def test_files_that_do_not_fit_are_refused_in_a_line(leg: Leg, tmp_path: Path) -> None:
     with pytest.raises(LinkwiseError, match=r"give its \.osim file as --robot"):
         Muscles(leg.folder / "force.sto", tmp_path)
@@ -308,6 +324,10 @@ def test_files_that_do_not_fit_are_refused_in_a_line(leg: Leg, tmp_path: Path) -
     with pytest.raises(LinkwiseError, match=r"late\.sto: row .* begins at 0\.5 s"):
         leg.analysed(Muscles(tmp_path / "late.sto", leg.file))
     write_sto(tmp_path / "other.sto", ("biceps",), leg.time, leg.tension[:, :1])
+    twice = ("straight", "/forceset/straight")
+    write_sto(tmp_path / "twice.sto", twice, leg.time, leg.tension[:, :2])
+    with pytest.raises(LinkwiseError, match="'straight' and '/forceset/straight' are both 'straight'"):
+        leg.analysed(Muscles(tmp_path / "twice.sto", leg.file))
     with pytest.raises(LinkwiseError, match="no column is an actuator of the model"):
         leg.analysed(Muscles(tmp_path / "other.sto", leg.file))
 

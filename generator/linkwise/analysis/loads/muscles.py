@@ -125,9 +125,14 @@ def grouped(
 def _columns(columns: Sequence[str], names: ActuatorNames) -> tuple[dict[str, int], tuple[str, ...]]:
     """Return the number of each actuator's column, and what is told of other columns and muscles."""
     time = time_column(columns, Reading())
-    numbers, extra = {}, []
+    numbers: dict[str, int] = {}
+    extra = []
     for at, column in enumerate(columns):
         name = end_of_path(column)
+        if name in numbers:
+            raise LinkwiseError(
+                f"{columns[numbers[name]]!r} and {column!r} are both {name!r}; leave one of them out"
+            )
         if name in names.actuators:
             numbers[name] = at
         elif at != time:
@@ -143,7 +148,13 @@ def _columns(columns: Sequence[str], names: ActuatorNames) -> tuple[dict[str, in
             f"no actuator of the model for {listed(extra)}: left out, so that joint torques contain what"
             " these give; files of reserve actuators go with --muscle-actuators"
         )
-    missing = [name for name in names.actuators if name not in numbers]
+    unapplied = [name for name in numbers if name in names.unapplied]
+    if unapplied:
+        told.append(
+            f"the model does not apply {listed(unapplied)}, and the file has forces of these: they count;"
+            " leave their columns out if they should not"
+        )
+    missing = [one for one in names.actuators if one not in numbers and one not in names.unapplied]
     if missing:
         told.append(f"no column for {listed(missing)}: taken to give nothing")
     return numbers, tuple(told)

@@ -88,7 +88,7 @@ def followed(
     if log.suffix.lower() not in SUFFIXES:
         if asked is not None and (asked.tasks or asked.is_of_plates):
             raise LinkwiseError(
-                "--ik-tasks, --plate, --plate-threshold and --c3d-axes go with a log of markers;"
+                f"--ik-tasks, --plate, --plate-threshold and --c3d-axes go with a log of markers;"
                 f" {log} is none"
             )
         return None
@@ -105,8 +105,8 @@ def followed(
         loads, told = replace(loads, given=(*loads.given, *given)), [*told, *notes]
     elif asked.is_of_plates:
         raise LinkwiseError(
-            f"--plate, --plate-threshold and --c3d-axes go with a .c3d file; {log} has neither plates nor"
-            " axes"
+            f"--plate, --plate-threshold and --c3d-axes go with a .c3d file; {log} has neither plates"
+            " nor axes"
         )
     progress("inverse kinematics", 0, 1)
     found = asked_of_opensim(

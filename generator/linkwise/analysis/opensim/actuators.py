@@ -39,6 +39,8 @@ class ActuatorNames:
     actuators: tuple[str, ...]
     paths: frozenset[str]
     """Actuators along a path, as muscles are."""
+    unapplied: frozenset[str]
+    """Actuators that the model itself does not apply."""
     groups: Mapping[str, tuple[str, ...]]
     coordinates: tuple[str, ...]
 
@@ -75,6 +77,7 @@ def actuator_names(osim: Any, given: ActuatorFile) -> ActuatorNames:
     return ActuatorNames(
         tuple(own),
         frozenset(name for name, one in own.items() if _is_path(osim, one)),
+        frozenset(name for name, one in own.items() if not one.get_appliesForce()),
         groups,
         tuple(one.getName() for one in _all(model.getCoordinateSet())),
     )

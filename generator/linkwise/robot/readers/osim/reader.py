@@ -151,12 +151,15 @@ def _vector(values: tuple[float, ...]) -> Vec3:
 def _forces(model: Element) -> Iterator[Omission]:
     """Yield the forces that act by themselves, which the torques leave out."""
     for force in members(model, "ForceSet"):
-        acts = yes(force, "appliesForce", True) and not yes(force, "isDisabled")
-        if acts and not gives_torque(force):
+        if _acts(force) and not gives_torque(force):
             coordinate = text_of(force, "coordinate")
             yield Omission(
                 ACTING.get(force.tag, force.tag), name_of(force), coordinate and f"on {coordinate}"
             )
+
+
+def _acts(force: Element) -> bool:
+    return yes(force, "appliesForce", True) and not yes(force, "isDisabled")
 
 
 def gives_torque(force: Element) -> bool:
@@ -173,9 +176,11 @@ def _ignored(model: Element) -> tuple[Note, ...]:
     counts = Counter(force.tag for force in members(model, "ForceSet") if gives_torque(force))
     counts.update(part.tag for part in members(model, "ContactGeometrySet"))
     counts.update(part.tag for part in members(model, "MarkerSet"))
+    off = (force for force in members(model, "ForceSet") if not _acts(force))
     weightless = (body for body in members(model, "BodySet") if _has_inertia_alone(body))
     return (
         *(Note("ignored", what, f"{count} ×") for what, count in sorted(counts.items())),
+        *(Note("ignored", name_of(force), f"a {force.tag} that the model does not apply") for force in off),
         *(Note("ignored", name_of(body), "its inertia, as its mass is 0") for body in weightless),
     )
 
