@@ -95,7 +95,7 @@ def of_several_masses(plan: StudyPlan, trials: Sequence[TrialSummary]) -> tuple[
 
 
 def of_their_robots(plan: StudyPlan, trials: Sequence[TrialSummary]) -> tuple[str, ...]:
-    """Return a line where the table of subjects has masses, and none of some, whose robots then tell theirs."""
+    """Return a line where a table of masses lacks subjects, whose robots then tell theirs."""
     there = dict.fromkeys(trial.labels[SUBJECT] for trial in trials)
     lacking = [name for name in there if name not in plan.bodies]
     is_of_mass = any(not math.isnan(body.mass) for body in plan.bodies.values())
