@@ -78,8 +78,8 @@ def _prepared(log: Path, robot: OpenedRobot, asked: Request, progress: Progress,
         unfiltered = before_filter(asked.cutoff_sweep, samples, processing, buffer)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
-        told = *slip_warnings(samples, robot.constrained, processing), *beyond_log(samples, processing)
-    samples = replace(samples, warnings=(*samples.warnings, *told))
+        doubts = *slip_warnings(samples, robot.constrained, processing), *beyond_log(samples, processing)
+    samples = replace(samples, warnings=(*samples.warnings, *doubts))
     motion = samples.time[start:stop]
     borne = placed_loads(asked.loads, robot, motion, reading.ignore_extra, progress, buffer)
     if asked.muscles is not None:
