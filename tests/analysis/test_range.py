@@ -46,3 +46,17 @@ def test_a_range_without_a_movement_is_refused(tmp_path, start, stop, message):
     log = write_csv(tmp_path / "log.csv", smooth(200, 3))
     with pytest.raises(LinkwiseError, match=message.replace(".", "[.]")):
         analyze(log, PLANAR3, processing=Processing(start=start, stop=stop))
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "told"),
+    [
+        (-0.5, 1.0, ("--from -0.5 is before the log, which begins at 0 s",)),
+        (0.5, 2.5, ("--to 2.5 is after the log, which ends at 1.99 s",)),
+        (-0.005, 1.995, ()),  # less than a sample
+    ],
+)
+def test_a_range_beyond_the_log_is_warned_of(tmp_path, start, stop, told):
+    log = write_csv(tmp_path / "log.csv", smooth(200, 3))
+    result = analyze(log, PLANAR3, processing=Processing(start=start, stop=stop))
+    assert result.warnings == told

@@ -109,8 +109,45 @@ def test_cycles_by_a_plate_begin_where_its_own_samples_cross_the_threshold(way: 
     said = "force of push above 40 N; between the load's own samples, of 1000 Hz, by straight lines"
     assert told == {"by": said, "trials": ["a"]}
     file.write_text(file.read_text().replace("to_time = 3.1\n", ""))
-    with pytest.raises(LinkwiseError, match=r"it ends at 3.199 s, .*; analyse less of the motion, by --from"):
+    message = r"it ends at 3.199 s, .*; analyse less of the motion, by \[analysis\] from_time and "
+    with pytest.raises(LinkwiseError, match=message):
         run_study(file, out, Here())
+
+
+@pytest.mark.parametrize(
+    ("asked", "start", "message"),
+    [
+        ("from_time = 7", "stands", "[analysis] from_time 7: 0 samples are there, and 2 are needed"),
+        ("from_time = 2\nto_time = 1", "stands", "[analysis] from_time 2 is not before [analysis] to_time 1"),
+        ("", "right>20", "trial 'a': [cycles] right: no load, contact or column 'right'"),
+    ],
+)
+def test_messages_name_keys_of_the_study_and_no_flags(
+    asked: str, start: str, message: str, tmp_path: Path
+) -> None:
+    file = _stepping(tmp_path, asked, start)
+    with pytest.raises(LinkwiseError) as raised:
+        run_study(file, tmp_path / "out", Here())
+    assert message in str(raised.value)
+    assert "--" not in str(raised.value)
+
+
+def test_a_trial_without_a_cycle_is_told_how_often_one_begins(tmp_path: Path) -> None:
+    (broken,) = run_study(_stepping(tmp_path, "to_time = 1.5", "stands"), tmp_path / "out", Here()).broken
+    told = "no whole cycle by 'stands' between 0 and 1.5 s; it begins 1 and ends 2 times there"
+    assert broken.reason == f"a.csv: {told}"
+
+
+def _stepping(folder: Path, asked: str, start: str) -> Path:
+    """Write a study of one log of 4 s that stands for 0.3 s of each, and return its file."""
+    time = np.round(np.arange(0, 4, 0.01), 2)
+    q = np.sin(time)[:, None] * [1, 0.5, 0.2]
+    write_csv(folder / "a.csv", np.column_stack([time, q, time % 1 < 0.295]), (*JOINTS, "stands"))
+    choices = f'[analysis]\nignore_extra = true\n{asked}\n[cycles]\nstart = "{start}"\n'
+    trial = '[[trial]]\nlog = "a.csv"\nrobot = "planar3"\n'
+    file = folder / "study.toml"
+    file.write_text(f"schema = 1\npages = false\n{choices}{trial}")
+    return file
 
 
 def test_cycles_lie_in_the_range_of_time_that_is_analysed(tmp_path: Path) -> None:

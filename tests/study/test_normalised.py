@@ -153,7 +153,7 @@ def test_a_subject_that_the_table_does_not_have_is_told(tmp_path: Path) -> None:
     file = study_of(tmp_path, 'normalise = "mass"\nsubjects = "who.csv"\n')
     (line,) = run_study(file, tmp_path / "out", Here()).warnings
     assert line == (
-        "'subjects' lacks 'S2', normalised by the mass of each trial's robot; it has 's2', of whom there"
+        "'subjects' lacks 'S2', normalised by the mass of the robot of each trial; it has 's2', of whom there"
         " is no trial"
     )
     assert json.loads((tmp_path / "out/study.json").read_text())["notes"] == [line]

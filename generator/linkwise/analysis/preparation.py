@@ -27,7 +27,7 @@ from linkwise.analysis.request import Request
 from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Reading
 from linkwise.analysis.stated_bodies import check_lengths
-from linkwise.analysis.stream import span_of
+from linkwise.analysis.stream import beyond_log, span_of
 from linkwise.analysis.swept_log import SweptLog, before_filter
 from linkwise.analysis.told_beside import ToldBeside
 from linkwise.analysis.torques import Decomposer
@@ -85,8 +85,8 @@ def _prepared(log: Path, robot: OpenedRobot, asked: Request, progress: Progress,
         unfiltered = before_filter(asked.cutoff_sweep, samples, processing, buffer)
         if processing.lowpass is not None:
             lowpass(samples.q, samples.rate, processing.lowpass)
-        slips = tuple(slip_warnings(samples, robot.constrained, processing))
-    samples = replace(samples, warnings=(*samples.warnings, *slips))
+        doubts = *slip_warnings(samples, robot.constrained, processing), *beyond_log(samples, processing)
+    samples = replace(samples, warnings=(*samples.warnings, *doubts))
     motion = samples.time[start:stop]
     borne = placed_loads(asked.loads, robot, motion, reading.ignore_extra, progress, buffer)
     if asked.muscles is not None:

@@ -74,6 +74,15 @@ def span_of(samples: Samples, processing: Processing) -> tuple[int, int]:
     return start, stop
 
 
+def beyond_log(samples: Samples, processing: Processing) -> Iterator[str]:
+    """Yield a warning for each end of the range of time that lies a sample or more outside the log."""
+    first, last, step = samples.time[0], samples.time[-1], 1 / samples.rate
+    if processing.start is not None and processing.start <= first - step:
+        yield f"--from {processing.start:g} is before the log, which begins at {first:.6g} s"
+    if processing.stop is not None and processing.stop >= last + step:
+        yield f"--to {processing.stop:g} is after the log, which ends at {last:.6g} s"
+
+
 Filled = tuple[PartSums, Closure]
 """Sums over a part of a block, and how well it closes."""
 

@@ -16,7 +16,7 @@ from linkwise.analysis.measured_torques import refuse_follower, torque_columns
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.samples import Samples, read_samples
 from linkwise.analysis.settings import Lowpass, Processing, Reading
-from linkwise.analysis.stream import LEAST_SAMPLES, span_of
+from linkwise.analysis.stream import LEAST_SAMPLES, beyond_log, span_of
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
@@ -101,7 +101,7 @@ def read_torque_log(
             lowpass(q, samples.rate, processing.lowpass)
             start, stop = _within(start, stop, samples, processing, processing.lowpass)
         _refuse_still(q[start:stop], robot, measured)
-    told = samples.warnings, samples.ignored
+    told = (*samples.warnings, *beyond_log(samples, processing)), samples.ignored
     return TorqueLog(path.name, samples.rate, q, noise, measured, torque, start, stop, *told, closed)
 
 

@@ -117,7 +117,7 @@ def drawn_causes(
 
 
 def _told(figure: PaperFigure, rows: Sequence[CausePanels], tests: Sequence[Compared]) -> Iterator[str]:
-    """Yield lines for below a figure: what curves, marks and bands are of, where a reader must be told."""
+    """Yield lines for below a figure: what curves, marks and bands are of, where that has to be told."""
     bars = " Bars below: where the test finds a difference, in the cause's colour." if tests else ""
     yield f"A coordinate's motion is its acceleration and velocity together.{bars}"
     if figure.band != "none" and any(row.is_of_one for row in rows):

@@ -22,7 +22,7 @@ CORRECTIONS: dict[Correction, str] = {
     "none": "not corrected for the number of columns",
     "bonferroni": "by Bonferroni",
     "holm": "by Holm",
-    "fdr-bh": "false discovery rate by Benjamini and Hochberg",
+    "fdr-bh": "by the false discovery rate of Benjamini and Hochberg",
 }
 """Corrections, in words."""
 

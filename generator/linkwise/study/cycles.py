@@ -34,11 +34,12 @@ Span = tuple[float, float]
 
 def cycle_spans(cycles: Cycles, job: Job, trial: Trial) -> list[Span]:
     """Return the beginning and end of each whole cycle in s; raise LinkwiseError where there is none."""
-    time = job.analysed.time
+    time, begun = job.analysed.time, ""
     if cycles.table:
         found = written_cycles(cycles.table, bool(cycles.sides)).get((trial.recording, trial.side), [])
     else:
         up, down = _edges(job)
+        begun = f"; it begins {len(up)} and ends {len(down)} times there"
         if cycles.start:
             found = list(pairwise(up.tolist()))
         else:
@@ -49,9 +50,11 @@ def cycle_spans(cycles: Cycles, job: Job, trial: Trial) -> list[Span]:
     if not inside:
         what = cycles.table or cycles.what(trial.side)
         between = (
-            f"none of {len(found)} that last {cycles.shortest:g} to {cycles.longest:g} s" if found else "none"
+            f": none of {len(found)} that last {cycles.shortest:g} to {cycles.longest:g} s"
+            if found
+            else begun or f": it has none of {trial.recording!r}"
         )
-        raise LinkwiseError(f"no whole cycle by {what!r} between {time[0]:g} and {time[-1]:g} s: {between}")
+        raise LinkwiseError(f"no whole cycle by {what!r} between {time[0]:g} and {time[-1]:g} s{between}")
     return inside
 
 

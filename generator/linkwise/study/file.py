@@ -31,6 +31,7 @@ from linkwise.study.plan import (
 from linkwise.study.plan_checks import check_plan
 from linkwise.study.subjects import SubjectSize, read_subjects
 from linkwise.study.summary import STATISTICS
+from linkwise.study.told_keys import by_keys
 
 COLUMNS = (
     *(
@@ -201,7 +202,7 @@ def trials_of(
                 _trial(place, known_keys("the entry", one, known), factors, usual, folder) for one in entries
             ]
         for trial, keys in several:
-            with within(f"trial {trial.name!r}"):
+            with within(f"trial {trial.name!r}"), by_keys():
                 yield replace(trial, choices=chosen(AnalysisChoices, keys))
 
 

@@ -95,17 +95,16 @@ def of_several_masses(plan: StudyPlan, trials: Sequence[TrialSummary]) -> tuple[
 
 
 def of_their_robots(plan: StudyPlan, trials: Sequence[TrialSummary]) -> tuple[str, ...]:
-    """Return a line where the table of subjects has masses, and robots tell those of others."""
+    """Return a line where a table of masses lacks subjects, whose robots then tell theirs."""
     there = dict.fromkeys(trial.labels[SUBJECT] for trial in trials)
     lacking = [name for name in there if name not in plan.bodies]
     is_of_mass = any(not math.isnan(body.mass) for body in plan.bodies.values())
     if plan.normalise in ("", "none") or not is_of_mass or not lacking:
         return ()
     others = [name for name in plan.bodies if name not in there]
+    by = f"'subjects' lacks {listed(map(repr, lacking))}, normalised by the mass of the robot of each trial"
     told = f"; it has {listed(map(repr, others))}, of whom there is no trial" if others else ""
-    return (
-        f"'subjects' lacks {listed(map(repr, lacking))}, normalised by the mass of each trial's robot{told}",
-    )
+    return (by + told,)
 
 
 def told_of_bodies(plan: StudyPlan, trials: Iterable[TrialSummary]) -> dict[str, object]:

@@ -33,6 +33,7 @@ from linkwise.study.results import together
 from linkwise.study.robots import check_robots
 from linkwise.study.sides import SidedColumns
 from linkwise.study.tables import kept_columns
+from linkwise.study.told_keys import by_keys
 from linkwise.study.trial import TrialOutcome, TrialTask, prepared_trial
 
 
@@ -181,7 +182,12 @@ def _columns(plan: StudyPlan, before: Collection[str]) -> tuple[Column, ...]:
         if trial.name in before:
             continue
         try:
-            with within(f"trial {trial.name!r}"), trial_here(trial) as here, passing_folder() as buffer:
+            with (
+                within(f"trial {trial.name!r}"),
+                by_keys(),
+                trial_here(trial) as here,
+                passing_folder() as buffer,
+            ):
                 return SidedColumns.of(prepared_trial(plan, here, buffer), plan.cycles, here.side).columns
         except LinkwiseError as reason:
             reasons.append(reason)

@@ -39,6 +39,7 @@ from linkwise.study.robots import opened_robot
 from linkwise.study.sides import SidedColumns
 from linkwise.study.summary import RunningMoments
 from linkwise.study.tables import CYCLE, PERCENT, TrialTable, kept_columns
+from linkwise.study.told_keys import by_keys
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ def run_trial(task: TrialTask) -> TrialOutcome:
     """Run a trial and return its outcome; its folder appears whole, or not at all if it fails."""
     try:
         require_seen(task.folder)
-        with whole_directory(task.folder, refuse_unless_trial) as draft:
+        with by_keys(), whole_directory(task.folder, refuse_unless_trial) as draft:
             record = _worked(task, draft)
             (draft / RECORD).write_text(record.text(), encoding="utf-8")
     except LinkwiseError as error:
