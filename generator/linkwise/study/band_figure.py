@@ -3,6 +3,7 @@
 A filled band is of the spread between subjects, a hatched one of what is uncertain.
 """
 
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,8 +22,8 @@ from linkwise.study.comparisons import Compared
 from linkwise.study.deviation_columns import fitting_values
 from linkwise.study.deviations import Deviations, deviations
 from linkwise.study.figure_units import in_unit
-from linkwise.study.plan import PaperFigure
-from linkwise.study.spread import Spread, columns_of_trials, spread, values_of
+from linkwise.study.plan import NARROW, PaperFigure
+from linkwise.study.spread import FILLED, FILLED_OF_ONE, Spread, columns_of_trials, spread, values_of
 from linkwise.study.summary import TrialSummary, words_of_trials
 
 MOST = 12
@@ -30,13 +31,6 @@ MOST = 12
 WIDE, HIGH = 3.4, 2.3
 """Width and height of a panel in inches; two stand side by side."""
 MM = 1 / 25.4
-NARROW = 120.0
-"""Width in mm below which panels stand below each other."""
-FILLED = {"deviation": "filled: ± sd between subjects", "range": "filled: range of subjects"}
-FILLED_OF_ONE = {
-    "deviation": "filled: ± sd over trials of one subject",
-    "range": "filled: range of trials of one subject",
-}
 DOTS_OF_ONE = "dots: trials of one subject; bars: ± sd over them"
 HATCHED = {
     "within": "hatched: ± sd within a trial,\nby what is uncertain",
@@ -44,6 +38,8 @@ HATCHED = {
     "new": "hatched: ± sd of a new subject's truth,\nspread and uncertainty together",
 }
 """Kinds of bands, as a legend calls them."""
+LETTERS, MARGIN, LONGEST = 13, 0.8, 110
+"""Letters of a title on an inch, inches beside a panel, and most letters of a title."""
 EDGE = 0.5
 """Width of a hatched band's lines in points."""
 HATCHES = ("////", "\\\\\\\\", "||||", "----")
@@ -208,8 +204,10 @@ def _panel(axis: Any, panel: BandPanel, figure: PaperFigure, words: Mapping[str,
             _curve(axis, number, level, found, figure.band)
             if key in panel.uncertain and figure.hatched != "none":
                 _hatched(axis, number, found, getattr(panel.uncertain[key], figure.hatched))
-    told = column_title(panel.column, words)
-    axis.set_title(drawn(figure.names.get(panel.column, told.title), 58), fontsize=9)
+    told = column_title(panel.column, words, panel.unit)
+    room = int((axis.figure.get_figwidth() / axis.get_gridspec().ncols - MARGIN) * LETTERS)
+    title = textwrap.fill(drawn(figure.names.get(panel.column, told.title), LONGEST), room)
+    axis.set_title(title, fontsize=9)
     axis.set_ylabel(told.unit(panel.unit))
     if next(iter(panel.levels.values())).each.shape[1] == 1:
         axis.set_xticks(range(len(panel.levels)), [drawn(figure.named(one)) for one in panel.levels])
