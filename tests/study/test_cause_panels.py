@@ -79,6 +79,7 @@ def test_in_one_column_of_a_journal_nothing_covers_anything(drawn_of: Any) -> No
     first, second = figure.axes
     boxes = [axis.get_tightbbox() for axis in (first, second)]
     assert boxes[0].y0 >= boxes[1].y1 - 1  # below each other, axes' labels and the legend included
+    assert first.get_ylim() == second.get_ylim()
     note = figure._supxlabel.get_window_extent()
     assert note.y1 <= second.get_legend().get_window_extent().y0
     for box in (*boxes, note):

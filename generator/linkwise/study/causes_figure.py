@@ -115,7 +115,7 @@ def drawn_causes(
         for axis in panels if is_narrow else panels[:1]:
             axis.set_ylabel(row.unit if said is None else f"{row.unit}\n{said.signs}")
         marked = [(axis, _clusters(row, level, figure, tests)) for level, axis in there]
-        _make_room([axis for axis, _ in marked], max(len(some) for _, some in marked), not is_narrow)
+        _make_room([axis for axis, _ in marked], max(len(some) for _, some in marked))
         for axis, some in marked:
             _mark(axis, some, looks)
             marks += len(some)
@@ -221,11 +221,13 @@ def _clusters(
     ]
 
 
-def _make_room(axes: Sequence[Any], marks: int, is_shared: bool) -> None:
-    """Keep the lowest part of panels for marks, so that these hide no curve."""
-    for axis in axes[:1] if is_shared else axes:
-        low, high = axis.get_ylim()
-        axis.set_ylim(low - (high - low) * MARK * marks / (1 - MARK * marks) if marks else low, high)
+def _make_room(axes: Sequence[Any], marks: int) -> None:
+    """Give the panels of a joint one range, and keep its lowest part for marks, so that these hide no curve."""
+    ranges = [axis.get_ylim() for axis in axes]
+    low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
+    floor = MARK * marks
+    for axis in axes:
+        axis.set_ylim(low - (high - low) * floor / (1 - floor), high)
 
 
 def _mark(axis: Any, marks: Sequence[tuple[str, Sequence[Cluster]]], looks: Mapping[str, Any]) -> None:
