@@ -222,7 +222,7 @@ def _clusters(
 
 
 def _make_room(axes: Sequence[Any], marks: int) -> None:
-    """Give the panels of a joint one range, and keep its lowest part for marks, so that these hide no curve."""
+    """Give a joint's panels one range, and keep its lowest part for marks, so that these hide no curve."""
     ranges = [axis.get_ylim() for axis in axes]
     low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
     floor = MARK * marks
