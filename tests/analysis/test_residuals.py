@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from helpers.command_line import run_linkwise
 from helpers.motion_logs import LEG, PLANAR3, smooth, write_csv
-from linkwise import LinkwiseError, Load, generate, read_system, write_package
+from linkwise import LinkwiseError, Load, Lowpass, Processing, generate, read_system, write_package
 from linkwise.analysis import Analysis, analyze
 from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.show.page import page_data
 
 LEGS = ["pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r"]
+SHOWN = ["pelvis forward", "pelvis up", "pelvis posterior tilt", "right hip", "right knee", "right ankle"]
+"""Names of these in figures."""
 FORCE = np.array([30.0, 600.0, 0.0])
 
 
@@ -74,10 +76,10 @@ def height_of(y: Any, tilt: Any, hip: Any, knee: Any, ankle: Any) -> Any:
 
 def test_figures_begin_with_a_joint_and_draw_residuals_below_the_others(pushed: Analysis) -> None:
     pytest.importorskip("matplotlib")
-    assert "hip_flexion_r" in pushed.figure("causes").get_suptitle()
+    assert "What loads the right hip" in pushed.figure("causes").get_suptitle()
     shares = pushed.figure("shares")
     names = [text.get_text() for text in shares.axes[0].get_yticklabels()]
-    assert names == [*LEGS[3:], *(f"residual {name}" for name in LEGS[:3])]
+    assert names == [*SHOWN[3:], *(f"residual {name}" for name in SHOWN[:3])]
     widths = [bar.patches[0].get_width() for bar in shares.axes[0].containers]
     hip = np.abs(pushed.gravity[:, 3].sum(axis=1)).mean()
     every = [np.abs((pushed.acceleration + pushed.velocity)[:, 3, :, k].sum(1)).mean() for k in range(6)]
@@ -85,8 +87,8 @@ def test_figures_begin_with_a_joint_and_draw_residuals_below_the_others(pushed: 
     assert widths[0] == pytest.approx(100 * hip / whole)
     power = pushed.figure("power")
     shown = [text.get_text() for text in power.axes[1].get_yticklabels()]
-    assert shown == LEGS[3:]
-    assert "Left out, as nothing drives these: pelvis_tx" in power.get_supxlabel()
+    assert shown == SHOWN[3:]
+    assert "Left out, as nothing drives these: pelvis forward" in power.get_supxlabel()
     data = json.loads(page_data(pushed))
     assert [joint["residual"] for joint in data["joints"]] == [True] * 3 + [False] * 3
     assert len(data["residuals"]) == 2
@@ -119,3 +121,48 @@ def test_the_command_tells_residuals_and_how_to_say_otherwise(leg: Path, tmp_pat
     assert "where motors do, add --unactuated none" in told
     driven = run_linkwise(*given, "--out", "driven", "--unactuated", "none", folder=tmp_path).stdout
     assert "residuals" not in driven
+
+
+def test_cutoffs_name_joints_and_list_residuals_last(leg: Path) -> None:
+    pytest.importorskip("matplotlib")
+    filtered = Processing(lowpass=Lowpass(6.0))
+    result = analyze(leg / "log.csv", leg / "leg", processing=filtered, cutoff_sweep=(4.0, 12.0, 3))
+    sweep = result.cutoff_sweep
+    assert sweep is not None
+    every = [sweep.columns[row].joint in (0, 1, 2) for row in sweep.listed.tolist()]
+    assert 0 < sum(every) < len(every)
+    assert every == sorted(every)
+    at = [next(row for row, one in enumerate(sweep.columns) if one.name == f"tau/{name}") for name in LEGS]
+    changes = dict(zip(LEGS, np.abs(sweep.change[at]), strict=True))
+    largest = max(LEGS[3:], key=changes.__getitem__)
+    assert f"joint torques by up to {100 * changes[largest]:.3g} % ({largest})" in sweep.sentence
+    figure = result.figure("cutoff")
+    titles = [axis.get_title("left") for axis in figure.axes[::2]]
+    assert titles == [
+        f"{name}:\nroot mean square" for name in [*SHOWN[3:], *(f"residual {one}" for one in SHOWN[:3])]
+    ]
+    assert [axis.lines[0].get_label() for axis in figure.axes[::2]] == ["joint torque"] * 3 + ["residual"] * 3
+    assert "Residuals stand last" in figure.get_supxlabel()
+
+
+def test_shares_without_a_certain_sign_begin_with_joints(leg: Path) -> None:
+    (leg / "bodies.toml").write_text('schema = 1\n[all]\nmass = "20 %"\ncentre = "20 mm"\n', encoding="utf-8")
+    signs = analyze(leg / "log.csv", leg / "leg", uncertain=leg / "bodies.toml").signs
+    every = [share.column.joint in (0, 1, 2) for share in signs.uncertain]
+    assert 0 < sum(every) < len(every)
+    assert every == sorted(every)
+    sizes = [abs(share.value) for share in signs.uncertain[: every.count(False)]]
+    assert sizes == sorted(sizes, reverse=True)
+    assert any(f"asked {name} for" in signs.sentence for name in LEGS[3:])
+
+
+def test_the_energy_figure_calls_a_base_s_coordinates_residuals(leg: Path) -> None:
+    pytest.importorskip("matplotlib")
+    result = analyze(leg / "log.csv", leg / "leg", induced_power=True)
+    figure = result.figure("energy")
+    told = [text.get_text() for axis in figure.axes for text in axis.texts]
+    assert "through residuals" in told
+    note = figure.get_supxlabel().replace("\n", " ")
+    assert "residuals: pelvis forward, pelvis up, pelvis posterior tilt, which nothing drives" in note
+    paper = result.figure("paper").get_supxlabel().replace("\n", " ")
+    assert "Torques of pelvis forward, pelvis up, pelvis posterior tilt are residuals" in paper

@@ -94,7 +94,11 @@ def test_without_cycles_means_stand_beside_each_other(drawn: list[Any], tmp_path
 @pytest.mark.parametrize(
     ("columns", "message"),
     [
-        ('["causes:joint9"]', r"has 'tau_by/joint9/\*', which no column is called"),
+        (
+            '["causes:joint9"]',
+            r"trial 'S1-fast-1': \[\[figure\]\]: 'columns' has 'causes:joint9', and the robot has no such"
+            r" joint; nearest are 'joint1'",
+        ),
         (
             '["causes:joint1", "tau/*"]',
             "'columns' has causes:joint1 beside others; draw causes in a figure of",

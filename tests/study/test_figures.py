@@ -117,6 +117,12 @@ def test_labels_are_words_with_signs_where_all_models_agree(drawn_of: Any) -> No
     assert (axis.get_title("left"), axis.get_ylabel()) == ("hip torque", "N·m")
 
 
+def test_what_muscles_leave_of_a_torque_is_called_so(drawn_of: Any) -> None:
+    muscled = [replace(trial, units={**trial.units, "tau_before_muscles/hip": "N·m"}) for trial in trials()]
+    axis, _ = drawn_of(PaperFigure(("tau/hip",), "condition"), muscled)
+    assert axis.get_title("left") == "hip torque left by muscles"
+
+
 @pytest.mark.parametrize(
     ("keys", "told"),
     [

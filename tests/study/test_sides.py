@@ -296,3 +296,26 @@ def refuse(folder: Path, message: str) -> None:
 def test_sides_are_told_by_words_of_names(name: str, other: str, ipsi: str) -> None:
     assert (swapped(name), swapped(other)) == (other, name)
     assert neutral(name, "right") == neutral(other, "left") == ipsi
+
+
+def test_net_torques_by_cause_are_of_the_side_whose_cycle_it_is(walks: Path) -> None:
+    """Figures of causes, too, name joints by the side whose cycle it is."""
+    kept = '"tau_by/knee_ipsi/*", "tau_qdd/knee_ipsi/**", "tau_qd/knee_ipsi/**"'
+    text = (STUDY + BY_PLATES + TRIALS).replace('"**"', kept)
+    figure = '[[figure]]\ncolumns = ["causes:knee_ipsi"]\nby = "side"\n'
+    study = walks.parent / "causes.toml"
+    study.write_text(text + figure, encoding="utf-8")
+    found = run_study(study, walks.parent / "causes", Here())
+    assert (found.broken, found.warnings) == ((), ())
+    assert (walks.parent / "causes/causes-knee_ipsi.svg").is_file()
+    for side in ("left", "right"):
+        table = samples(walks.parent / "causes", f"as-is-{side}")
+        for cause in ("flex_ipsi", "turn"):
+            parts = table.filter(regex=f"^tau_qdd?/knee_ipsi/[^/]+/{cause}$").sum(axis=1)
+            np.testing.assert_allclose(table[f"tau_by/knee_ipsi/{cause}"], parts, rtol=0, atol=1e-9)
+        assert np.abs(table["tau_by/knee_ipsi/flex_ipsi"]).max() > 0.5
+    study.write_text(text + figure.replace("knee_ipsi", "knee_l"), encoding="utf-8")
+    with pytest.raises(
+        LinkwiseError, match=r"has 'causes:knee_l', and the robot has no .* nearest are 'knee_"
+    ):
+        run_study(study, walks.parent / "causes", Here())

@@ -90,6 +90,8 @@ class CertainSigns:
     links: tuple[str, ...]
     is_gradient: bool = False
     """True if torques by velocity are of the gradient convention, which counts them twice."""
+    residuals: frozenset[int] = frozenset()
+    """Numbers of the joints that nothing drives, which are told after the others."""
 
     @property
     def shares(self) -> tuple[LargestTorque, ...]:
@@ -106,10 +108,9 @@ class CertainSigns:
 
     @property
     def uncertain(self) -> tuple[LargestTorque, ...]:
-        """Shares whose sign is not certain, the largest first."""
-        return tuple(
-            sorted((p for p in self.shares if not p.is_certain), key=lambda p: abs(p.value), reverse=True)
-        )
+        """Shares whose sign is not certain, the largest first, of residuals last."""
+        found = (p for p in self.shares if not p.is_certain)
+        return tuple(sorted(found, key=lambda p: (p.column.joint in self.residuals, -abs(p.value))))
 
     @property
     def sentence(self) -> str:
@@ -117,7 +118,7 @@ class CertainSigns:
         for quantity, what in (("tau_qd", "velocity"), ("tau_qdd", "acceleration")):
             certain = [p for p in self.shares if p.column.quantity == quantity and p.is_certain]
             if certain:
-                told = max(certain, key=lambda p: abs(p.value))
+                told = max(certain, key=lambda p: (p.column.joint not in self.residuals, abs(p.value)))
                 column = told.column
                 assert column.joint is not None
                 assert column.link is not None
@@ -140,7 +141,9 @@ class CertainSigns:
         if not unsure:
             told = f"all {count} shares have a certain sign where they are largest"
         shown = ", ".join(
-            f"{p.column.name} {plus_minus(p.value, p.deviation)} {p.column.unit}" for p in unsure[:SHOWN]
+            f"{p.column.name}{' (residual)' * (p.column.joint in self.residuals)}"
+            f" {plus_minus(p.value, p.deviation)} {p.column.unit}"
+            for p in unsure[:SHOWN]
         )
         more = f" and {len(unsure) - SHOWN} more" if len(unsure) > SHOWN else ""
         yield f"{told}{': ' if shown else ''}{shown}{more}"

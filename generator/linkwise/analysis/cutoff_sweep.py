@@ -74,6 +74,8 @@ class CutoffSweep:
     """Times of these in s, (R, C)."""
     joints: tuple[str, ...]
     links: tuple[str, ...]
+    residuals: frozenset[int] = frozenset()
+    """Numbers of the joints that nothing drives, listed after the others and never the largest."""
 
     def __getitem__(self, name: str) -> tuple[Array, Array, Array]:
         """Return root mean squares, values of largest magnitude and their times, (C,) each, of a column.
@@ -118,7 +120,7 @@ class CutoffSweep:
 
     @cached_property
     def listed(self) -> Index:
-        """Numbers of the rows of shares by one cause, those first that change most.
+        """Numbers of the rows of shares by one cause, those first that change most, of residuals last.
 
         Those below a thousandth of their joint's largest torque at every cutoff are left out.
         """
@@ -132,7 +134,7 @@ class CutoffSweep:
             for row in self.order.tolist()
             if self.columns[row].quantity in SHARES and largest[row] > SMALL * most[self.columns[row].joint]
         ]
-        return np.array(kept, np.intp)
+        return np.array(sorted(kept, key=self._is_residual), np.intp)
 
     @property
     def span(self) -> str:
@@ -153,7 +155,7 @@ class CutoffSweep:
     def sentence(self) -> str:
         """Sentence on how much joint torques and shares depend on the cutoff."""
         torques = [row for row in self.order.tolist() if self.columns[row].quantity == "tau"]
-        torques = [row for row in torques if self._is_large(row)]
+        torques = sorted((row for row in torques if self._is_large(row)), key=self._is_residual)
         if not torques or not len(self.listed):
             return ""
         whole, share = torques[0], int(self.listed[0])
@@ -170,6 +172,9 @@ class CutoffSweep:
         joint = self.columns[row].joint
         assert joint is not None
         return self.joints[joint]
+
+    def _is_residual(self, row: int) -> bool:
+        return self.columns[row].joint in self.residuals
 
     def _is_large(self, row: int) -> bool:
         """Return whether a joint's torque is more than next to nothing beside the largest in its unit."""

@@ -4,12 +4,14 @@ A coordinate's motion is one cause, its acceleration and its velocity together. 
 all causes sum to the joint's torque.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
+from urllib.parse import unquote
 
 from linkwise_runtime.motion.trace_equations import BETWEEN, LOAD, SHARE
 
 from linkwise.analysis.loads.placed import PlacedLoad
+from linkwise.analysis.motion_words import MotionWords, shown_joints
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_quantities import MOTION, PASSIVE
 
@@ -58,14 +60,18 @@ def _name(cause: NetCause, robot: OpenedRobot, loads: Sequence[PlacedLoad]) -> s
     return cause.quantity.removeprefix("tau_")
 
 
-def label_of(name: str) -> str:
-    """Return a cause in words, from its name in columns."""
-    kind, between, rest = name.replace("%2F", "/").partition(BETWEEN)
+def label_of(name: str, words: Mapping[str, MotionWords]) -> str:
+    """Return a cause in words, from its name in columns.
+
+    words: words of coordinates, by name
+    """
+    kind, between, rest = unquote(name).partition(BETWEEN)
     if between and kind in (LOAD, SHARE):
         return f"load {rest}" if kind == LOAD else rest
     if kind == "gravity" or f"tau_{kind}" in PASSIVE:
         return kind if kind == "gravity" else f"own {kind}"
-    return f"{rest if kind == 'motion' and between else name.replace('%2F', '/')} motion"
+    moved = rest if kind == "motion" and between else unquote(name)
+    return f"{shown_joints([moved], words)[0]} motion"
 
 
 def cause_of(quantity: str, at: Sequence[int]) -> NetCause | None:

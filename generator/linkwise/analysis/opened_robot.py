@@ -234,6 +234,15 @@ class OpenedRobot:
         return tuple(i for i in self.driven if i not in self.residuals) or self.driven
 
     @property
+    def residuals_apart(self) -> frozenset[int]:
+        """Numbers of the joints that are told as residuals, after all others; none if there are no others."""
+        return frozenset(self.driven) - frozenset(self.moving_itself)
+
+    def named_apart(self, name: str, i: int) -> str:
+        """Return a name of joint i for people: "residual pelvis up" where nothing drives it."""
+        return f"residual {name}" if i in self.residuals_apart else name
+
+    @property
     def joints_apart(self) -> tuple[int, ...]:
         """Numbers of the joints that have torques, those that are residuals last."""
         return tuple(dict.fromkeys((*self.moving_itself, *self.driven)))

@@ -106,7 +106,8 @@ class AnalysisResult(WholeMovement):
     def signs(self) -> CertainSigns:
         """Shares with their deviations at their largest magnitude, and whose sign is certain."""
         gradient = self.processing.convention == "gradient"
-        return CertainSigns(self.peaks, self.robot.joints, self.robot.links, gradient)
+        robot = self.robot
+        return CertainSigns(self.peaks, robot.joints, robot.links, gradient, robot.residuals_apart)
 
     @property
     def time(self) -> Array:

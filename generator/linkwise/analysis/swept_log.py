@@ -79,7 +79,8 @@ class SweptLog:
         places = np.array(cutoffs)
         low, high = (int(np.abs(places - end).argmin()) for end in (asked.low, asked.high))
         numbers = cutoffs.index(mine), low, high
-        return CutoffSweep(own.columns, places, *numbers, rms, peak, time, robot.joints, robot.links)
+        names = robot.joints, robot.links, robot.residuals_apart
+        return CutoffSweep(own.columns, places, *numbers, rms, peak, time, *names)
 
     def _sizes(self, cutoff: float, progress: Progress) -> tuple[Array, Array, Array]:
         """Return what `RowSizes` tells of the log filtered at another cutoff."""

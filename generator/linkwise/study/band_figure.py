@@ -3,6 +3,7 @@
 A filled band is of the spread between subjects, a hatched one of what is uncertain.
 """
 
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,8 +22,8 @@ from linkwise.study.comparisons import Compared
 from linkwise.study.deviation_columns import fitting_values
 from linkwise.study.deviations import Deviations, deviations
 from linkwise.study.figure_units import in_unit
-from linkwise.study.plan import PaperFigure
-from linkwise.study.spread import OF_ONE, Spread, columns_of_trials, spread, values_of
+from linkwise.study.plan import NARROW, PaperFigure
+from linkwise.study.spread import FILLED, Spread, columns_of_trials, spread, values_of
 from linkwise.study.summary import TrialSummary, words_of_trials
 
 MOST = 12
@@ -30,9 +31,6 @@ MOST = 12
 WIDE, HIGH = 3.4, 2.3
 """Width and height of a panel in inches; two stand side by side."""
 MM = 1 / 25.4
-NARROW = 120.0
-"""Width in mm below which panels stand below each other."""
-FILLED = {"deviation": "filled: ± sd between subjects", "range": "filled: range of subjects"}
 DOTS_OF_ONE = "dots: trials of one subject; bars: ± sd over them"
 HATCHED = {
     "within": "hatched: ± sd within a trial,\nby what is uncertain",
@@ -40,6 +38,8 @@ HATCHED = {
     "new": "hatched: ± sd of a new subject's truth,\nspread and uncertainty together",
 }
 """Kinds of bands, as a legend calls them."""
+LETTERS, MARGIN, LONGEST = 13, 0.8, 110
+"""Letters of a title on an inch, inches beside a panel, and most letters of a title."""
 EDGE = 0.5
 """Width of a hatched band's lines in points."""
 HATCHES = ("////", "\\\\\\\\", "||||", "----")
@@ -56,6 +56,8 @@ class BandPanel:
     tests: tuple[Compared, ...]
     uncertain: dict[str, Deviations]
     """Deviations by level, of curves that have some."""
+    is_left_by_muscles: bool = False
+    """True for a joint torque that is what muscles leave."""
 
 
 def band_figures(
@@ -101,7 +103,15 @@ def panels_of(
     trials = converted(figure, trials)
     known = columns_of_trials(trials)
     asked = figure_columns(figure, known)
-    panels = [BandPanel(name, known[name], *_levels(figure, trials, name, tests)) for name in asked]
+    panels = [
+        BandPanel(
+            name,
+            known[name],
+            *_levels(figure, trials, name, tests),
+            name.startswith("tau/") and name.replace("tau", "tau_before_muscles", 1) in known,
+        )
+        for name in asked
+    ]
     if figure.hatched in ("mean", "new") and not any(panel.uncertain for panel in panels):
         raise LinkwiseError(
             f"[[figure]]: 'hatched' is {figure.hatched!r}, and no curve has deviations; give all trials the"
@@ -182,7 +192,7 @@ def _kinds_of_bands(figure: PaperFigure, panels: Sequence[BandPanel]) -> list[tu
     is_hatched = figure.hatched != "none" and any(panel.uncertain for panel in panels)
     kinds = []
     if figure.band in FILLED and (is_hatched or of_one):
-        text = f"filled: {OF_ONE[figure.band]}" if of_one else FILLED[figure.band]
+        text = (FILLED_OF_ONE if of_one else FILLED)[figure.band]
         if of_one and of_one[0].each.shape[1] == 1:
             kinds.append(
                 (extra("matplotlib.lines").Line2D([], [], color=INK, marker="o", linewidth=0), DOTS_OF_ONE)
@@ -204,8 +214,11 @@ def _panel(axis: Any, panel: BandPanel, figure: PaperFigure, words: Mapping[str,
             _curve(axis, number, level, found, figure.band)
             if key in panel.uncertain and figure.hatched != "none":
                 _hatched(axis, number, found, getattr(panel.uncertain[key], figure.hatched))
-    told = column_title(panel.column, words)
-    axis.set_title(drawn(figure.names.get(panel.column, told.title), 58), fontsize=9)
+    told = column_title(panel.column, words, panel.unit)
+    title = f"{told.title} left by muscles" if panel.is_left_by_muscles else told.title
+    room = int((axis.figure.get_figwidth() / axis.get_gridspec().ncols - MARGIN) * LETTERS)
+    title = textwrap.fill(drawn(figure.names.get(panel.column, title), LONGEST), room)
+    axis.set_title(title, fontsize=9)
     axis.set_ylabel(told.unit(panel.unit))
     if next(iter(panel.levels.values())).each.shape[1] == 1:
         axis.set_xticks(range(len(panel.levels)), [drawn(figure.named(one)) for one in panel.levels])

@@ -27,7 +27,7 @@ from linkwise.study.plan import SIDES, Cycles, StudyPlan, Trial
 from linkwise.study.summary import RunningMoments
 
 AT_ONCE = 1 << 18
-MARGIN = 3
+MARGIN = 12
 """Samples beyond a cycle's ends that its splines use."""
 Span = tuple[float, float]
 

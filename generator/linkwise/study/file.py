@@ -29,6 +29,7 @@ from linkwise.study.plan import (
     Trial,
 )
 from linkwise.study.plan_checks import check_plan
+from linkwise.study.sides import of_either_side
 from linkwise.study.subjects import SubjectSize, read_subjects
 from linkwise.study.summary import STATISTICS
 from linkwise.study.told_keys import by_keys
@@ -110,6 +111,8 @@ def read_study(path: Path, trust_python: bool = False) -> StudyPlan:
 def _with_nets(trial: Trial, nets: tuple[str, ...]) -> Trial:
     """Return the trial with net torques by cause among what it computes, where the study asks for some."""
     outputs = trial.choices.outputs
+    if trial.side:
+        nets = tuple(dict.fromkeys(map(of_either_side, nets)))
     columns = (*(outputs.columns or ("all",)), *nets) if nets else outputs.columns
     return replace(trial, choices=replace(trial.choices, outputs=replace(outputs, columns=columns)))
 

@@ -29,6 +29,8 @@ OF_FILES = tuple(one.key for one in written(AnalysisChoices) if one.option.is_fi
 """Choices that are paths of files."""
 WIDTHS = {"single": "90 mm", "double": "180 mm"}
 """Widths of figures over one and over two columns of a journal."""
+NARROW = 120.0
+"""Width in mm below which panels stand below each other."""
 CAUSES = "causes:"
 """Beginning of what a figure names in place of columns: what loads the joint that follows."""
 Normalise = Literal["", "none", "mass", "weight*height"]
@@ -141,6 +143,11 @@ class PaperFigure:
             raise LinkwiseError(
                 f"[[figure]]: 'size' is {self.size!r}; give single or double, or a width of 40 to 500 mm, as"
                 " 120 mm"
+            )
+        if self.joints and self.hatched in ("mean", "new"):
+            raise LinkwiseError(
+                f"[[figure]]: 'hatched' is {self.hatched!r}, and figures of causes have no hatched bands;"
+                f" draw columns such as {self.patterns[0]!r}, or leave it out"
             )
         if 0 < len(self.joints) < len(self.columns):
             raise LinkwiseError(

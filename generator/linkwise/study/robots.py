@@ -5,12 +5,13 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
+from linkwise_runtime.chosen_names import nearest_first
 from linkwise_runtime.version import VERSION
 
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.errors import LinkwiseError, within
-from linkwise.escape import listed
+from linkwise.escape import listed, short
 from linkwise.package.manifest import FILE, Manifest
 from linkwise.package_cache import KeptPackage, kept_package
 from linkwise.pipeline import PYTHON
@@ -19,7 +20,8 @@ from linkwise.robot import is_description
 from linkwise.robot.read import most_bytes
 from linkwise.study.normalised import check_mass
 from linkwise.study.paths import is_address, opened_here, require_there, told_of, version_of
-from linkwise.study.plan import StudyPlan
+from linkwise.study.plan import CAUSES, RIGHT, StudyPlan
+from linkwise.study.sides import neutral
 
 ROBOTS = 4
 """Most robots that a worker keeps in memory: trials of one subject follow one another."""
@@ -42,6 +44,7 @@ def check_robots(plan: StudyPlan, progress: Progress) -> tuple[str, ...]:
             manifest = Manifest.read(kept.directory)
             if first is not None:
                 _compare(first, robot, manifest)
+            _check_figures(plan, [joint.name for joint in manifest.joints])
             check_mass(plan, robot, () if manifest.tree is None else manifest.tree.links)
         first = first or (robot, manifest)
     progress("robots", len(robots), len(robots))
@@ -50,6 +53,18 @@ def check_robots(plan: StudyPlan, progress: Progress) -> tuple[str, ...]:
 
 def _owner(plan: StudyPlan, robot: str) -> str:
     return f"trial {next(trial.name for trial in plan.trials if trial.robot == robot)!r}"
+
+
+def _check_figures(plan: StudyPlan, joints: Sequence[str]) -> None:
+    """Raise LinkwiseError for a figure of what loads a joint that the robot does not have."""
+    is_sided = plan.cycles is not None and plan.cycles.sides != ""
+    known = list(dict.fromkeys(neutral(name, RIGHT) if is_sided else name for name in joints))
+    for joint in (joint for figure in plan.figures for joint in figure.joints):
+        if joint not in known:
+            raise LinkwiseError(
+                f"[[figure]]: 'columns' has {short(f'{CAUSES}{joint}', 80)!r}, and the robot has no such"
+                f" joint; nearest are {listed(map(repr, nearest_first(joint, known)))}"
+            )
 
 
 def package_of(robot: str, plan: StudyPlan) -> KeptPackage:

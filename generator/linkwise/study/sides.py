@@ -33,6 +33,8 @@ WORD = re.compile(
     r"|(?<=[a-z0-9])(Right|Left|R|L)(?![A-Za-z0-9])"  # kneeRight, kneeR
 )
 """A word of a side, by itself, or where capitals part words."""
+TOLD = re.compile(r"(?<![A-Za-z0-9])(?:ipsi|contra)(?![a-z0-9])|(?<=[a-z0-9])(?:Ipsi|Contra)(?![A-Za-z0-9])")
+"""Word of a name that stands for a side in a cycle."""
 TURNING = ("q", "qd", "qdd", "tau")
 """Beginnings of quantities along a coordinate, which change sign with it."""
 PLAIN = ("time", "power", "flow", "gain", "energy", "kinetic", "contact")
@@ -52,6 +54,11 @@ def neutral(name: str, side: str) -> str:
         return told.capitalize() if found[3] else told
 
     return WORD.sub(word, name)
+
+
+def of_either_side(pattern: str) -> str:
+    """Return a pattern with * in the place of sides, which fits a trial's own columns of both."""
+    return WORD.sub("*", TOLD.sub("*", pattern))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,11 +10,12 @@ from linkwise.study.plan import SUBJECT
 from linkwise.study.summary import STATISTICS, TrialSummary
 
 MEAN = STATISTICS.index("mean")
-OF_ONE = {
-    "deviation": "± sd over trials of one subject",
-    "range": "range of trials of one subject",
+FILLED = {"deviation": "filled: ± sd between subjects", "range": "filled: range of subjects"}
+FILLED_OF_ONE = {
+    "deviation": "filled: ± sd over trials of one subject",
+    "range": "filled: range of trials of one subject",
 }
-"""Kinds of bands where trials of one subject stand in place of subjects."""
+"""Filled bands, as a figure tells of them: of subjects, or of one subject's trials."""
 
 
 @dataclass(frozen=True, eq=False)

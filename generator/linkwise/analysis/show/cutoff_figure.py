@@ -44,6 +44,7 @@ def cutoff(result: AnalysisResult, _: int) -> "Figure":
         "Sizes are over the whole movement; the upright line is at the cutoff of"
         f" {sweep.cutoffs[sweep.own]:.4g} Hz, where the log is analysed. Of each joint the {MOST} largest"
         " shares are drawn, through one link, by one cause.",
+        *(["Residuals stand last: nothing drives these."] if result.robot.residuals_apart else []),
         *([f"Not drawn, as their shares change less: {listed(left_out)}."] if left_out else []),
         result.provenance,
     )
@@ -51,11 +52,12 @@ def cutoff(result: AnalysisResult, _: int) -> "Figure":
 
 
 def _chosen(result: AnalysisResult, sweep: CutoffSweep) -> list[int]:
-    """Return the joints that are drawn, in their order."""
+    """Return the joints that are drawn, in their order, residuals last."""
     driven = list(result.robot.driven)
     first = dict.fromkeys(sweep.columns[row].joint for row in sweep.listed.tolist())
     ranked = [*(i for i in first if i in driven), *(i for i in driven if i not in first)]
-    return sorted(i for i in ranked[:JOINTS] if i is not None)
+    kept = ranked[:JOINTS]
+    return [i for i in result.robot.joints_apart if i in kept]
 
 
 def _joint(result: AnalysisResult, sweep: CutoffSweep, i: int, left: Any, right: Any) -> None:
@@ -63,9 +65,10 @@ def _joint(result: AnalysisResult, sweep: CutoffSweep, i: int, left: Any, right:
     columns = sweep.columns
     whole = next(row for row, c in enumerate(columns) if c.quantity == "tau" and c.joint == i)
     shares = np.array([r for r, c in enumerate(columns) if c.quantity in SHARES and c.joint == i], np.intp)
+    whole_label = "residual" if i in result.robot.residuals_apart else "joint torque"
     for place, row in enumerate([whole, *_largest(sweep, shares)]):
         column = columns[row]
-        look: dict[str, Any] = {"color": INK, "linewidth": 2.2, "label": "joint torque"}
+        look: dict[str, Any] = {"color": INK, "linewidth": 2.2, "label": whole_label}
         if row != whole:
             look = {"label": _label(result, sweep, column), "linestyle": LOOKS.get(column.quantity, "dotted")}
             moves = column.quantity in LOOKS and column.cause is not None
@@ -77,7 +80,8 @@ def _joint(result: AnalysisResult, sweep: CutoffSweep, i: int, left: Any, right:
         panel.axvline(sweep.cutoffs[sweep.own], color=INK, linewidth=0.8, zorder=0)
         panel.set_ylim(bottom=0.0)
         _frequencies(panel, sweep)
-    left.set_title(f"{drawn(result.robot.figure_joints[i])}: root mean square")
+    name = result.robot.named_apart(drawn(result.robot.figure_joints[i]), i)
+    left.set_title(f"{name}:\nroot mean square")
     right.set_title("largest magnitude")
     left.set_ylabel(columns[whole].unit)
     right.legend(loc="upper left", bbox_to_anchor=(1.01, 1.05), fontsize=7, handlelength=3)

@@ -28,6 +28,7 @@ from linkwise.analysis.show.energy_segments import (
     segments_of,
     work_of_segments,
 )
+from linkwise.escape import listed
 from linkwise.extras import extra
 from linkwise.plotstyle import INK, drawn
 
@@ -71,11 +72,12 @@ def energy(result: AnalysisResult, phase: int) -> "Figure":
     _legend(figure.add_subplot(grid[1, :]), right, bool(widest))
     write_title(figure, result, "How energy flows")
     tied = result.robot.constrained is not None
-    write_note(figure, _note(lanes, flows, widest, tied), *bands.notes, foot(result))
+    residuals = [drawn(result.robot.figure_joints[i]) for i in sorted(result.robot.residuals_apart)]
+    write_note(figure, _note(lanes, flows, widest, tied, residuals), *bands.notes, foot(result))
     return figure
 
 
-def _note(lanes: SegmentLanes, flows: SegmentFlows, widest: float, tied: bool) -> str:
+def _note(lanes: SegmentLanes, flows: SegmentFlows, widest: float, tied: bool, residuals: list[str]) -> str:
     told = ["lanes: kinetic and potential energy above its least, all by one scale"]
     if widest:
         step = flows.time[1] - flows.time[0]
@@ -83,6 +85,8 @@ def _note(lanes: SegmentLanes, flows: SegmentFlows, widest: float, tied: bool) -
     left_out = len(lanes.every) - len(lanes.shown)
     if left_out:
         told.append(f"{left_out} segments that less work was done on are left out")
+    if residuals:
+        told.append(f"residuals: {listed(residuals)}, which nothing drives")
     if tied:
         told.append("what ties carry to a segment counts as if it came through its joints")
     return " · ".join(told)

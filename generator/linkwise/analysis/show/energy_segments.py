@@ -160,6 +160,8 @@ def _others(result: AnalysisResult, net: Mapping[str, Array], is_jointed: bool) 
 
 
 def joints_label(robot: OpenedRobot, segment: Segment) -> str:
-    """Return the names of the joints of a segment: the first and the last of several."""
+    """Return the names of a segment's joints: the first and the last of several; "residuals" for those."""
+    if robot.residuals_apart.issuperset(segment.joints):
+        return "residuals"
     names = [robot.figure_joints[i] for i in segment.joints]
     return names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}"

@@ -174,7 +174,7 @@ def _joints(result: AnalysisResult) -> list[dict[str, Any]]:
     return [
         {
             "name": printable(robot.joints[i]),
-            "shown": printable(robot.plot_joints[i]),
+            "shown": printable(robot.figure_joints[i]),
             "unit": robot.units[i],
             "residual": i not in robot.moving_itself,
         }

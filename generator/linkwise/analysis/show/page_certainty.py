@@ -44,12 +44,12 @@ def _share(result: AnalysisResult, peak: LargestTorque) -> dict[str, Any]:
     """Return a share in words, with its largest value and the time of it."""
     column, robot = peak.column, result.robot
     kind = {"tau_qd": "velocity of ", "tau_qdd": "acceleration of "}.get(column.quantity, "gravity")
-    cause = "" if column.cause is None else robot.plot_joints[column.cause]
+    cause = "" if column.cause is None else robot.figure_joints[column.cause]
     assert column.joint is not None
     assert column.link is not None
     return {
         "cause": printable(kind + cause),
-        "joint": printable(robot.plot_joints[column.joint]),
+        "joint": printable(robot.named_apart(robot.figure_joints[column.joint], column.joint)),
         "link": printable(robot.plot_links[column.link]),
         "value": f"{plus_minus(peak.value, peak.deviation)} {column.unit}",
         "time": peak.time,

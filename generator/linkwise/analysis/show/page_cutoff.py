@@ -34,6 +34,8 @@ def _share(result: AnalysisResult, sweep: CutoffSweep, row: int) -> list[str]:
     rms = [f"{size:.3g}" for size in sweep.rms[row, ends]]
     peaks = ", ".join(f"{size:.3g}" for size in sweep.peak[row, ends])
     sign = " (another sign)" if sweep.changes_sign[row] else ""
-    names = [sweep.cause(column).removeprefix("the "), result.robot.plot_joints[column.joint], link]
+    robot = result.robot
+    joint = robot.named_apart(robot.figure_joints[column.joint], column.joint)
+    names = [sweep.cause(column).removeprefix("the "), joint, link]
     change = float(np.round(100 * sweep.change[row], 1))
     return [*map(printable, names), *rms, column.unit, f"{change:+.3g} %", peaks + sign]

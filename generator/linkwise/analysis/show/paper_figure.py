@@ -197,7 +197,7 @@ def _legend(axis: Any, title: str, names: Sequence[str]) -> None:
 
 
 def _left_out(result: AnalysisResult) -> str:
-    """Return a note on what the last two panels do not show."""
+    """Return a note on what the last two panels do not show, and on which torques are residuals."""
     own, robot = own_joints(result), result.robot
     others = [robot.figure_joints[at] for at in robot.driven if at not in own]
     text = "The last two panels show each link's own joint only; the table and the page have every joint."
@@ -205,4 +205,7 @@ def _left_out(result: AnalysisResult) -> str:
         text += " Bands are one standard deviation to either side."
     if others:
         text += f" Not in them, as they carry no link with mass directly: {', '.join(map(drawn, others))}."
+    if robot.residuals_apart:
+        some = ", ".join(drawn(robot.figure_joints[i]) for i in sorted(robot.residuals_apart))
+        text += f" Torques of {some} are residuals: nothing drives these."
     return text

@@ -208,10 +208,7 @@ def _unsure_patch() -> Any:
 def _loaded(result: AnalysisResult) -> list[str]:
     """Return the names of the joints that are drawn, residuals last."""
     robot = result.robot
-    kinds = ["" if i in robot.moving_itself else "residual " for i in robot.joints_apart]
-    return [
-        f"{kind}{drawn(robot.figure_joints[i])}" for kind, i in zip(kinds, robot.joints_apart, strict=True)
-    ]
+    return [robot.named_apart(drawn(robot.figure_joints[i]), i) for i in robot.joints_apart]
 
 
 def _notes(result: AnalysisResult, parts: Sequence[SharePart]) -> list[str]:
