@@ -74,7 +74,7 @@ def test_bands_of_one_subject_are_over_its_trials_and_say_so(
     kept = 'pages = false\ncolumns = ["tau/joint1"]\n'
     study = write_study(tmp_path, HEAD, kept, CHOICES, cycles, FIGURE, TRIALS, subjects=1)
     assert not run_study(study, tmp_path / "out", Here()).broken
-    assert drawn[0].get_supxlabel().endswith("\nBands: ± sd over trials of one subject.")
+    assert "Filled: ± sd over trials of one subject." in drawn[0].get_supxlabel().replace("\n", " ")
     table = pd.read_parquet(tmp_path / "out" / "trials")
     trials = table.groupby(["condition", "trial", *(["percent"] if cycles else [])], observed=True)
     spread = trials["tau/joint1"].mean().loc["slow"].groupby("percent" if cycles else lambda _: 0)

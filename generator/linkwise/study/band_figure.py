@@ -23,7 +23,7 @@ from linkwise.study.deviation_columns import fitting_values
 from linkwise.study.deviations import Deviations, deviations
 from linkwise.study.figure_units import in_unit
 from linkwise.study.plan import NARROW, PaperFigure
-from linkwise.study.spread import FILLED, Spread, columns_of_trials, spread, values_of
+from linkwise.study.spread import FILLED, FILLED_OF_ONE, Spread, columns_of_trials, spread, values_of
 from linkwise.study.summary import TrialSummary, words_of_trials
 
 MOST = 12
