@@ -43,7 +43,7 @@ def told_for(result: Analysis, names: tuple[str, ...], patch: pytest.MonkeyPatch
         largest = np.abs(result.values[rows[name].numbers]).max(axis=1, keepdims=True)
         values.append(np.broadcast_to(0.1 * largest, (len(largest), len(result.time))))
     every = np.concatenate(values)
-    totals = Totals(np.abs(every).mean(axis=1), np.abs(every).max(axis=1))
+    totals = Totals(np.abs(every).mean(axis=1), np.abs(every).max(axis=1), np.sqrt((every**2).mean(axis=1)))
     return replace(
         result, rows=ResultRows(rows.axes, rows.points, tuple(places)), values=every, totals=totals
     )
@@ -161,7 +161,7 @@ def without(result: Analysis) -> Analysis:
     """Return a result without any deviation."""
     kept = [row for row, (name, _) in enumerate(result.rows.places) if not name.startswith("sd/")]
     rows = ResultRows(result.rows.axes, result.rows.points, tuple(result.rows.places[row] for row in kept))
-    totals = Totals(result.totals.mean[kept], result.totals.peak[kept])
+    totals = Totals(result.totals.mean[kept], result.totals.peak[kept], result.totals.rms[kept])
     return replace(result, rows=rows, values=result.values[kept], totals=totals, uncertain=None, peaks=())
 
 

@@ -66,7 +66,7 @@ def test_shares_of_many_joints_are_their_own_the_largest_other_ones_and_the_rest
     monkeypatch.setattr("linkwise.analysis.show.shares_figure.MANY", 2)
     figure = analysis.figure("shares")
     assert [axis.get_title(loc="left") for axis in figure.axes[:2]] == [
-        "everything, gravity too",
+        "everything,\ngravity too",
         "the movement alone, without gravity",
     ]
     widths = np.array([[patch.get_width() for patch in bar] for bar in figure.axes[1].containers])
