@@ -123,7 +123,9 @@ def crowd_of(joints: tuple[str, ...], analysis: Analysis) -> Analysis:
             values.append(size * first)
     robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * len(joints), tree=None)
     none = np.zeros((len(joints), len(joints)))
-    totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1))
+    size = np.abs(values)
+    rms = np.sqrt(np.square(values).mean(axis=1))
+    totals = Totals(size.mean(axis=1), size.max(axis=1), rms)
     about: Any = {"robot": robot, "totals": totals, "works": {"power_link": Work(none, none)}, "total": 400}
     return replace(analysis, rows=ResultRows.of(robot, places), values=np.array(values), **about)
 
