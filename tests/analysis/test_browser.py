@@ -294,7 +294,9 @@ def crowd(place, count=14):
     ]
     torques = np.sin(np.arange(count * count)[:, None] + np.arange(40) / 9)
     values = np.vstack([analysis.values[0], torques, torques])
-    totals = Totals(np.abs(values).mean(axis=1), np.abs(values).max(axis=1), np.sqrt((values**2).mean(axis=1)))
+    totals = Totals(
+        np.abs(values).mean(axis=1), np.abs(values).max(axis=1), np.sqrt((values**2).mean(axis=1))
+    )
     given = np.arange(1.0, count * count + 1).reshape(count, count)
     works = {**analysis.works, "power_link": Work(given, given.T)}
     rows = ResultRows.of(robot, places)

@@ -49,7 +49,8 @@ def test_the_ground_bears_areas_of_links_and_lines_of_all(stance: Analysis) -> N
             panel = panels[2 * row + c]
             lines = {line.get_label(): line.get_ydata() for line in panel.get_lines()}
             if what not in "xy":
-                assert panel.get_title(loc="left") == f"torque of {what} (N·m)"
+                word = {"ankle_angle_r": "ankle", "knee_angle_r": "knee", "hip_flexion_r": "hip"}[what]
+                assert panel.get_title(loc="left") == f"torque of right {word} (N·m)"
                 np.testing.assert_array_equal(lines["found from the motion"], stance[f"tau/{what}"])
                 np.testing.assert_array_equal(lines["by what was measured"], stance[f"tau_as_loads/{what}"])
                 continue

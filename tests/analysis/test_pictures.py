@@ -67,7 +67,7 @@ def test_shares_of_many_joints_are_their_own_the_largest_other_ones_and_the_rest
     figure = analysis.figure("shares")
     assert [axis.get_title(loc="left") for axis in figure.axes[:2]] == [
         "everything,\ngravity too",
-        "the movement alone, without gravity",
+        "the movement alone,\nwithout gravity",
     ]
     widths = np.array([[patch.get_width() for patch in bar] for bar in figure.axes[1].containers])
     terms = np.stack([analysis.acceleration, analysis.velocity])  # (2, S, joint, link, cause)
@@ -101,9 +101,9 @@ def test_pictures_and_the_page_leave_out_an_ending_that_all_joints_have(analysis
         assert [joint["shown"] for joint in json.loads(page_data(result))["joints"]] == found
         return found
 
-    assert shown("hip_joint", "Knee_Joint", "toe-joint") == ["hip", "Knee", "toe"]
-    assert shown("hip_joint", "knee_joint", "toe") == ["hip_joint", "knee_joint", "toe"]
-    assert shown("hip_joint", "hip-joint", "toe_joint") == ["hip_joint", "hip-joint", "toe_joint"]
+    assert shown("base_joint", "Boom_Joint", "tip-joint") == ["base", "Boom", "tip"]
+    assert shown("base_joint", "boom_joint", "tip") == ["base_joint", "boom_joint", "tip"]
+    assert shown("base_joint", "base-joint", "tip_joint") == ["base_joint", "base-joint", "tip_joint"]
 
 
 def bars(figure):
@@ -319,7 +319,6 @@ def many(analysis, count=14):
 def test_many_joints_get_a_legend_that_fits(analysis):
     figure = replace(many(analysis), values=np.abs(many(analysis).values)).figure("paper")
     figure.draw_without_rendering()
-    assert figure.get_figheight() > analysis.figure("paper").get_figheight()
     inside = figure.bbox
     lowest = figure._supxlabel.get_window_extent().y1
     boxes = [axis.get_legend().get_window_extent() for axis in figure.axes[5:]]
@@ -330,10 +329,11 @@ def test_many_joints_get_a_legend_that_fits(analysis):
     assert boxes[0].y0 >= boxes[1].y1 - 1
     assert boxes[1].y0 >= lowest - 1
     texts = [text.get_text() for text in figure.axes[5].get_legend().get_texts()]
-    assert len(set(texts)) == 14
+    assert 7 <= len(set(texts)) <= 8  # the most loaded joints, and the one that is drawn
     assert max(map(len, texts)) == 24
+    assert f"thin: {14 - len(texts)} others" in figure.axes[5].get_legend().get_title().get_text()
     looks = {(line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines[:-1]}
-    assert len(looks) == 14
+    assert len(looks) == len(texts) + 1
 
 
 def test_joints_that_the_last_panels_lack_are_named(analysis):

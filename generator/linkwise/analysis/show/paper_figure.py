@@ -170,7 +170,7 @@ def _legend_of(title: str, names: Sequence[str], panel: _Panel) -> tuple[str, li
 
 def _legend_columns(names: Sequence[str]) -> int:
     """Return how many names fit side by side."""
-    return max(1, min(6, 93 // (max(len(drawn(name)) for name in names) + 6)))
+    return max(1, min(6, 93 // (max((len(drawn(name)) for name in names), default=0) + 6)))
 
 
 def _legend_rows(names: Sequence[str]) -> int:
