@@ -174,7 +174,7 @@ def _legend_columns(names: Sequence[str]) -> int:
 
 
 def _legend_rows(names: Sequence[str]) -> int:
-    return -(-len(names) // _legend_columns(names))
+    return max(1, -(-len(names) // _legend_columns(names)))
 
 
 def _legend(axis: Any, title: str, names: Sequence[str]) -> None:
