@@ -17,6 +17,7 @@ from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.show import figure_bytes
 from linkwise.analysis.show.drawn_curves import largest_few
 from linkwise.analysis.show.page import page_data, stick_figure
+from linkwise.analysis.whole_movement import Totals
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
 from matplotlib.figure import Figure
@@ -310,10 +311,14 @@ def test_poses_of_a_slide_on_a_turned_frame(tmp_path):
 
 def many(analysis, count=14):
     """Return the same numbers with as many names as asked for, one of 80 letters."""
-    joints = tuple(f"joint{i}" if i != 4 else f"{'a_name_from_a_drawing_' * 4}4" for i in range(count))
+    joints = tuple(f"joint{i}" if i else f"{'a_name_from_a_drawing_' * 4}0" for i in range(count))
     robot = replace(analysis.robot, joints=joints, links=joints, units=("rad",) * count, tree=None)
-    rows = ResultRows.of(robot, [("q", (i,)) for i in range(count)])
-    return replace(analysis, robot=robot, rows=rows, values=analysis.values[1 + np.arange(count) % 9])
+    own = [("q", (i,)) for i in range(count)] + [("tau", (i,)) for i in range(count)]
+    rows = ResultRows.of(robot, [*own, *(("tau_link", (0, j)) for j in range(count))])
+    values = analysis.values[1 + np.arange(3 * count) % 9] * np.linspace(1, 2, 3 * count)[:, None]
+    sizes = np.abs(values)
+    totals = Totals(sizes.mean(axis=1), sizes.max(axis=1), np.sqrt((values**2).mean(axis=1)))
+    return replace(analysis, robot=robot, rows=rows, values=values, totals=totals)
 
 
 def test_many_joints_get_a_legend_that_fits(analysis):
