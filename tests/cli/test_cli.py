@@ -469,7 +469,7 @@ def test_generate_warns_of_a_floating_base_and_of_bodies_that_cannot_be(
     assert done.returncode == 0, done.stderr
     assert [line for line in done.stderr.splitlines() if line.startswith("warning")] == [
         "warning: negative.toml: accepted though physically impossible: "
-        "rod (link 'rod' has negative mass -2 kg), "
+        "rod (negative mass -2 kg), "
         "'base_yaw', 'base_pitch', 'base_roll', 'hinge' (can move together without moving any mass)",
         "warning: negative.toml: six coordinates without any contact forces, singular at a pitch of ±90°: "
         "base (floating: x, y, z, yaw, pitch, roll)",
@@ -488,10 +488,10 @@ def test_inspect_shows_a_robot_that_generate_refuses_for_a_body_that_cannot_be(
     assert shown.returncode == 0
     assert f"refused by generate: negative.toml: {reason}\n" in shown.stdout
     assert "  1  rod  (-2 kg; hinge)" in shown.stdout
-    assert "\nunphysical\n  rod link 'rod' has negative mass -2 kg" in shown.stdout
+    assert "\nunphysical\n  rod negative mass -2 kg" in shown.stdout
     page = linkwise("inspect", "negative.toml").stdout
     assert f"\nrefused by generate: negative.toml: {reason}\n" in page
-    assert "\nunphysical: rod link 'rod' has negative mass -2 kg; accepted though physically" in page
+    assert "\nunphysical: rod negative mass -2 kg; accepted though physically" in page
     assert json.loads(linkwise("inspect", "negative.toml", "--json").stdout)["refused"].endswith(reason)
     accepted = linkwise("inspect", "negative.toml", "--allow-unphysical", "--json")
     assert json.loads(accepted.stdout)["refused"] == ""

@@ -44,7 +44,7 @@ BAD: dict[str, tuple[tuple[str, ...], str]] = {
     ),
     "impossible choice": (
         (HEAD, "[analysis]\ncutoff = -6\n", TRIALS),
-        "--cutoff -6: give a frequency in Hz above 0",
+        "[analysis] cutoff -6: give a frequency in Hz above 0",
     ),
     "one name": ((HEAD, TRIALS.replace("-{trial}", "")), "two trials are called 'S1-fast'; name each"),
     "no log": (
@@ -54,7 +54,7 @@ BAD: dict[str, tuple[tuple[str, ...], str]] = {
     "empty trial": ((HEAD, "[[trial]]\n"), "trial 1: needs 'log'"),
     "a choice of one trial": (
         (HEAD, CHOICES, TRIALS + "padding = 'even'\n"),
-        "trial 'S1-fast-1': --filter-order and --padding go with --cutoff; add it",
+        "[analysis] filter_order and [analysis] padding go with [analysis] cutoff; add it",
     ),
     "no pattern": (
         (HEAD, TRIALS.replace(".csv", ".mot")),
@@ -77,7 +77,7 @@ BAD: dict[str, tuple[tuple[str, ...], str]] = {
     ),
     "no payload": (
         (HEAD, CHOICES, 'payload = ["x"]\n', TRIALS),
-        "trial 'S1-fast-1': --payload x: ",
+        "trial 'S1-fast-1': [analysis] payload x: ",
     ),
     "no limits": (
         (HEAD, '[cycles]\nduring = "stands"\nshortest = 2.0\nlongest = 1.0\n', TRIALS),
