@@ -33,6 +33,7 @@ ROOMS = (
     "oracle",
     "package",
     "output",
+    "own_opensim",
     "own_process",
     "plotstyle",
     "render",

@@ -83,7 +83,7 @@ ROOMS: dict[str, Room] = {
                 ),
                 *("citations", "render", "extras", "option", "arrays"),
                 *("progress", "bounded_file", "input_file", "generator_fingerprint"),
-                *("errors", "escape", "own_process", "own_runtime"),
+                *("errors", "escape", "own_opensim", "own_process", "own_runtime"),
             )
         )
     ),

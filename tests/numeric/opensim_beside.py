@@ -170,7 +170,8 @@ def follows(model: Any, order: list[str], free: dict[str, float], locked: dict[s
 
 
 def derivatives(function: Any, x: float) -> tuple[float, float, float]:
-    at, orders = osim.Vector(1, x), [osim.StdVectorInt([0] * order) for order in (1, 2)]
+    # Lists of Python: OpenSim does not know its own StdVectorInt where ezc3d, wrapped by SWIG too, was used.
+    at, orders = osim.Vector(1, x), [[0] * order for order in (1, 2)]
     first, second = (function.calcDerivative(order, at) for order in orders)
     return function.calcValue(at), first, second
 

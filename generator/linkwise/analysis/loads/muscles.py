@@ -33,8 +33,8 @@ from linkwise.analysis.settings import Reading
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
+from linkwise.own_opensim import asked_of_opensim
 from linkwise.progress import Progress
-from linkwise.robot.readers.osim.own_opensim import asked_of_opensim
 
 GROUPS = "--muscle-group"
 APART = 1e-5

@@ -17,8 +17,8 @@ from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.input_file import require_file
+from linkwise.own_opensim import asked_of_opensim
 from linkwise.progress import Progress
-from linkwise.robot.readers.osim.own_opensim import asked_of_opensim
 
 HEAD = (
     *("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units"),

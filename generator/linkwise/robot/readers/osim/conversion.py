@@ -5,8 +5,8 @@ from pathlib import Path
 from linkwise.bounded_file import MIB
 from linkwise.errors import within
 from linkwise.output import passing_folder
+from linkwise.own_opensim import asked_of_opensim
 from linkwise.own_process import ProcessLimits
-from linkwise.robot.readers.osim.own_opensim import asked_of_opensim
 
 LIMITS = ProcessLimits(seconds=300, memory=2048 * MIB)
 
