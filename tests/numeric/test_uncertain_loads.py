@@ -120,13 +120,14 @@ def test_a_walk_on_plates_deviates_as_draws_of_its_motion_its_bodies_and_its_pla
 
 def _pressed(model: Any, q: Any, load: Any, time: float) -> Any:
     """Return the torques (draws, n) of a plate whose force, moment and centre of pressure are drawn."""
-    _, *row = (np.interp(time, load.table[:, 0], column) for column in load.table.T)
+    (wrench,) = load.wrenches
+    _, *row = (np.interp(time, wrench.table[:, 0], column) for column in wrench.table.T)
     force, about_origin, point = np.reshape(row, (3, 3))
     moment = about_origin - np.cross(point, force)
     seed = sum(map(ord, load.name))
-    wrench = zip((force, moment, point), (FORCE, MOMENT, POINT), strict=True)
-    drawn = [off(part, size, seed + k) for k, (part, size) in enumerate(wrench)]
-    return load_torque(model, q, load.acts_on.frame.name, drawn)
+    parts = zip((force, moment, point), (FORCE, MOMENT, POINT), strict=True)
+    drawn = [off(part, size, seed + k) for k, (part, size) in enumerate(parts)]
+    return load_torque(model, q, wrench.acts_on.frame.name, drawn)
 
 
 @pytest.fixture(scope="module")
