@@ -208,7 +208,7 @@ def test_analyze_writes_what_is_asked_for(
     called: Any, monkeypatch: pytest.MonkeyPatch, chosen: dict[str, Any], wanted: Outputs
 ) -> None:
     monkeypatch.setattr("linkwise.cli.analyze.opened_robot", lambda *given: "the robot")
-    out, log, robot, asked, _ = called("analyze", "analyze_to", chosen)
+    out, log, robot, asked, *_ = called("analyze", "analyze_to", chosen)
     assert (out, log, robot) == (Path("out"), Path("walk.csv"), "the robot")
     assert (asked.reading, asked.processing, asked.outputs) == (Reading(), Processing(), wanted)
 

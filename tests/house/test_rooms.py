@@ -16,6 +16,7 @@ ROOMS = (
     "cli",
     "study",
     "citations",
+    "bundle",
     "package_cache",
     "pipeline",
     "kernel_choice",

@@ -51,6 +51,7 @@ C = (
 ROOMS: dict[str, Room] = {
     "cli": _folder("cli"),
     "study": _folder("study"),
+    "bundle": _folder("bundle"),
     "report": Room(
         (f"{HOUSE}report/", "templates/report/"),
         ("tests/report/test_pages.py", "tests/report/test_reduction.py", "tests/report/test_commands.py"),

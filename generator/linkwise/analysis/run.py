@@ -1,7 +1,7 @@
 """`analyze`: from a log and a robot to arrays in memory, or to a directory of files."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -128,9 +128,16 @@ def analyze(
 
 
 def analyze_to(
-    out: Path, log: Path, robot: OpenedRobot, asked: Request, progress: Progress
+    out: Path,
+    log: Path,
+    robot: OpenedRobot,
+    asked: Request,
+    progress: Progress,
+    beside: Mapping[str, Callable[[Sequence[Path], Path], object]] | None = None,
 ) -> tuple[Analysis, Sequence[Path]]:
     """Analyse a log of any length with flat memory; `out` appears when everything is done.
+
+    beside: what makes more files, by their names, of the record and the table, and writes them to a path
 
     Returns the analysis and the paths of the files written. Samples of the analysis are in a file without a
     name where figures or a page are asked for; otherwise it has none. Raises LinkwiseError, as `analyze`
@@ -172,22 +179,30 @@ def analyze_to(
             analysis = job.analysis(job.run(sink, progress), kept.values)
         if analysis.cutoff_sweep is not None:
             write_sweep(draft / f"{SWEEP_TABLE}.{outputs.table}", analysis.cutoff_sweep, note)
-        _write_beside_table(draft, analysis, outputs)
+        _write_beside_table(draft, analysis, outputs, beside or {})
         names = sorted(file.name for file in draft.iterdir())
     return analysis, [out / name for name in names]
 
 
-def _write_beside_table(draft: Path, analysis: Analysis, outputs: Outputs) -> None:
-    """Write the record, the figures and the page."""
+def _write_beside_table(
+    draft: Path,
+    analysis: Analysis,
+    outputs: Outputs,
+    beside: Mapping[str, Callable[[Sequence[Path], Path], object]],
+) -> None:
+    """Write the record, the figures, the page, and what is made of the record and the table."""
     files = file_names("-".join(map(file_name, name.split(":", 1))) for name in outputs.figures)
     for file, name in zip(files, outputs.figures, strict=True):
         kind = outputs.figure_format
         (draft / f"{file}.{kind}").write_bytes(figure_bytes(analysis, name, kind))
     if outputs.page:
         (draft / "report.html").write_bytes(report(analysis).encode())
-    files = sorted([RECORD, *(file.name for file in draft.iterdir())])
+    files = sorted([RECORD, *beside, *(file.name for file in draft.iterdir())])
     record = {**analysis.record(), "files": files}
     (draft / RECORD).write_bytes(f"{json_text(record, indent=1)}\n".encode())
+    table = draft / f"analysis.{outputs.table}"
+    for name, write in beside.items():
+        write([draft / RECORD, *([table] if table.is_file() else [])], draft / name)
 
 
 def _refuse_unless_result(target: Path) -> None:

@@ -1,8 +1,9 @@
 """The command `analyze`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from linkwise_runtime.motion.trace_equations import BETWEEN, RESIDUAL
@@ -13,8 +14,9 @@ from linkwise.analysis.muscle_remainder import remainder_line
 from linkwise.analysis.outputs import closed_at
 from linkwise.analysis.payload import with_payloads
 from linkwise.analysis.run import analyze_to
+from linkwise.bundle import FILE, BundledInputs, pack, written_analysis
 from linkwise.cli import Json, tell
-from linkwise.cli.flags import takes
+from linkwise.cli.flags import NOTHING, WrittenOptions, takes
 from linkwise.cli.log_options import UNITS, Backend, LogIfAny, RobotIfAny, opened_robot
 from linkwise.cli.opensim_setup import with_setup
 from linkwise.escape import json_text, listed
@@ -28,6 +30,12 @@ Setup = Annotated[
     ),
 ]
 Out = Annotated[Path, typer.Option(help="Directory to write; a former result is replaced")]
+Bundled = Annotated[
+    bool,
+    typer.Option(
+        "--bundle", help=f"Also write {FILE}: log, robot, choices, versions and result, for linkwise replay"
+    ),
+]
 
 app = typer.Typer(add_completion=False)
 
@@ -38,7 +46,7 @@ app = typer.Typer(add_completion=False)
     ...,
     *("induced", "sto", "sto_units", "induced_power", "reaction", "uncertain", "cutoff_sweep"),
     *("trace", "trace_windows", "trace_weight", "trace_restart", "trace_torque"),
-    *("trace_torque_factor", "backend", "page", "as_json"),
+    *("trace_torque_factor", "backend", "page", "bundle", "as_json"),
     complete=with_setup,
 )
 def analyze(
@@ -49,27 +57,51 @@ def analyze(
     robot: RobotIfAny = None,
     opensim_setup: Setup = None,
     backend: Backend = None,
+    bundle: Bundled = False,
     as_json: Json = False,
+    given: WrittenOptions = NOTHING,
 ) -> None:
     """Decompose a recorded movement: every torque term, as a table, figures and a page."""
     assert log is not None, "`with_setup` sees to it"
     assert robot is not None, "`with_setup` sees to it"
+    analysis, files = analyzed(out, log, robot, chosen, options, backend, given if bundle else None)
+    if as_json:
+        print(json_text(analysis.record()))
+    else:
+        tell(*_summary(analysis, files))
+
+
+def analyzed(
+    out: Path,
+    log: Path,
+    robot: str | Path,
+    chosen: AnalysisChoices,
+    options: Options,
+    backend: str | None,
+    bundled: Mapping[str, Any] | None = None,
+) -> tuple[Analysis, Sequence[Path]]:
+    """Analyse a log, tell its warnings, and return the analysis and the files that were written.
+
+    bundled: options as they were written, for a bundle beside the result; None for none
+    """
+    robot = Path(robot)
     with shown_progress() as progress:
         package = opened_robot(robot, backend, options, progress)
     package = with_payloads(package, chosen.payloads(package))
     asked = chosen.request(package, robot)
+    beside = {}
+    if bundled is not None:
+        inputs = BundledInputs.of(written_analysis(log, robot, package.backend, bundled))
+        beside[FILE] = partial(pack, inputs)
     with shown_progress(UNITS) as progress:
-        analysis, files = analyze_to(out, log, package, asked, progress)
+        analysis, files = analyze_to(out, log, package, asked, progress, beside)
     for warning in analysis.warnings:
         tell(f"warning: {log}: {warning}", err=True)
     for warning in analysis.load_warnings:
         tell(f"warning: {warning}", err=True)
     if analysis.ignored:
         tell(f"left out: {listed(analysis.ignored)}", err=True)
-    if as_json:
-        print(json_text(analysis.record()))
-    else:
-        tell(*_summary(analysis, files))
+    return analysis, files
 
 
 def _summary(analysis: Analysis, files: Sequence[Path]) -> list[str]:

@@ -23,6 +23,7 @@ COMMANDS = {
     "inspect": "Show a robot's joints, links, parameters, and what was merged, locked, ignored or left out.",
     "analyze": "Decompose a recorded movement: every torque term, as a table, figures and a page.",
     "study": "Analyse many recordings: every trial, and what they say together; also on a cluster.",
+    "replay": "Run the analysis of a bundle again, and compare its result with the bundle's.",
     "identify": "Identify links from a log of motion and torques: masses, centres, inertias, friction.",
     "cite": "Print the references of what a result used, as BibTeX.",
     "graph": "Show what autograd computes for a partial torque, or a part of it; equal operations are one.",

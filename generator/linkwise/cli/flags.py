@@ -21,6 +21,13 @@ RobotName = Annotated[str, typer.Argument(help=DESCRIPTIONS)]
 RobotNames = Annotated[list[str], typer.Argument(help=DESCRIPTIONS)]
 
 
+class WrittenOptions(dict[str, Any]):
+    """Options of a command as they were written, by key; a command that has a parameter of it gets them."""
+
+
+NOTHING = WrittenOptions()
+
+
 def tell_run(*robots: str | Path) -> None:
     """Print, in a line each, which of these robots are programs, and so were run to be read."""
     for robot in filter(is_program, robots):
@@ -50,18 +57,20 @@ def takes(
     def decorate(command: Command) -> Command:
         own = inspect.signature(command).parameters
         kinds: dict[str, Any] = {name: p.annotation for name, p in own.items() if is_dataclass(p.annotation)}
+        told = [name for name, p in own.items() if p.annotation is WrittenOptions]
 
         @wraps(command)
         def run(**given: Any) -> None:
             given = complete(given)
             made = {name: chosen(kind, given) for name, kind in kinds.items()}
-            command(**made, **{name: given[name] for name in own if name not in kinds})
+            made |= {name: WrittenOptions(given) for name in told}
+            command(**made, **{name: given[name] for name in own if name not in made})
 
         flags = {
             flag.name: flag.replace(kind=Parameter.KEYWORD_ONLY)
             for name, parameter in own.items()
             for flag in (_flags(kinds[name], usual) if name in kinds else [parameter])
-            if flag.name not in without
+            if flag.name not in (*without, *told)
         }
         at = order.index(...) if order else 0
         names = (*order[:at], *(name for name in flags if name not in order), *order[at + 1 :])

@@ -1,0 +1,167 @@
+"""Record of a bundle: the analysis as it was written, what made it, and its files with their hashes."""
+
+import platform
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from importlib import metadata
+from pathlib import Path, PurePosixPath
+from typing import Any, Literal
+
+from linkwise_runtime.version import VERSION
+
+from linkwise.analysis.choices import AnalysisChoices
+from linkwise.option import Written, written
+from linkwise.package.decode import parse_json, require
+from linkwise.pipeline import is_program
+from linkwise.robot import Options
+from linkwise.robot.read import is_built_in
+
+FILE = "bundle.zip"
+"""Name of the bundle in the folder of a result."""
+CONTENTS = "bundle.json"
+RESULT = "result"
+"""Folder in the bundle with the record and the table."""
+SCHEMA = 1
+
+Kind = Literal["built-in", "file", "program", "package"]
+LIBRARIES = ("numpy", "scipy", "sympy", "pyarrow", "mujoco", "opensim", "ezc3d", "h5py", "rosbags", "torch")
+"""Libraries that have a part in numbers, or read files."""
+
+
+@dataclass(frozen=True)
+class WrittenAnalysis:
+    """An analysis as it is written: where log and robot are, and options by key, those given alone.
+
+    `kind` says what the robot is: a program and a package are code. Texts of options that are files are
+    paths.
+    """
+
+    log: str
+    robot: str
+    kind: Kind
+    backend: str
+    choices: Mapping[str, Any]
+    options: Mapping[str, Any]
+
+    def with_files(self, named: Mapping[str, str]) -> "WrittenAnalysis":
+        """Return the same with other names of log, robot and files; a name without another stays."""
+
+        def of(kind: type, given: Mapping[str, Any]) -> dict[str, Any]:
+            files = {one.key for one in written(kind) if one.option.is_file}
+            return {key: _named(value, named) if key in files else value for key, value in given.items()}
+
+        return WrittenAnalysis(
+            named.get(self.log, self.log),
+            named.get(self.robot, self.robot),
+            self.kind,
+            self.backend,
+            of(AnalysisChoices, self.choices),
+            of(Options, self.options),
+        )
+
+    @property
+    def files(self) -> Iterator[str]:
+        """Paths that options name, each once."""
+        for kind, given in ((AnalysisChoices, self.choices), (Options, self.options)):
+            for one in written(kind):
+                value = given.get(one.key) if one.option.is_file else None
+                yield from value if isinstance(value, list) else filter(None, [value])
+
+
+def written_analysis(log: Path, robot: Path, backend: str, given: Mapping[str, Any]) -> WrittenAnalysis:
+    """Return an analysis as it was written; backend: the one that computed."""
+    options = {one: given_of(one, given) for one in (AnalysisChoices, Options)}
+    return WrittenAnalysis(
+        str(log), str(robot), _kind(robot), backend, options[AnalysisChoices], options[Options]
+    )
+
+
+def _kind(robot: Path) -> Kind:
+    if robot.is_dir():
+        return "package"
+    if is_program(robot):
+        return "program"
+    return "built-in" if is_built_in(robot) and not robot.exists() else "file"
+
+
+def given_of(kind: type, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options of a dataclass that were given, and are not as if they were not, as plain data."""
+    return {
+        one.key: _plain(given[one.key])
+        for one in written(kind)
+        if given.get(one.key) not in (None, [], (), one.default) and not _is_usual(one, given[one.key])
+    }
+
+
+def _is_usual(one: Written, value: Any) -> bool:
+    return not isinstance(value, (list, tuple)) and value == one.default
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (list, tuple)):
+        return [_plain(one) for one in value]
+    return str(value) if isinstance(value, Path) else value
+
+
+def _named(value: Any, named: Mapping[str, str]) -> Any:
+    return [named.get(one, one) for one in value] if isinstance(value, list) else named.get(value, value)
+
+
+@dataclass(frozen=True)
+class PackedFile:
+    """Size and hash of a file in a bundle."""
+
+    bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """Contents of a bundle: the analysis, versions of what made it, files by name, and what was left out."""
+
+    analysis: WrittenAnalysis
+    versions: Mapping[str, str]
+    files: Mapping[str, PackedFile]
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def tops(self) -> set[str]:
+        """Names of the files, and of the folders that a log or a robot may be."""
+        return {*self.files, *(str(folder) for name in self.files for folder in PurePosixPath(name).parents)}
+
+    def record(self) -> dict[str, Any]:
+        """Return this as plain data."""
+        return {"schema": SCHEMA, **asdict(self)}
+
+    @staticmethod
+    def read(text: str) -> "Bundle":
+        """Return the contents of a bundle by its record; raises ValueError for any other text."""
+        data = parse_json(text)
+        require(isinstance(data, dict) and data.get("schema") == SCHEMA, "schema", str(SCHEMA), data)
+        try:
+            asked, files = WrittenAnalysis(**data["analysis"]), data["files"]
+            found = Bundle(
+                asked,
+                dict(data["versions"]),
+                {name: PackedFile(int(one["bytes"]), str(one["sha256"])) for name, one in files.items()},
+                tuple(map(str, data["left_out"])),
+            )
+        except (AttributeError, KeyError, TypeError) as error:
+            raise ValueError(f"{CONTENTS} lacks {error}") from error
+        texts = (asked.log, asked.robot, asked.kind, asked.backend, *found.versions.values())
+        require(all(isinstance(text, str) for text in texts), "analysis", "texts", texts)
+        for given in (asked.choices, asked.options):
+            require(isinstance(given, dict), "analysis", "options by key", given)
+        return found
+
+
+def versions_here() -> dict[str, str]:
+    """Return the versions of linkwise, Python, the system and the libraries that have a part in numbers."""
+    found = {"linkwise": VERSION, "Python": platform.python_version()}
+    found["system"] = f"{platform.system()} {platform.machine()}"
+    for name in LIBRARIES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found

@@ -1,0 +1,227 @@
+"""A bundle is an analysis in one file: run again elsewhere, it gives the same, and what differs is told."""
+
+import csv
+import json
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
+
+import numpy as np
+import pytest
+from helpers.command_line import run_linkwise
+from helpers.induced_setup import write_case
+from helpers.motion_logs import LEG, PLANAR3, smooth, write_csv
+from linkwise.analysis.choices import AnalysisChoices
+from linkwise.bundle import unpacked
+from linkwise.option import chosen
+from linkwise.robot import Options
+from numpy.typing import NDArray
+
+DATA = LEG.parent
+MJCF = """<mujoco model="arm"><compiler meshdir="shapes"/><asset><mesh name="shell" file="shell.obj"/></asset>
+<worldbody><body name="upper">{inertial}<joint name="shoulder" axis="0 1 0"/>
+<geom type="mesh" mesh="shell"/></body></worldbody></mujoco>"""
+SHELL = "\n".join(
+    [f"v {x} {y} {z}" for x in (0, 0.1) for y in (0, 0.1) for z in (0, 0.3)]
+    + ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
+)
+
+
+def analysed(folder: Path, *words: object) -> Path:
+    """Bundle of an analysis in `folder`, which is gone from then on."""
+    done = run_linkwise("analyze", *words, "--out", "out", "--no-page", "--bundle", folder=folder)
+    assert done.returncode == 0, done.stderr
+    assert "out/bundle.zip" in done.stdout
+    bundle = folder.with_suffix(".zip")
+    shutil.move(folder / "out/bundle.zip", bundle)
+    shutil.rmtree(folder)
+    return bundle
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    folder = tmp_path / "case"
+    folder.mkdir()
+    write_csv(folder / "log.csv", smooth(60, 3))
+    return folder
+
+
+def replayed(bundle: Path, *words: object) -> str:
+    done = run_linkwise("replay", bundle, *words, folder=bundle.parent)
+    assert done.returncode == 0, done.stderr
+    assert "\nthe same, within 1e-09\n" in done.stdout
+    return done.stdout
+
+
+def changed(bundle: Path, change: Callable[[dict[str, bytes]], None]) -> Path:
+    """Bundle with other content, packed anew."""
+    with ZipFile(bundle) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    change(content)
+    path = bundle.with_name("changed.zip")
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        for name, data in content.items():
+            archive.writestr(name, data)
+    return path
+
+
+def asked_otherwise(bundle: Path, **choices: object) -> Path:
+    def change(content: dict[str, bytes]) -> None:
+        record = json.loads(content["bundle.json"])
+        record["analysis"]["choices"] |= choices
+        content["bundle.json"] = json.dumps(record).encode()
+
+    return changed(bundle, change)
+
+
+def test_a_bundle_is_replayed_where_nothing_else_is(case: Path) -> None:
+    (case / "deep").mkdir()
+    shutil.copy(LEG, case / "deep/leg.toml")
+    joints = ["pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r"]
+    write_csv(case / "log.csv", smooth(60, 6), joints)
+    write_csv(case / "push.csv", smooth(60, 3), [f"foot/force_{axis}" for axis in "xyz"])
+    (case / "sure.toml").write_text('schema = 1\n[all]\nmass = "5 %"\n')
+    words = ["log.csv", "--robot", "deep/leg.toml", "--base", "fixed", "--cutoff", 6, "--padding", "even"]
+    words += ["--loads", "push.csv", "--loads-cutoff", 5, "--uncertain", "sure.toml", "--lock"]
+    words += ["ankle_angle_r=0.1", "--ignore-extra", "--from", 0.1, "--phase", "first=0..0.3"]
+    bundle = analysed(case, *words, "--payload", "foot=2,0.1,0,0")
+    told = replayed(bundle, "--out", "again")
+    assert "the same here" in told
+    assert "compared: 50 samples of" in told
+    assert str(Path("again/analysis.parquet")) in told
+    assert "bundle.zip" not in told
+
+
+@pytest.mark.parametrize("table", ["parquet", "csv", "none"])
+def test_a_number_that_differs_is_told_with_column_and_sample(case: Path, table: str) -> None:
+    bundle = analysed(case, "log.csv", "--robot", "planar3", "--cutoff", 6, "--format", table)
+    other = asked_otherwise(bundle, cutoff=6.001)
+    done = run_linkwise("replay", other, "--out", "other", folder=case.parent)
+    assert done.returncode == 1, done.stderr
+    assert "\nNOT the same, within 1e-09\n" in done.stdout
+    found = re.search(r"largest difference: (\S+) \S.* in (\S+), (.*); (\S+) of the largest", done.stdout)
+    assert found is not None
+    assert 1e-9 < float(found[4]) < 1e-2
+    if table == "csv":
+        with ZipFile(bundle) as archive:
+            was = read_table(archive.read("result/analysis.csv").decode())
+        now = read_table((case.parent / "other/analysis.csv").read_text())
+        apart = np.abs(was[found[2]] - now[found[2]])
+        assert (f"sample {apart.argmax()}", f"{apart.max():.3g}") == (found[3], found[1])
+    loose = run_linkwise("replay", other, "--tolerance", 0.1, folder=case.parent)
+    assert (loose.returncode, "\nthe same, within 0.1\n" in loose.stdout) == (0, True)
+
+
+def read_table(text: str) -> dict[str, NDArray[np.float64]]:
+    names, *rows = csv.reader(text.splitlines())
+    return dict(zip(names, np.array(rows, dtype=float).T, strict=True))
+
+
+def test_columns_that_only_one_result_has_are_not_the_same(case: Path) -> None:
+    bundle = analysed(case, "log.csv", "--robot", "planar3", "--columns", "sums")
+    done = run_linkwise("replay", asked_otherwise(bundle, columns=["tau/*"]), folder=case.parent)
+    assert done.returncode == 1
+    assert "columns not here: " in done.stdout
+    assert "no number differs" in done.stdout
+
+
+def test_an_opensim_setup_with_its_loads_goes_along(case: Path) -> None:
+    write_case(case, "", "plate.xml", "body1 CENTER_OF_MASS")
+    bundle = analysed(case, "--opensim-setup", "setup.xml")
+    with ZipFile(bundle) as archive:
+        assert {name for name in archive.namelist() if name.startswith("files/")} == {
+            "files/0/plate.xml",
+            "files/0/plate.sto",
+        }
+    replayed(bundle)
+
+
+def test_loads_named_by_a_path_of_this_machine_are_refused(case: Path) -> None:
+    write_case(case, "", "plate.xml", "body1 CENTER_OF_MASS")
+    plate = case / "plate.xml"
+    plate.write_text(plate.read_text().replace("plate.sto", str(case / "plate.sto")))
+    done = run_linkwise("analyze", "--opensim-setup", "setup.xml", "--out", "out", "--bundle", folder=case)
+    assert done.returncode == 2
+    assert "by paths of this machine; name them relative to it" in done.stderr
+    assert not (case / "out").exists()
+
+
+@pytest.mark.parametrize("has_inertia", [True, False])
+def test_meshes_are_left_out_unless_the_robot_cannot_be_read_without(case: Path, has_inertia: bool) -> None:
+    inertial = '<inertial pos="0 0 0.1" mass="1" diaginertia="1 1 1"/>' if has_inertia else ""
+    (case / "shapes").mkdir()
+    (case / "shapes/shell.obj").write_text(SHELL)
+    (case / "arm.xml").write_text(MJCF.format(inertial=inertial))
+    write_csv(case / "log.csv", smooth(60, 1), ["shoulder"])
+    bundle = analysed(case, "log.csv", "--robot", "arm.xml")
+    with ZipFile(bundle) as archive:
+        assert ("robot/shapes/shell.obj" in archive.namelist()) is not has_inertia
+    assert ("left out of it: shell.obj" in replayed(bundle)) is has_inertia
+
+
+@pytest.mark.parametrize("kind", ["package", "program"])
+def test_code_is_not_run_unless_it_is_trusted(case: Path, kind: str) -> None:
+    if kind == "package":
+        shutil.copytree(PLANAR3, case / "arm")
+        bundle = analysed(case, "log.csv", "--robot", "arm")
+    else:
+        shutil.copy(DATA / "cart_pendulum.py", case)
+        write_csv(case / "log.csv", smooth(60, 2), ["x", "theta"])
+        bundle = analysed(case, "log.csv", "--robot", "cart_pendulum.py")
+    done = run_linkwise("replay", bundle, folder=case.parent)
+    assert done.returncode == 2
+    assert "which replay does not run by itself; read it, and give --trust-python" in done.stderr
+    replayed(bundle, "--trust-python")
+
+
+def _damage(content: dict[str, bytes]) -> None:
+    content["log/log.csv"] += b"\n"
+
+
+def _escape(content: dict[str, bytes]) -> None:
+    record = json.loads(content["bundle.json"])
+    record["files"]["../evil.csv"] = record["files"]["log/log.csv"]
+    content |= {"bundle.json": json.dumps(record).encode(), "../evil.csv": content["log/log.csv"]}
+
+
+def _empty(content: dict[str, bytes]) -> None:
+    del content["bundle.json"]
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (_damage, "its file 'log/log.csv' is not what was packed"),
+        (_escape, "has a file '../evil.csv', outside of any folder of its own"),
+        (_empty, "is no bundle, or a damaged one"),
+    ],
+)
+def test_a_changed_bundle_is_refused(
+    case: Path, change: Callable[[dict[str, bytes]], None], told: str
+) -> None:
+    bundle = analysed(case, "log.csv", "--robot", "planar3")
+    done = run_linkwise("replay", changed(bundle, change), "--out", "again", folder=case.parent)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert told in done.stderr
+    assert not list(case.parent.rglob("evil.csv"))
+    assert not (case.parent / "again").exists()
+
+
+def test_what_is_no_bundle_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("time,a\n")
+    for name in ("log.csv", "gone.zip", "."):
+        done = run_linkwise("replay", name, folder=tmp_path)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+
+
+def test_written_options_come_back_as_they_were(case: Path) -> None:
+    words = ["log.csv", "--robot", "planar3", "--map", "joint1=joint1", "--induced", "joints"]
+    bundle = analysed(case, *words, "--trace", "joint1", "--trace-windows", 0.2, "--lock", "joint3=0.1")
+    asked = unpacked(bundle, case.parent / "there").analysis
+    assert asked.log == "log/log.csv"
+    choices, options = chosen(AnalysisChoices, asked.choices), chosen(Options, asked.options)
+    assert choices.reading.pairs == (("joint1", "joint1"),)
+    assert (choices.outputs.induced, choices.outputs.trace.windows) == (("joints",), 0.2)
+    assert options.lock == {"joint3": 0.1}
