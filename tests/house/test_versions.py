@@ -61,13 +61,13 @@ def test_what_has_no_version_leads_to_the_newest(tmp_path: Path) -> None:
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Two versions of a small site with the house's own sidebar, served from this machine to itself."""
     folder = tmp_path_factory.mktemp("versions")
-    for version in ("0.1.0", "0.2.0"):
+    for version in ("0.2.0", "0.3.0"):
         source = folder / f"source {version}"
         named = f"project = 'arms'\nrelease = {version!r}\n"
         pages(source, "parts/arm.rst")
         (source / "conf.py").write_text(f"{CONF}{named}")
         (source / "index.rst").write_text("Arms\n====\n\n.. toctree::\n   :glob:\n\n   parts/*\n")
-        for name in ("arm", *(("hand",) if version == "0.2.0" else ())):
+        for name in ("arm", *(("hand",) if version == "0.3.0" else ())):
             (source / f"parts/{name}.rst").write_text(f"{name}\n====\n\nA {name}.\n")
         build = [sys.executable, "-m", "sphinx", "--quiet", "--fail-on-warning", source, folder / version]
         subprocess.run(build, check=True)
@@ -95,17 +95,17 @@ def test_the_sidebar_leads_to_the_same_page_of_another_version_or_to_its_index(
         label = driver.find_element(By.CLASS_NAME, "versions")
         WebDriverWait(driver, 10).until(lambda _: label.is_displayed())
         choice = Select(label.find_element(By.TAG_NAME, "select"))
-        assert [option.text for option in choice.options] == ["0.2.0", "0.1.0"]
+        assert [option.text for option in choice.options] == ["0.3.0", "0.2.0"]
         assert choice.first_selected_option.text != version
         choice.select_by_visible_text(version)
         WebDriverWait(driver, 10).until(lambda _: driver.current_url == f"{server}/{version}/{page}")
 
     driver.set_window_size(1300, 900)
     driver.get(f"{server}/latest/parts/arm.html#arm")
-    WebDriverWait(driver, 10).until(lambda _: driver.current_url == f"{server}/0.2.0/parts/arm.html#arm")
-    choose("0.1.0", "parts/arm.html#arm")
+    WebDriverWait(driver, 10).until(lambda _: driver.current_url == f"{server}/0.3.0/parts/arm.html#arm")
     choose("0.2.0", "parts/arm.html#arm")
-    driver.get(f"{server}/0.2.0/parts/hand.html")
-    choose("0.1.0", "index.html")
+    choose("0.3.0", "parts/arm.html#arm")
+    driver.get(f"{server}/0.3.0/parts/hand.html")
+    choose("0.2.0", "index.html")
     driver.get(server)
-    WebDriverWait(driver, 10).until(lambda _: driver.current_url == f"{server}/0.2.0/index.html")
+    WebDriverWait(driver, 10).until(lambda _: driver.current_url == f"{server}/0.3.0/index.html")
