@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .PHONY: docs pictures demo demo-control test lint generate control bench corpus opensim crash random fuzz same mutate report clean
-.PHONY: ship pythons licences calls embedded exports
+.PHONY: ship pythons licences calls embedded exports identity
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -28,9 +28,9 @@ generate: $(READY)
 	$(BIN)/linkwise generate puma560 --out generated
 	$(BIN)/linkwise generate torso --out generated
 
-# The documentation as a site: out/docs/index.html. A warning fails it.
+# The documentation as a site: out/docs/index.html leads to the newest of the versions beside it. A warning fails it.
 docs: $(READY)
-	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going docs out/docs
+	$(BIN)/python docs/versions.py out/docs
 
 # What the pages of the documentation show, run; their pictures drawn anew.
 pictures: $(READY)
@@ -109,6 +109,10 @@ same: $(READY)
 # The tests in Python 3.12, 3.13 and 3.14, where these are: an hour, and gigabytes where torch comes with what GPUs need.
 pythons: $(READY)
 	$(BIN)/python tests/tools/pythons.py
+
+# Authors, keywords, classifiers and URLs of pyproject.toml, brought to all other files that have some.
+identity: $(READY)
+	$(BIN)/python tests/tools/identity.py
 
 # The tables of docs/licences.md.
 licences: $(READY)

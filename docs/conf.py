@@ -2,6 +2,7 @@
 
 import re
 import sys
+import tomllib
 from pathlib import Path
 
 import sphinxcontrib.typer
@@ -9,14 +10,16 @@ from linkwise.cli.app import command_of
 from linkwise_runtime.version import VERSION
 from sphinx.application import Sphinx
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # for generated.planar3
+DOCS = Path(__file__).parent
+sys.path[:0] = [str(DOCS.parent), str(DOCS)]  # for generated.planar3, and llms_txt
 sphinxcontrib.typer.get_typer_command = command_of  # so that pages show options as `--help` does
 
 project = "linkwise"
 release = version = VERSION
-author = "linkwise developers"
-copyright = "linkwise developers, Apache-2.0"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinxcontrib.typer"]
+told = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+author = ", ".join(one["name"] for one in told["authors"])
+copyright = f"{author}, Apache-2.0"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinxcontrib.typer", "llms_txt"]
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["pictures"]
 root_doc = "index"
@@ -26,7 +29,12 @@ html_title = f"linkwise {VERSION}"
 html_show_sphinx = False
 html_copy_source = False
 html_static_path = ["_static"]
-html_css_files = ["width.css"]
+html_css_files = ["width.css", "versions.css"]
+html_js_files = [("versions.js", {"defer": "defer"})]
+html_baseurl = f"{told['urls']['Documentation']}/{VERSION}/"
+templates_path = ["_templates"]
+sidebar = [f"sidebar/{part}.html" for part in ("search", "scroll-start", "navigation", "scroll-end")]
+html_sidebars = {"**": ["sidebar/brand.html", "versions.html", *sidebar]}
 
 smartquotes = False  # they make an en dash of the hyphens of --parameters
 myst_heading_anchors = 3

@@ -13,6 +13,8 @@ from linkwise.input_file import is_file
 from linkwise.package.decode import parse_json, require
 
 YEAR = "2026"
+AUTHORS = "{The linkwise developers}"
+"""Authors of linkwise, as BibTeX lists them; `make identity` writes them."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ SOFTWARE = Citation(
     "linkwise",
     "software",
     {
-        "author": "{The linkwise developers}",
+        "author": AUTHORS,
         "title": "linkwise: which joint's movement loads which joint, through which link",
         "version": VERSION,
         "year": YEAR,

@@ -1,12 +1,15 @@
 """README.md and docs/ run as printed, lead to what is there, and build without a warning."""
 
+import html
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
+from linkwise_runtime.version import VERSION
 from tools import pages
 
 ROOT = pages.ROOT
@@ -91,6 +94,27 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.ship
 def test_the_documentation_builds_without_a_warning(site: Path) -> None:
     assert (site / "index.html").is_file()
+
+
+@pytest.mark.ship
+def test_llms_txt_has_every_page_with_its_title_once(site: Path) -> None:
+    text = (site / "llms.txt").read_text(encoding="utf-8")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    base = f"{project['urls']['Documentation']}/{VERSION}/"
+    links = re.findall(r"^- \[([^\]]+)\]\((\S+)\)(?:: \S.*)?$", text, re.MULTILINE)
+    told = {
+        page.relative_to(ROOT / "docs").with_suffix(".html") for page in pages.PAGES if page.parent != ROOT
+    }
+    assert sorted(url for _, url in links) == sorted(base + str(page) for page in told - {Path("index.html")})
+    for title, url in links:
+        shown = (site / url.removeprefix(base)).read_text(encoding="utf-8")
+        assert f"<title>{title} - " in html.unescape(shown), title
+    index = (ROOT / "docs/index.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## (.+)$", text, re.MULTILINE) == re.findall(
+        r"^:caption: (.+)$", index, re.MULTILINE
+    )
+    opening = index.split("\n\n")[1]
+    assert text.startswith(f"# linkwise\n\n> {' '.join(opening.split())}\n\n## ")
 
 
 TOO_WIDE = """

@@ -32,7 +32,8 @@ from helpers.needed import missing
 from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).parents[2]
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+README = ROOT / "README.md"
+PAGES = (README, *sorted({*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")} - {README}))
 RUN = ("sh", "python")
 GIVEN = {
     "panda.urdf": PANDA,
