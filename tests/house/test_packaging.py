@@ -17,8 +17,9 @@ from helpers.installation import ROOT, Environment, copied, empty_environment
 from helpers.needed import needs
 from linkwise import generate, read_system, write_package
 from linkwise_runtime.version import VERSION
-from release.archives import Archives, built
 from tools.pages import PAGES, blocks
+
+from release.archives import Archives, built
 
 pytestmark = pytest.mark.ship
 CORE_MEGABYTES = 200
