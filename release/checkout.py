@@ -57,8 +57,9 @@ def objections(root: Path) -> Iterator[str]:
     if changed:
         more = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
         yield f"{changed[0][3:]}{more}: not committed; commit or remove it"
-    if git(root, "tag", "--list", f"v{version}").strip():
-        yield f"{VERSION}: version {version} is tagged already; raise VERSION"
+    tags = git(root, "tag", "--points-at", "HEAD").decode().split()
+    if f"v{version}" not in tags and git(root, "tag", "--list", f"v{version}").strip():
+        yield f"{VERSION}: version {version} is tagged already, at another commit; raise VERSION"
     told = section(root, version)
     if told is None:
         yield f"CHANGELOG.md: begins with no section of {version}; tell there what changed"

@@ -1,6 +1,7 @@
 """Recipes by which conda's tools build both distributions: each says what its pyproject.toml says."""
 
 import hashlib
+import sys
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from linkwise.errors import LinkwiseError
 from packaging.requirements import Requirement
-from rattler_build import RattlerBuildError, Stage0Recipe
+from rattler_build import RattlerBuildError, Stage0Recipe, build_recipes
 
 TEMPLATE = Path(__file__).parent / "conda/recipe.yaml.j2"
 OTHER = {"linkwise": "linkwise-runtime", "linkwise-runtime": "linkwise"}
@@ -52,3 +53,7 @@ def recipe(project: Path, sources: Path, version: str) -> str:
 def matched(requirements: Iterable[str]) -> list[str]:
     """Return requirements as conda writes them; names are the same there."""
     return [f"{need.name} {need.specifier}".strip() for need in map(Requirement, requirements)]
+
+
+if __name__ == "__main__":  # with recipes, where conda-forge can be reached
+    build_recipes([*sys.argv[1:]], channel=["conda-forge"], output_dir="out/conda", package_format="conda")
