@@ -60,7 +60,7 @@ def evened(archive: Path, epoch: str) -> None:
     os.environ["SOURCE_DATE_EPOCH"] = epoch
     with tarfile.open(before) as old, ReproducibleTarFile.open(archive, "w:gz") as new:
         for member in sorted(old.getmembers(), key=lambda member: member.name):
-            member.pax_headers.pop("mtime", None)  # fractions of seconds, beside the time that is evened
+            member.pax_headers = {}  # fractions of seconds, beside the time that is evened
             new.addfile(member, old.extractfile(member))
     before.unlink()
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from griffe import (
     Alias,
+    AliasResolutionError,
     Attribute,
     Class,
     Function,
@@ -25,6 +26,7 @@ from griffe import (
     Parameters,
 )
 from linkwise.cli.app import COMMANDS, REPORTS, command_of
+from linkwise.errors import LinkwiseError
 
 PACKAGES = ("linkwise", "linkwise_runtime", "generated.planar3")
 SINGLE = re.compile(r"^\.\. auto(?:function|class|exception):: ([\w.]+)$", re.MULTILINE)
@@ -35,7 +37,10 @@ LINE = 0
 
 
 def public_face(root: Path) -> Module:
-    """Return the public names of a checkout, by the path that documentation gives them, and the commands."""
+    """Return the public names of a checkout, by the path that documentation gives them, and the commands.
+
+    Raises LinkwiseError for a name that is not there.
+    """
     loader = GriffeLoader(search_paths=[root / "generator", root], allow_inspection=False)
     for name in PACKAGES:
         loader.load(name)
@@ -46,7 +51,10 @@ def public_face(root: Path) -> Module:
         place = face
         for folder in folders:
             place = place.members.get(folder) or added(place, Module(folder))  # type: ignore[assignment]
-        added(place, plain(name, loader.modules_collection[path]))
+        try:
+            added(place, plain(name, loader.modules_collection[path]))
+        except (AliasResolutionError, KeyError) as error:
+            raise LinkwiseError(f"{path}: is told to be public, and is not there") from error
     commands = added(face, Module("commands"))
     for command in flags():
         added(commands, command)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from griffe import Module, find_breaking_changes
+from griffe import Breakage, Module, Parameter, find_breaking_changes
 
 from release.checkout import is_breaking_told, numbers, version_of
 from release.public_face import public_face, read, written
@@ -19,8 +19,14 @@ def recorded(root: Path) -> dict[str, Path]:
 
 def broken(old: Path, new: Module) -> list[str]:
     """Return the changes that break whoever uses a face that is recorded, a line each."""
-    found = find_breaking_changes(read(old), new)
-    return [f"{each.obj.path.removeprefix('public.')}: {each.explain().partition(': ')[2]}" for each in found]
+    return [line(change) for change in find_breaking_changes(read(old), new)]
+
+
+def line(change: Breakage) -> str:
+    """Return what has changed: its path, the parameter, and griffe's word for it."""
+    values = (change.old_value, change.new_value)
+    [parameter, *_] = [f"({value.name})" for value in values if isinstance(value, Parameter)] or [""]
+    return f"{change.obj.path.removeprefix('public.')}{parameter}: {change.kind.value.lower()}"
 
 
 def untold(root: Path, face: Module) -> list[str]:

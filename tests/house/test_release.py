@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 from helpers.installation import ROOT, copied
+from linkwise import LinkwiseError
 from linkwise_runtime.version import VERSION
 
 from release.checkout import objections
@@ -153,14 +154,15 @@ def test_what_speaks_against_a_release_is_told_by_name(
 
 
 def test_a_refused_release_ends_with_status_2_and_makes_nothing(repository: Path) -> None:
-    left_about(repository)
-    changed(repository / "generator/linkwise/pipeline.py", "def read_system(", "def read_the_system(")
+    changed(
+        repository / "generator/linkwise/package_cache.py", "def kept_package(", "def kept_package(new: int, "
+    )
     done = subprocess.run(
         [sys.executable, "-m", "release"], cwd=repository, capture_output=True, text=True, check=False
     )
     assert done.returncode == 2
     assert not (repository / "out").exists()
-    assert "left-about.txt" in done.stderr
+    assert "generator/linkwise/package_cache.py: not committed" in done.stderr
     assert f"{FOLDER}/{VERSION}.json: is not the public face of this checkout" in done.stderr
     assert "Traceback" not in done.stderr
 
@@ -186,6 +188,11 @@ def test_a_change_that_breaks_users_is_told_and_raises_more_than_the_last_number
     changed(repository / "CHANGELOG.md", "0.1.99", "0.2.0")
     (repository / FOLDER / "0.1.99.json").rename(repository / FOLDER / "0.2.0.json")
     assert list(face_objections(repository, face)) == []
+    changed(repository / "generator/linkwise/pipeline.py", "def read_system(", "def read_the_system(")
+    with pytest.raises(
+        LinkwiseError, match=r"^linkwise\.read_system: is told to be public, and is not there$"
+    ):
+        public_face(repository)
 
 
 def test_no_change_breaks_users_untold() -> None:
