@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .PHONY: docs pictures demo demo-control test lint generate control bench corpus opensim crash random fuzz same mutate report clean
-.PHONY: ship pythons licences calls embedded exports identity
+.PHONY: ship pythons licences calls embedded exports identity release rehearsal api
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -121,6 +121,18 @@ licences: $(READY)
 # The tables of docs/calls.md.
 calls: $(READY)
 	$(BIN)/python tests/tools/call_page.py
+
+# All that a release hands out, in out/release, up to the upload; release/README.md says the steps. `make rehearsal` makes
+# the same of the last commit at any time, and tells what speaks against a release.
+release: $(READY)
+	$(BIN)/python -m release
+
+rehearsal: $(READY)
+	$(BIN)/python -m release --rehearse
+
+# The public face of this version, with which later releases are compared: release/api/VERSION.json.
+api: $(READY)
+	$(BIN)/python -m release.recorded_faces
 
 # Speed beside Pinocchio and CasADi, reports and motions at length: minutes, on a quiet machine.
 bench: $(READY)

@@ -40,22 +40,6 @@ def copied(target: Path) -> Path:
     return target
 
 
-def archive_of_sources(folder: Path, target: Path, python: Path = Path(sys.executable)) -> Path:
-    """Build the archive of sources of the project in a folder, by the setuptools that a Python has."""
-    program = "import sys; from setuptools import build_meta; build_meta.build_sdist(sys.argv[1])"
-    run(python, "-c", program, target, folder=folder)
-    [archive] = target.glob("*.tar.gz")
-    return archive
-
-
-def wheel_of(source: Path, target: Path, python: Path = Path(sys.executable)) -> Path:
-    """Build the wheel of a project or of its archive, with the tools that a Python has."""
-    build = [*PIP, "--python", python, "wheel", *ALONE, "--no-build-isolation", "--wheel-dir", target]
-    run(*build, source, folder=target.parent, PATH=f"{python.parent}{os.pathsep}{os.environ['PATH']}")
-    [wheel] = target.glob("*.whl")
-    return wheel
-
-
 def needs_of(requirements: Iterable[str]) -> Iterator[Distribution]:
     """Return what requirements bring where they are installed, themselves included; each once, by name."""
     waiting, seen = [Requirement(text) for text in requirements], set()

@@ -13,11 +13,13 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 import pinocchio as pin
 import pytest
-from helpers.installation import ROOT, Environment, archive_of_sources, copied, empty_environment, wheel_of
+from helpers.installation import ROOT, Environment, copied, empty_environment
 from helpers.needed import needs
 from linkwise import generate, read_system, write_package
 from linkwise_runtime.version import VERSION
 from tools.pages import PAGES, blocks
+
+from release.archives import Archives, built
 
 pytestmark = pytest.mark.ship
 CORE_MEGABYTES = 200
@@ -30,33 +32,32 @@ MOTION = ([0.3, -0.7], [1.0, 0.5], [2.0, -3.0])
 def runtime(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel of the runtime alone, beside the copy of the checkout in which it is built."""
     folder = tmp_path_factory.mktemp("archives")
-    return wheel_of(copied(folder / "checkout") / "generator/linkwise_runtime", folder / "runtime")
+    return built(copied(folder / "checkout") / "generator/linkwise_runtime", folder / "runtime").wheel
 
 
 @pytest.fixture(scope="session")
-def archives(runtime: Path) -> tuple[Path, Path]:
+def archives(runtime: Path) -> Archives:
     """The archive of sources, made where the runtime's wheel was, and the wheel that is built from it."""
     folder = runtime.parents[1]
-    sources = archive_of_sources(folder / "checkout", folder / "sources")
-    return sources, wheel_of(sources, folder / "wheel")
+    return built(folder / "checkout", folder / "archives")
 
 
 @pytest.fixture(scope="session")
-def clean(archives: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Environment:
+def clean(archives: Archives, tmp_path_factory: pytest.TempPathFactory) -> Environment:
     """The wheel installed outside the checkout, with what it needs and no extra."""
     environment = empty_environment(tmp_path_factory.mktemp("installed") / "venv")
     environment.link(["linkwise"])
     assert not list(environment.packages.glob("*linkwise*"))
-    environment.install(archives[1])
+    environment.install(archives.wheel)
     return environment
 
 
 @pytest.fixture(scope="session")
-def builder(archives: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Environment:
+def builder(archives: Archives, tmp_path_factory: pytest.TempPathFactory) -> Environment:
     """An environment of projects that generate their robot as they are built."""
     environment = empty_environment(tmp_path_factory.mktemp("builder") / "venv")
-    environment.link(["linkwise", "setuptools", "scikit-build-core"])
-    environment.install(archives[1])
+    environment.link(["linkwise", "build", "setuptools", "scikit-build-core"])
+    environment.install(archives.wheel)
     return environment
 
 
@@ -65,23 +66,25 @@ def files_below(folder: Path) -> set[str]:
     return {path.as_posix() for path in found if path.suffix != ".pyc" and ".egg-info" not in str(path)}
 
 
-def test_the_archive_of_sources_is_the_checkout(archives: tuple[Path, Path], tmp_path: Path) -> None:
-    with tarfile.open(archives[0]) as archive:
+def test_the_archive_of_sources_is_the_checkout(archives: Archives, tmp_path: Path) -> None:
+    with tarfile.open(archives.sources) as archive:
         packed = {name.partition("/")[2] for name in archive.getnames() if archive.getmember(name).isfile()}
     own = {name for name in packed if ".egg-info/" in name} | {"PKG-INFO", "setup.cfg"}
     assert packed - own == files_below(copied(tmp_path / "checkout"))
 
 
 def test_the_wheel_has_the_generator_its_templates_and_licence_and_nothing_else(
-    archives: tuple[Path, Path],
+    archives: Archives,
 ) -> None:
-    with zipfile.ZipFile(archives[1]) as wheel:
+    with zipfile.ZipFile(archives.wheel) as wheel:
         record = f"linkwise-{VERSION}.dist-info"
         parts = {name for name in wheel.namelist() if not name.startswith(f"{record}/")}
         assert wheel.read(f"{record}/licenses/LICENSE") == (ROOT / "LICENSE").read_bytes()
         metadata = wheel.read(f"{record}/METADATA").decode()
     assert "License-Expression: Apache-2.0\n" in metadata
-    kept = {"linkwise_runtime/LICENSE", "linkwise_runtime/pyproject.toml"}  # of the runtime's own wheel
+    kept = {
+        f"linkwise_runtime/{name}" for name in ("LICENSE", "README.md", "pyproject.toml")
+    }  # its own wheel's
     generator = {name for name in files_below(ROOT / "generator") if "__pycache__" not in name} - kept
     templates = {f"linkwise/templates/{name}" for name in files_below(ROOT / "templates")}
     assert parts == generator | templates
@@ -158,11 +161,11 @@ def test_a_package_runs_where_there_is_numpy_and_its_runtime_alone(
 
 
 def test_linkwise_says_so_where_another_runtime_took_the_place_of_its_own_or_it_is_gone(
-    archives: tuple[Path, Path], tmp_path: Path
+    archives: Archives, tmp_path: Path
 ) -> None:
     machine = empty_environment(tmp_path / "machine")
     machine.link(["linkwise"])
-    machine.install(archives[1])
+    machine.install(archives.wheel)
     version = machine.packages / "linkwise_runtime/version.py"
     version.write_text(version.read_text().replace(VERSION, "10.1.0"))
     mend = "install linkwise again, with --force-reinstall, and no linkwise-runtime beside it"
@@ -195,6 +198,7 @@ def test_the_version_is_written_once(tmp_path: Path) -> None:
     literal = re.compile(rf"(?<![\d.]){re.escape(VERSION)}(?![\d.])".encode())
     folder = copied(tmp_path / "checkout")
     found = {name for name in files_below(folder) if literal.search((folder / name).read_bytes())}
+    found -= {"constraints.txt"}  # versions of others
     assert {name for name in found if not name.startswith("generated/")} == history
 
 
@@ -224,8 +228,7 @@ def example(name: str, folder: Path) -> Path:
 
 def test_a_wheel_of_setuptools_has_its_robot(builder: Environment, tmp_path: Path) -> None:
     project = example("setuptools", tmp_path)
-    sources = archive_of_sources(project, tmp_path / "sources", builder.python)
-    wheel = wheel_of(sources, tmp_path / "wheel", builder.python)
+    wheel = built(project, tmp_path / "archives", builder.python).wheel
     user = empty_environment(tmp_path / "user")
     user.link(["numpy"])
     user.install(wheel)
@@ -247,7 +250,7 @@ def test_an_editable_install_of_setuptools_has_its_robot_beside_the_sources(
 def test_a_wheel_of_scikit_build_core_has_its_robot(builder: Environment, tmp_path: Path) -> None:
     project = example("scikit-build-core", tmp_path)
     user = empty_environment(tmp_path / "user")
-    user.install(wheel_of(project, tmp_path / "wheel", builder.python))
+    user.install(built(project, tmp_path / "archives", builder.python).wheel)
     program = f"""from array import array
 from arm_control import JOINTS, inverse_dynamics
 tau = array("d", [0.0] * JOINTS)

@@ -31,7 +31,7 @@ USERS = (
 )
 BINDING = ("spm",)
 """Extras whose packages bind the programs that use them; `all` brings none of these."""
-DEVELOPERS = ("docs", "test", "lint")
+DEVELOPERS = ("docs", "release", "test", "lint")
 NOT_LISTED = re.compile(r"linkwise$|(nvidia|cuda|triton)\b")
 """linkwise itself, and what PyTorch brings for GPUs of one maker, of which the page says a line."""
 
