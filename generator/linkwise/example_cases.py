@@ -1,7 +1,7 @@
 """Whole cases to try linkwise on: a robot, a movement, what acts on it, and what to type.
 
-They are data of the package `linkwise.examples`, and SHA256SUMS there, in the format of `sha256sum`, lists them:
-no file leaves the package that has not its hash.
+They are data of the package `linkwise.examples`. SHA256SUMS there lists them, as `sha256sum` writes it, and
+no file leaves the package that has another hash.
 """
 
 import re
@@ -51,7 +51,7 @@ class ExampleCase:
             ) from error
         if sha256(found).hexdigest() != self.files[name]:
             raise LinkwiseError(
-                f"example {self.name}: {name} is not as it was published, by its SHA-256; install linkwise again"
+                f"example {self.name}: {name} is not what was published; install linkwise again"
             )
         return found
 
@@ -102,5 +102,5 @@ def _refuse_unless_empty(target: Path, case: ExampleCase) -> None:
     wrong = faults(target, case.files)
     if len(wrong) < len(case.files) or "was changed" in wrong.values():
         file, fault = next(iter(wrong.items()))
-        raise LinkwiseError(f"{target} holds this example, but {file} {fault}; move the folder away, or {ANOTHER}")
+        raise LinkwiseError(f"{target} holds this example, but {file} {fault}; move it away, or {ANOTHER}")
     raise LinkwiseError(f"{target} is not empty; {ANOTHER}")

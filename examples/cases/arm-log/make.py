@@ -1,7 +1,7 @@
-"""Make arm-log.csv anew: Panda in MuJoCo, with friction, a thing in its hand, and sensors that are not perfect.
+"""Make arm-log.csv anew: Panda in MuJoCo, with friction, a thing in its hand, and noise of its sensors.
 
-`python make.py FOLDER`, with MuJoCo and NumPy. What it simulates and the robot's file, panda.urdf, does not say:
-the thing in the hand, the friction of joints, and the noise of encoders and torque sensors.
+`python make.py FOLDER`, with MuJoCo and NumPy. The file of the robot, panda.urdf, knows nothing of the
+thing in the hand and of the friction of joints. Nothing of linkwise takes part.
 """
 
 import sys
@@ -53,7 +53,7 @@ def wanted(time: float) -> np.ndarray:
 
 
 def motors(robot: mujoco.MjModel, now: mujoco.MjData, time: float) -> np.ndarray:
-    """Return what a controller asks of the motors (7,) in N m: a model of the arm, and springs to the path."""
+    """Return what a controller asks of the motors (7,) in N m: a model of the arm, springs to the path."""
     q, qd, qdd = wanted(time)
     spring = 400 * (q - now.qpos) + 40 * (qd - now.qvel)
     torque = np.empty(7)

@@ -1,6 +1,6 @@
-"""Make step.csv, ground.csv and torques.csv anew: two steps of a leg of four bars in MuJoCo, whose hip is held.
+"""Make step.csv, ground.csv and torques.csv anew: two steps of a leg of four bars in MuJoCo, held at the hip.
 
-`python make.py FOLDER`, with MuJoCo and NumPy. The leg is that of leg.toml, written once more in MuJoCo's own format.
+`python make.py FOLDER`, with MuJoCo and NumPy. The leg of leg.toml is written once more, for MuJoCo.
 In stance the ground pushes the foot by a force that is given; the motors follow the path all the same.
 """
 
@@ -14,7 +14,7 @@ HERE = Path(__file__).parent
 STEP, RATE, SECONDS = 0.0001, 200, 1.0
 """Step of the simulation in s, samples of the log a second, and its length in s."""
 PERIOD, STANCE = 0.5, 0.5
-"""Time of a step in s, and the part of it in which the foot is on the ground. One goes before the log begins."""
+"""Time of a step in s, one of which goes before the log, and the part of it on the ground."""
 LENGTH, LIFT, HEIGHT = 0.09, 0.05, 0.26
 """Of a step, how high the foot is lifted, and of the hip above the ground, in m."""
 WEIGHT, SLOPE = 36.0, 0.12
@@ -111,7 +111,8 @@ def main() -> None:
         "step.csv": ("time,front,front_shin,back,back_shin", "%.6f", made[:, 1:5]),
         "torques.csv": ("time,front,back", "%.4f", made[:, 5:7]),
         "ground.csv": (
-            "time," + ",".join(f"ground:shin_front/{what}_{axis}" for what in ("point", "force") for axis in "xyz"),
+            "time,"
+            + ",".join(f"ground:shin_front/{what}_{axis}" for what in ("point", "force") for axis in "xyz"),
             "%.5f",
             np.insert(made[:, 7:11], [2, 4], 0.0, axis=1),
         ),

@@ -1,7 +1,7 @@
 """Make throw.csv and torques.csv anew: an arm in MuJoCo that throws a ball.
 
-`python make.py FOLDER`, with MuJoCo and NumPy. Muscles are motors here: they follow a swing of each joint, from the
-shoulder to the wrist, and hold the ball until RELEASE. Nothing of linkwise takes part.
+`python make.py FOLDER`, with MuJoCo and NumPy. Muscles are motors here: they follow a swing of each joint,
+from the shoulder to the wrist, and hold the ball until RELEASE. Nothing of linkwise takes part.
 """
 
 import sys
@@ -25,7 +25,9 @@ def model(ball: float) -> mujoco.MjModel:
     """Return the arm with something of `ball` kg in its hand."""
     spec = mujoco.MjSpec.from_file(str(HERE / "arm.urdf"))
     spec.option.timestep = STEP
-    thing = spec.body("hand").add_body(name="ball", pos=GRIP, ipos=(0, 0, 0), mass=ball, explicitinertial=True)
+    thing = spec.body("hand").add_body(
+        name="ball", pos=GRIP, ipos=(0, 0, 0), mass=ball, explicitinertial=True
+    )
     thing.inertia = [1e-9] * 3  # a point, nearly
     return spec.compile()
 

@@ -32,5 +32,6 @@ def example(
 def _tell_next(case: ExampleCase, folder: Path, written: bool) -> None:
     place = folder.as_posix()
     tell(f"{'wrote' if written else 'up to date:'} {place}: {counted(len(case.files), 'file')}")
-    tell(f"{case.title}; where it is from: {place}/SOURCE.md", "", "Next, and more of it in its README.md:", "")
+    tell(f"{case.title}; where it is from: {place}/SOURCE.md")
+    tell("", "Next, and more of it in its README.md:", "")
     tell(*(f"  {line}" for line in (f"cd {quote(place)}", *case.first_command)))
