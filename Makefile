@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .PHONY: docs pictures demo demo-control test lint generate control bench corpus opensim crash random fuzz same mutate report clean
-.PHONY: ship pythons licences calls embedded exports identity release rehearsal api
+.PHONY: ship sums pythons licences calls embedded exports identity release rehearsal api
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -32,10 +32,15 @@ generate: $(READY)
 docs: $(READY)
 	$(BIN)/python docs/versions.py out/docs
 
-# What the pages of the documentation show, run; their pictures drawn anew.
+# What the pages of the documentation and the notebooks show, run; their pictures drawn anew.
 pictures: $(READY)
 	$(BIN)/python tests/tools/pages.py
+	$(BIN)/python tests/tools/notebooks.py
 	$(BIN)/python docs/pictures/draw.py
+
+# The hashes of what `linkwise example` copies, after a change of it.
+sums:
+	cd examples/cases && LC_ALL=C sha256sum */*.* > SHA256SUMS
 
 # The figure and the tables of docs/control.md: what is cancelled at the root, and what a loop at 1 kHz keeps.
 control: $(READY)

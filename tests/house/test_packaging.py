@@ -16,6 +16,7 @@ import pytest
 from helpers.installation import ROOT, Environment, copied, empty_environment
 from helpers.needed import needs
 from linkwise import generate, read_system, write_package
+from linkwise.example_cases import example_cases
 from linkwise_runtime.version import VERSION
 from tools.pages import PAGES, blocks
 
@@ -23,6 +24,7 @@ from release.archives import Archives, built
 
 pytestmark = pytest.mark.ship
 CORE_MEGABYTES = 200
+EXAMPLES_KILOBYTES = 400
 RUNNING_MEGABYTES = 90
 HELP_SECONDS = 0.5
 MOTION = ([0.3, -0.7], [1.0, 0.5], [2.0, -3.0])
@@ -73,22 +75,37 @@ def test_the_archive_of_sources_is_the_checkout(archives: Archives, tmp_path: Pa
     assert packed - own == files_below(copied(tmp_path / "checkout"))
 
 
+<<<<<<< HEAD
 def test_the_wheel_has_the_generator_its_templates_and_licence_and_nothing_else(
     archives: Archives,
 ) -> None:
     with zipfile.ZipFile(archives.wheel) as wheel:
+=======
+def test_the_wheel_has_the_generator_its_templates_examples_and_licence_and_nothing_else(
+    archives: tuple[Path, Path],
+) -> None:
+    with zipfile.ZipFile(archives[1]) as wheel:
+        packed = [one for one in wheel.infolist() if one.filename.startswith("linkwise/examples/")]
+        assert sum(one.compress_size for one in packed) <= 1000 * EXAMPLES_KILOBYTES
+>>>>>>> b29d6fec1a7d504bd113e0913fdbc47c79667a5a
         record = f"linkwise-{VERSION}.dist-info"
         parts = {name for name in wheel.namelist() if not name.startswith(f"{record}/")}
         assert wheel.read(f"{record}/licenses/LICENSE") == (ROOT / "LICENSE").read_bytes()
         metadata = wheel.read(f"{record}/METADATA").decode()
+<<<<<<< HEAD
     assert "License-Expression: Apache-2.0\n" in metadata
     kept = {
         f"linkwise_runtime/{name}" for name in ("LICENSE", "README.md", "pyproject.toml")
     }  # its own wheel's
+=======
+    assert "License-Expression: Apache-2.0 AND CC-BY-3.0\n" in metadata
+    kept = {"linkwise_runtime/LICENSE", "linkwise_runtime/pyproject.toml"}  # of the runtime's own wheel
+>>>>>>> b29d6fec1a7d504bd113e0913fdbc47c79667a5a
     generator = {name for name in files_below(ROOT / "generator") if "__pycache__" not in name} - kept
     templates = {f"linkwise/templates/{name}" for name in files_below(ROOT / "templates")}
-    assert parts == generator | templates
-    assert {PurePosixPath(name).suffix for name in parts} == {
+    cases = {f"linkwise/examples/{name}" for name in files_below(ROOT / "examples/cases")}
+    assert parts == generator | templates | cases
+    assert {PurePosixPath(name).suffix for name in parts - cases} == {
         *(".py", ".typed", ".cmake", ".toml", ".h", ".c", ".j2")
     }
 
@@ -110,6 +127,11 @@ def test_first_commands_run_in_a_clean_environment(clean: Environment, tmp_path:
     assert "torch" in proved
     assert "joint1" in clean.run("linkwise", "inspect", "planar3", folder=tmp_path)
     assert "| τ_1,3 |" in clean.run("linkwise", "report", "terms", "planar3", folder=tmp_path)
+    for name in example_cases():
+        assert name in clean.run("linkwise", "example", folder=tmp_path)
+        written = clean.run("linkwise", "example", name, folder=tmp_path)
+        assert written.startswith(f"wrote {name}: ")
+    assert files_below(tmp_path / "walk") == set(example_cases()["walk"].files)
     module = clean.run("linkwise", "--cmake-dir", folder=tmp_path).strip()
     assert Path(module) == clean.packages / "linkwise/cmake"
 

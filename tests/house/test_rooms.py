@@ -17,6 +17,7 @@ ROOMS = (
     "study",
     "citations",
     "bundle",
+    "example_cases",
     "package_cache",
     "pipeline",
     "kernel_choice",
@@ -124,7 +125,10 @@ def test_the_page_shows_the_rooms_in_this_order() -> None:
 def test_what_is_installed_has_every_room() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     folders = {name_of(path) for path in HOUSE.rglob("__init__.py")}
-    assert set(settings["tool"]["setuptools"]["packages"]) == folders | {"linkwise.templates"}
+    assert set(settings["tool"]["setuptools"]["packages"]) == folders | {
+        "linkwise.templates",
+        "linkwise.examples",
+    }
     own = tomllib.loads((HOUSE / "linkwise_runtime/pyproject.toml").read_text(encoding="utf-8"))
     runtime = {name for name in folders if name.startswith("linkwise_runtime")}
     assert set(own["tool"]["setuptools"]["packages"]) == runtime

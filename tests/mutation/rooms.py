@@ -82,7 +82,7 @@ ROOMS: dict[str, Room] = {
                     "kernel_choice",
                     "plotstyle",
                 ),
-                *("citations", "render", "extras", "option", "arrays"),
+                *("example_cases", "render", "extras", "option", "arrays"),
                 *("progress", "bounded_file", "input_file", "generator_fingerprint"),
                 *("errors", "escape", "own_opensim", "own_process", "own_runtime"),
             )

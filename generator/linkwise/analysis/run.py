@@ -34,7 +34,7 @@ from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import file_name, file_names, json_text
 from linkwise.input_file import is_inside
-from linkwise.output import whole_directory
+from linkwise.output import refuse_unless_folder, whole_directory
 from linkwise.package.write import refuse_inside_package
 from linkwise.progress import Progress, silent
 
@@ -207,9 +207,7 @@ def _write_beside_table(
 
 def _refuse_unless_result(target: Path) -> None:
     """Raise LinkwiseError unless `target` is an empty directory or a former result, and nothing else."""
-    if target.is_symlink() or not target.is_dir():
-        what = "a symbolic link" if target.is_symlink() else "not a folder"
-        raise LinkwiseError(f"{target} is {what}; give another --out")
+    refuse_unless_folder(target, "give another --out")
     there = sorted(file.name for file in target.iterdir())
     if not there:
         return

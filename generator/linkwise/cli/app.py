@@ -25,6 +25,7 @@ COMMANDS = {
     "study": "Analyse many recordings: every trial, and what they say together; also on a cluster.",
     "replay": "Run the analysis of a bundle again, and compare its result with the bundle's.",
     "identify": "Identify links from a log of motion and torques: masses, centres, inertias, friction.",
+    "example": "Put a whole case into a folder: robot, movement, forces, and what to type next.",
     "cite": "Print the references of what a result used, as BibTeX.",
     "graph": "Show what autograd computes for a partial torque, or a part of it; equal operations are one.",
     "motion": "Write two motions modelled on the paper's Fig. 5 and 10, for the arm of Table 2, `planar3`.",

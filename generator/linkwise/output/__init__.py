@@ -7,6 +7,13 @@ replace single files so, none a folder, nor one on systems that cannot exchange 
 """
 
 from linkwise.output.workplace import passing_folder, sweep
-from linkwise.output.writer import require_writable, whole_directory, write_files
+from linkwise.output.writer import refuse_unless_folder, require_writable, whole_directory, write_files
 
-__all__ = ["passing_folder", "require_writable", "sweep", "whole_directory", "write_files"]
+__all__ = [
+    "passing_folder",
+    "refuse_unless_folder",
+    "require_writable",
+    "sweep",
+    "whole_directory",
+    "write_files",
+]

@@ -69,6 +69,13 @@ def write_files(directory: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]
     return targets
 
 
+def refuse_unless_folder(target: Path, remedy: str) -> None:
+    """Raise LinkwiseError where `target`, which is there, is a symbolic link or not a folder."""
+    if target.is_symlink() or not target.is_dir():
+        what = "a symbolic link" if target.is_symlink() else "not a folder"
+        raise LinkwiseError(f"{target} is {what}; {remedy}")
+
+
 def require_writable(directory: Path) -> None:
     """Raise LinkwiseError, before any work is done, where no file can be made for `directory`."""
     place = directory

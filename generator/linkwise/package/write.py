@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from linkwise.errors import LinkwiseError
-from linkwise.output import require_writable, whole_directory
+from linkwise.output import refuse_unless_folder, require_writable, whole_directory
 from linkwise.package.contents import entries, faults, unlisted_files
 from linkwise.package.manifest import FILE, is_too_large
 
@@ -28,9 +28,7 @@ def check_target(directory: Path, robot: str | None) -> None:
     refuse_inside_package(directory.parent)
     if not os.path.lexists(directory):
         return
-    if directory.is_symlink() or not directory.is_dir():
-        what = "a symbolic link" if directory.is_symlink() else "not a folder"
-        raise LinkwiseError(f"{directory} is {what}; choose another --out or --name")
+    refuse_unless_folder(directory, "choose another --out or --name")
     earlier = earlier_package(directory)
     try:
         foreign = not earlier and next(entries(directory), None) is not None
