@@ -75,32 +75,19 @@ def test_the_archive_of_sources_is_the_checkout(archives: Archives, tmp_path: Pa
     assert packed - own == files_below(copied(tmp_path / "checkout"))
 
 
-<<<<<<< HEAD
-def test_the_wheel_has_the_generator_its_templates_and_licence_and_nothing_else(
+def test_the_wheel_has_the_generator_its_templates_examples_and_licence_and_nothing_else(
     archives: Archives,
 ) -> None:
     with zipfile.ZipFile(archives.wheel) as wheel:
-=======
-def test_the_wheel_has_the_generator_its_templates_examples_and_licence_and_nothing_else(
-    archives: tuple[Path, Path],
-) -> None:
-    with zipfile.ZipFile(archives[1]) as wheel:
         packed = [one for one in wheel.infolist() if one.filename.startswith("linkwise/examples/")]
         assert sum(one.compress_size for one in packed) <= 1000 * EXAMPLES_KILOBYTES
->>>>>>> b29d6fec1a7d504bd113e0913fdbc47c79667a5a
         record = f"linkwise-{VERSION}.dist-info"
         parts = {name for name in wheel.namelist() if not name.startswith(f"{record}/")}
         assert wheel.read(f"{record}/licenses/LICENSE") == (ROOT / "LICENSE").read_bytes()
         metadata = wheel.read(f"{record}/METADATA").decode()
-<<<<<<< HEAD
-    assert "License-Expression: Apache-2.0\n" in metadata
-    kept = {
-        f"linkwise_runtime/{name}" for name in ("LICENSE", "README.md", "pyproject.toml")
-    }  # its own wheel's
-=======
     assert "License-Expression: Apache-2.0 AND CC-BY-3.0\n" in metadata
-    kept = {"linkwise_runtime/LICENSE", "linkwise_runtime/pyproject.toml"}  # of the runtime's own wheel
->>>>>>> b29d6fec1a7d504bd113e0913fdbc47c79667a5a
+    of_the_runtime = ("LICENSE", "README.md", "pyproject.toml")  # its own wheel's
+    kept = {f"linkwise_runtime/{name}" for name in of_the_runtime}
     generator = {name for name in files_below(ROOT / "generator") if "__pycache__" not in name} - kept
     templates = {f"linkwise/templates/{name}" for name in files_below(ROOT / "templates")}
     cases = {f"linkwise/examples/{name}" for name in files_below(ROOT / "examples/cases")}
