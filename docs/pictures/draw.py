@@ -104,7 +104,7 @@ def _parts(throw: Any, now: int, i: int) -> list[tuple[float, str, str, str]]:
 
 
 def kinetic_chain(throw: Any) -> Any:
-    """How fast each segment turns, left; what drives the wrist and what holds it back, right."""
+    """The speed at which each segment turns, left; what drives the wrist and what holds it back, right."""
     with styled():
         figure = Figure(figsize=(9.6, 3.1), layout="constrained")
         left, right = figure.subplots(1, 2)

@@ -9,7 +9,9 @@ import pytest
 from helpers.answers import random_states, relative_error
 
 pytest.importorskip("pinocchio")
-ca = pytest.importorskip("casadi")
+pytest.importorskip("casadi")
+
+import casadi as ca
 
 from numeric import oracle_models
 
