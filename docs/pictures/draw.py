@@ -1,6 +1,7 @@
 """Pictures that explain: `python docs/pictures/draw.py` draws them anew, beside this file.
 
 who-loads-whom   the throw of docs/tutorial-robot.md at one instant: the arm, and what loads its joints
+kinetic-chain    the same throw over time: segments that peak one after the other, and what drives the wrist
 indices          joint i, link j and coordinate k of a partial torque
 """
 
@@ -21,8 +22,9 @@ from tools.pages import run_page  # noqa: E402  # in the folder that the line ab
 
 LENGTHS = (0.30, 0.26, 0.17)
 COLOUR_OF = {"shoulder": VERMILION, "elbow": BLUE, "wrist": GREEN}
-INSTANT, BEGIN = 0.3, 0.1
-"""Seconds of the log: what is drawn, and when the shoulder begins to swing."""
+COLOUR_OF_SEGMENT = {"upper arm": VERMILION, "forearm": BLUE, "hand": GREEN}
+INSTANT, BEGIN, RELEASE = 0.3, 0.1, 0.4
+"""Seconds of the log: what is drawn, when the shoulder begins to swing, and when the hand is fastest."""
 
 
 def places(q: np.ndarray) -> np.ndarray:
@@ -101,6 +103,43 @@ def _parts(throw: Any, now: int, i: int) -> list[tuple[float, str, str, str]]:
     return [part for part in parts if abs(part[0]) > 0.02]
 
 
+def kinetic_chain(throw: Any) -> Any:
+    """The speed at which each segment turns, left; what drives the wrist and what holds it back, right."""
+    with styled():
+        figure = Figure(figsize=(9.6, 3.1), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        shown = (throw.time >= 2 * BEGIN) & (throw.time <= RELEASE + 0.02)
+        time = throw.time[shown]
+        turns = -np.cumsum(throw.qd, axis=1)[shown]
+        for speed, (segment, colour) in zip(turns.T, COLOUR_OF_SEGMENT.items(), strict=True):
+            left.plot(time, speed, color=colour, label=segment)
+            left.plot(time[speed.argmax()], speed.max(), "o", color=colour, markersize=6)
+        left.set_title("how fast each segment turns, rad/s")
+        acceleration, velocity = (-part[shown, 2].sum(1) for part in (throw.acceleration, throw.velocity))
+        others = -(acceleration + velocity)
+        told = (
+            ("by the shoulder's motion", others[:, 0], VERMILION),
+            ("by the elbow's motion", others[:, 1], BLUE),
+            ("gravity", throw.gravity[shown, 2].sum(1), GRAVITY),
+            ("net", acceleration[:, 2], INK),
+            ("its own muscles", -throw.torque[shown, 2], GREEN),
+        )
+        for label, value, colour in told:
+            right.plot(time, value, color=colour)
+            shift = {"gravity": 3, "net": -3}.get(label, 0)  # which end side by side
+            place = (time[-1], value[-1])
+            right.annotate(
+                label, place, (5, shift), textcoords="offset points", color=colour, va="center", weight="bold"
+            )
+        right.axhline(0, color=INK, linewidth=0.8)
+        right.set_title("torque at the wrist, N·m: above zero it drives the throw")
+        left.legend(loc="upper left", handlelength=1.6)
+        for axis in (left, right):
+            axis.set_xlabel("time, s")
+            axis.set_xlim(time[0], time[-1])
+    return figure
+
+
 def indices() -> Any:
     """A bent arm of three links: the torque on joint i through link j, by the motion of coordinate k."""
     with styled():
@@ -137,7 +176,12 @@ def main() -> None:
         run_page(HERE.parent / "tutorial-robot.md", Path(folder))
         ball = Payload("hand", 0.145, (0, 0, -0.1), name="ball")
         throw = analyze(Path(folder, "throw.csv"), Path(folder, "out/arm"), payloads=[ball])
-    for name, figure in {"who-loads-whom": who_loads_whom(throw), "indices": indices()}.items():
+    figures = {
+        "who-loads-whom": who_loads_whom(throw),
+        "kinetic-chain": kinetic_chain(throw),
+        "indices": indices(),
+    }
+    for name, figure in figures.items():
         (HERE / f"{name}.png").write_bytes(saved(figure, "png", 160))
 
 

@@ -43,8 +43,8 @@ def licence(package: Distribution) -> str:
     if expression := metadata.get("License-Expression"):
         return str(expression)
     classifiers = [c for c in metadata.get_all("Classifier") or () if c.startswith("License :: ")]
-    if classifiers:
-        return " or ".join(sorted(c.rpartition(" :: ")[2].replace(" License", "") for c in classifiers))
+    if named := [c for c in classifiers if c != "License :: OSI Approved"]:  # which names none
+        return " or ".join(sorted(c.rpartition(" :: ")[2].replace(" License", "") for c in named))
     lines = (metadata.get("License") or "").strip().splitlines()
     return lines[0] if len(lines) == 1 else "in its files"
 
