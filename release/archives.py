@@ -21,7 +21,7 @@ ELSEWHERE = {"TZ": "Asia/Kathmandu", "LC_ALL": "C", "PYTHONHASHSEED": "1"}
 
 
 class Archives(NamedTuple):
-    """What a project is handed out as: an archive of sources, and the wheel that is built from it."""
+    """An archive of sources, and the wheel that is built from it."""
 
     sources: Path
     wheel: Path

@@ -199,7 +199,9 @@ def documentation(path: Path) -> Iterator[str]:
                     yield f"{path.relative_to(ROOT)}:{line.lineno}: {text}"
 
 
-@pytest.mark.parametrize("folder", ["generator", "templates", "generated", "tests", "docs", "examples"])
+@pytest.mark.parametrize(
+    "folder", ["generator", "templates", "generated", "tests", "docs", "examples", "release"]
+)
 def test_documentation_begins_with_what_it_tells_of(folder: str) -> None:
     files = sorted((ROOT / folder).rglob("*.py"))
     told = [line for path in files for line in documentation(path)]

@@ -23,7 +23,7 @@ AUDIT = (PROGRAMS / "zizmor", "--offline", "--no-progress", "--strict-collection
 
 
 def objects(command: tuple[Path | str, ...], files: list[Path]) -> str:
-    """What a checker says against files; nothing where it ends well."""
+    """Return what a checker says against files; nothing where it ends well."""
     done = subprocess.run([*command, *files], capture_output=True, text=True, check=False)
     return done.stdout + done.stderr if done.returncode else ""
 
