@@ -16,7 +16,7 @@ STEP, RATE, SECONDS = 0.0005, 100, 16
 THING, WHERE = 1.2, (0.0, 0.0, 0.15)
 """Mass in kg, and centre in the hand's axes in m: a bottle that the fingers hold."""
 BOTTLE = (0.006, 0.006, 0.0012)
-"""Its principal moments of inertia in kg m²."""
+"""Principal moments of inertia of it in kg m²."""
 COULOMB = (0.55, 0.6, 0.4, 0.5, 0.3, 0.25, 0.2)
 VISCOUS = (0.9, 1.1, 0.7, 0.8, 0.35, 0.3, 0.25)
 """Friction of the joints: N m, and N m s/rad."""

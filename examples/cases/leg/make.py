@@ -16,7 +16,7 @@ STEP, RATE, SECONDS = 0.0001, 200, 1.0
 PERIOD, STANCE = 0.5, 0.5
 """Time of a step in s, one of which goes before the log, and the part of it on the ground."""
 LENGTH, LIFT, HEIGHT = 0.09, 0.05, 0.26
-"""Of a step, how high the foot is lifted, and of the hip above the ground, in m."""
+"""Length of a step, how high the foot is lifted, and height of the hip above the ground, in m."""
 WEIGHT, SLOPE = 36.0, 0.12
 """Mean force of the ground in stance in N, and how far it leans, first back and then forwards."""
 THIGH, SHIN = 0.12, 0.22

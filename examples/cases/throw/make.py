@@ -16,7 +16,7 @@ STEP, RATE, SECONDS = 0.00025, 250, 0.7
 BALL, GRIP, RELEASE = 0.145, (0.0, 0.0, -0.1), 0.348
 """Mass in kg, its place in the hand's axes in m, and the instant in s from which it flies."""
 SWINGS = ((2.9, 1.7, 0.10, 0.46), (1.9, 0.2, 0.244, 0.46), (0.9, -0.6, 0.28, 0.478))
-"""Of shoulder, elbow and wrist: first and last angle in rad, begin and end in s."""
+"""Shoulder, elbow and wrist: first and last angle in rad, begin and end in s."""
 NOISE, SEED = 3e-5, 11
 """Standard deviation of an angle in rad, as of good encoders."""
 
