@@ -84,8 +84,8 @@ def test_moments_of_the_walk_are_those_that_opensim_found() -> None:
     table = np.loadtxt(io.StringIO(lines), skiprows=1)
     for at, name in enumerate(names[1:], 1):
         joint = re.sub("_(moment|force)$", "", name)
-        apart = result[f"tau/{joint}"] - table[:, at]
-        assert np.sqrt(np.mean(apart**2)) < 2e-3 * abs(table[:, at]).max(), joint
+        apart = (result[f"tau/{joint}"] - table[:, at])[3:-3]  # OpenSim ends a spline, linkwise a difference
+        assert np.sqrt(np.mean(apart**2)) < 1e-3 * abs(table[:, at]).max(), joint
 
 
 @pytest.mark.parametrize("notebook", notebooks.NOTEBOOKS, ids=lambda path: path.stem)
