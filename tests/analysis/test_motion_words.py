@@ -82,6 +82,15 @@ def test_models_whose_knees_bend_to_either_side_have_their_own_words(tmp_path: P
         assert str(words["hip_flexion_r"]) == "right hip, flexion +, extension −"
 
 
+def test_joints_that_would_have_the_same_words_keep_their_names(tmp_path: Path) -> None:
+    file = tmp_path / "leg.osim"
+    text = LEG.replace("AXIS", "0 0 1")
+    file.write_text(text.replace("knee_angle_r", "hip_back_flexion_r"))
+    assert words_by_name(file) == {}
+    file.write_text(text)
+    assert len(words_by_name(file)) == 2
+
+
 def test_robots_that_are_no_persons_have_no_words() -> None:
     tree = load_robot(linkwise.kept_package("puma560").directory).tree
     assert words_of(["shoulder", "elbow", "wrist1", "wrist2", "wrist3", "wrist4"], tree, UP) == (None,) * 6

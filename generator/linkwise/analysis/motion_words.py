@@ -133,6 +133,8 @@ def words_of(
 ) -> tuple[MotionWords | None, ...]:
     """Return the words of each coordinate, (n,); None where its name is no joint's, or its axis fits none.
 
+    None too where two coordinates would have the same: hip_front and hip_back, of a leg of four bars.
+
     names: names of the coordinates, in order; up: direction against gravity, (3,)
     """
     pieces = [tuple(piece.lower() for piece in PIECES.findall(name)) for name in names]
@@ -143,7 +145,14 @@ def words_of(
     directions = _directions(pieces, moves, np.asarray(up, float))
     if directions is None:
         return (None,) * len(names)
-    return tuple(_words(some, moved, directions) for some, moved in zip(pieces, moves, strict=True))
+    words = [_words(some, moved, directions) for some, moved in zip(pieces, moves, strict=True)]
+    count = Counter(map(_motion_of, filter(None, words)))
+    return tuple(own if own is not None and count[_motion_of(own)] == 1 else None for own in words)
+
+
+def _motion_of(words: MotionWords) -> tuple[str, frozenset[str]]:
+    """Return joint and motion, whichever way is positive."""
+    return words.joint, frozenset((words.positive, words.negative))
 
 
 def _directions(pieces: Sequence[Sequence[str]], moves: Sequence[_Moves | None], up: Array) -> Array | None:
