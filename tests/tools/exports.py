@@ -69,16 +69,17 @@ def main() -> None:
     warnings.simplefilter("ignore")
     logging.disable(logging.WARNING)
     write_package(generate(read_system(ROBOT), ["torch"]), asked.out / ROBOT)
-    package, wrong = import_package(asked.out / ROBOT), 0
+    package, wrong, calls = import_package(asked.out / ROBOT), 0, 0
     for call, stated in table():
         if call in OF_MOTION:
             continue
         if not asked.calls or call in asked.calls:
             told = goes(lambda: package.load("torch"), call)
             lies = [way for way in WAYS if stated[way] == bool(told[way])]
-            wrong += len(lies)
+            wrong, calls = wrong + len(lies), calls + 1
             shown = (f"{way} {told[way] or 'yes'}{', not as stated' * (way in lies)}" for way in WAYS)
             print(f"{call}: {'; '.join(shown)}", flush=True)
+    print(f"{calls} calls, {len(WAYS)} ways each, {wrong} not as stated")
     sys.exit(wrong > 0)
 
 

@@ -126,7 +126,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--only", choices=[*CHANGES, *SYSTEMS, *NEWER], action="append", help="may be repeated"
     )
     wanted = parser.parse_args(arguments).only or [*CHANGES, *SYSTEMS, *NEWER]
-    different = 0
+    different, compared = 0, 0
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         locales = make_locales(place / "locales")
@@ -142,8 +142,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 surroundings = Surroundings(python=(python,), missing=OPTIONAL)
             other = files(surroundings, place / name, locales)
             bad = differing(plain, other)
-            different += len(bad)
+            different, compared = different + len(bad), compared + 1
             print(f"{name}: {len(other)} files, {len(bad)} differ {' '.join(bad[:5])}", flush=True)
+    print(f"{len(plain)} files in {compared} other surroundings: {different} differ")
     return int(different > 0)
 
 
