@@ -127,6 +127,13 @@ def test_columns_that_only_one_result_has_are_not_the_same(case: Path) -> None:
     assert "no number differs" in done.stdout
 
 
+def test_another_number_of_samples_is_told(case: Path) -> None:
+    bundle = analysed(case, "log.csv", "--robot", "planar3")
+    done = run_linkwise("replay", asked_otherwise(bundle, from_time=0.2), folder=case.parent)
+    assert done.returncode == 2
+    assert "the bundle's result has 60 samples, and this one 40" in done.stderr
+
+
 def test_an_opensim_setup_with_its_loads_goes_along(case: Path) -> None:
     write_case(case, "", "plate.xml", "body1 CENTER_OF_MASS")
     bundle = analysed(case, "--opensim-setup", "setup.xml")
@@ -161,6 +168,18 @@ def test_meshes_are_left_out_unless_the_robot_cannot_be_read_without(case: Path,
     assert ("left out of it: shell.obj" in replayed(bundle)) is has_inertia
 
 
+def test_a_robot_whose_files_are_named_by_paths_of_this_machine_is_refused(case: Path) -> None:
+    (case / "arm.xml").write_text(f'<mujoco><include file="{case}/inner.xml"/></mujoco>')
+    (case / "inner.xml").write_text(
+        '<mujoco><worldbody><body><joint name="shoulder"/><geom size="0.1"/></body></worldbody></mujoco>'
+    )
+    write_csv(case / "log.csv", smooth(60, 1), ["shoulder"])
+    words = ["log.csv", "--robot", "arm.xml", "--out", "out"]
+    assert run_linkwise("analyze", *words, "--no-page", folder=case).returncode == 0
+    done = run_linkwise("analyze", *words, "--bundle", folder=case)
+    assert (done.returncode, "arm.xml names files by paths of this machine" in done.stderr) == (2, True)
+
+
 @pytest.mark.parametrize("kind", ["package", "program"])
 def test_code_is_not_run_unless_it_is_trusted(case: Path, kind: str) -> None:
     if kind == "package":
@@ -180,10 +199,24 @@ def _damage(content: dict[str, bytes]) -> None:
     content["log/log.csv"] += b"\n"
 
 
-def _escape(content: dict[str, bytes]) -> None:
-    record = json.loads(content["bundle.json"])
-    record["files"]["../evil.csv"] = record["files"]["log/log.csv"]
-    content |= {"bundle.json": json.dumps(record).encode(), "../evil.csv": content["log/log.csv"]}
+def _named(name: str) -> Callable[[dict[str, bytes]], None]:
+    def change(content: dict[str, bytes]) -> None:
+        record = json.loads(content["bundle.json"])
+        record["files"][name] = record["files"]["log/log.csv"]
+        content |= {"bundle.json": json.dumps(record).encode(), name: content["log/log.csv"]}
+
+    return change
+
+
+def _wrong(*keys: str, value: object) -> Callable[[dict[str, bytes]], None]:
+    def change(content: dict[str, bytes]) -> None:
+        record = at = json.loads(content["bundle.json"])
+        for key in keys[:-1]:
+            at = at[key]
+        at[keys[-1]] = value
+        content["bundle.json"] = json.dumps(record).encode()
+
+    return change
 
 
 def _empty(content: dict[str, bytes]) -> None:
@@ -194,7 +227,15 @@ def _empty(content: dict[str, bytes]) -> None:
     ("change", "told"),
     [
         (_damage, "its file 'log/log.csv' is not what was packed"),
-        (_escape, "has a file '../evil.csv', outside of any folder of its own"),
+        (_named("../evil.csv"), "has a file '../evil.csv', outside of any folder of its own"),
+        (_named("/evil.csv"), "has a file '/evil.csv', outside of any folder of its own"),
+        (_named("log\\evil.csv"), "has a file 'log\\\\evil.csv', outside of any folder of its own"),
+        (_named("C:evil.csv"), "has a file 'C:evil.csv', outside of any folder of its own"),
+        (_wrong("schema", value=7), "is no bundle, or a damaged one"),
+        (_wrong("analysis", "backend", value=3), "is no bundle, or a damaged one"),
+        (_wrong("analysis", "choices", value=[]), "is no bundle, or a damaged one"),
+        (_wrong("files", "log/log.csv", value=None), "is no bundle, or a damaged one"),
+        (_wrong("files", "log/log.csv", "bytes", value=10**15), "MiB unpacked, and"),
         (_empty, "is no bundle, or a damaged one"),
     ],
 )

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from linkwise_runtime.version import VERSION
 
 from linkwise.analysis.choices import AnalysisChoices
-from linkwise.option import Written, written
+from linkwise.option import written
 from linkwise.package.decode import parse_json, require
 from linkwise.pipeline import is_program
 from linkwise.robot import Options
@@ -85,16 +85,12 @@ def _kind(robot: Path) -> Kind:
 
 
 def given_of(kind: type, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options of a dataclass that were given, and are not as if they were not, as plain data."""
+    """Return the options of a dataclass that were given and are not the usual ones, as plain data."""
     return {
         one.key: _plain(given[one.key])
         for one in written(kind)
-        if given.get(one.key) not in (None, [], (), one.default) and not _is_usual(one, given[one.key])
+        if given.get(one.key) not in (None, [], (), one.default)
     }
-
-
-def _is_usual(one: Written, value: Any) -> bool:
-    return not isinstance(value, (list, tuple)) and value == one.default
 
 
 def _plain(value: Any) -> Any:

@@ -122,7 +122,7 @@ def _robot_files(analysis: WrittenAnalysis) -> tuple[tuple[Path, ...], tuple[str
         if len(kept) < len(files) and not _is_readable(robot, kept, analysis, Path(folder) / "bare"):
             kept = files
         copy = _copied(robot, kept, Path(folder) / "whole")
-        if len(robot_files(copy, options)) != len(kept):
+        if not _is_within(robot_files(copy, options), folder):
             raise LinkwiseError(
                 f"--bundle: {robot} names files by paths of this machine; name them relative to it"
             )
@@ -176,10 +176,14 @@ def _require_relative(path: Path, beside: Sequence[Path]) -> None:
         return
     with tempfile.TemporaryDirectory() as folder:
         copy = _copied(path, [path, *beside], Path(folder))
-        if not all(Path(os.path.abspath(one)).is_relative_to(folder) for one in beside_of(copy)):
+        if not _is_within(beside_of(copy), folder):
             raise LinkwiseError(
                 f"--bundle: {path} names {listed(beside)} by paths of this machine; name them relative to it"
             )
+
+
+def _is_within(files: Sequence[Path], folder: str) -> bool:
+    return all(Path(os.path.abspath(file)).is_relative_to(folder) for file in files)
 
 
 def _inside(path: Path) -> Iterator[Path]:
