@@ -26,7 +26,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 CORE = (
@@ -59,6 +59,8 @@ OF_OS = (
     *(f"O_{flag}" for flag in ("NOFOLLOW", "NONBLOCK", "CLOEXEC", "DIRECTORY", "TMPFILE")),
 )
 OF_SIGNAL = ("SIGHUP", "SIGKILL", "SIGPIPE", "SIGALRM", "pthread_sigmask", "pthread_kill", "setitimer")
+PROGRAMS = SimpleNamespace(NeedCurrentDirectoryForExePath=lambda command: False)
+"""What shutil.which asks Windows from Python 3.12 on."""
 UNFIT = re.compile(r'[<>:"|?*\\\x00-\x1f]|[. ]$|^(con|prn|aux|nul|com[1-9]|lpt[1-9])(\.|$)', re.IGNORECASE)
 LONGEST = 259
 
@@ -88,14 +90,14 @@ def in_the_case_that_is_there(path: Any) -> Any:
     if not isinstance(text, str) or text.startswith(("/proc", "/dev", "/sys")):
         return path
     found = "/" if text.startswith("/") else ""
-    for part in text.split("/"):
+    for part in filter(None, text.split("/")):
         here = f"{found}{part}"
-        if part and not SYSTEM["lexists"](here):
+        if not SYSTEM["lexists"](here):
             with contextlib.suppress(OSError):
                 alike = [name for name in SYSTEM["listdir"](found or ".") if name.lower() == part.lower()]
                 here = f"{found}{alike[0] if alike else part}"
         found = f"{here}/"
-    return found[:-1] if not text.endswith("/") else found
+    return found if text.endswith("/") else found[:-1]
 
 
 def case_blind() -> None:
@@ -224,10 +226,14 @@ def owners_are_not_told() -> None:
         os.supports_follow_symlinks.add(getattr(os, name))
 
 
+FIRST = ("st_mode", "st_ino", "st_dev", "st_nlink", "st_uid", "st_gid", "st_size")
+"""Fields that a stat_result has by their places, which from Python 3.13 on may not be named too."""
+
+
 def _without_owner(call: Callable[..., Any]) -> Callable[..., os.stat_result]:
     def plain(*given: Any, **named: Any) -> os.stat_result:
         found = call(*given, **named)
-        rest = {key: getattr(found, key) for key in dir(found) if key.startswith("st_")}
+        rest = {key: getattr(found, key) for key in dir(found) if key.startswith("st_") and key not in FIRST}
         kind = found.st_mode & ~0o777
         return os.stat_result((kind | 0o777, *tuple(found)[1:4], 0, 0, *tuple(found)[6:]), rest)
 
@@ -308,6 +314,7 @@ def windows() -> None:
         delattr(mmap, name)
     ctypes.CDLL = without()
     os.symlink = lambda *_, **__: (_ for _ in ()).throw(OSError(1314, "A required privilege is not held"))  # type: ignore[assignment]
+    shutil._winapi = PROGRAMS  # type: ignore[attr-defined]
     sys.platform = "win32"
 
 

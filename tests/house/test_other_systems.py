@@ -13,7 +13,7 @@ from pathlib import Path, PureWindowsPath
 
 import pytest
 from helpers import urdf_text
-from helpers.other_system import UNFIT, locks
+from helpers.other_system import PROGRAMS, UNFIT, locks
 from helpers.search_path import before
 from linkwise import LinkwiseError, generate, read_system
 from linkwise.cli import depfile
@@ -104,6 +104,8 @@ def on(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
         monkeypatch.setattr(sys, "platform", name)
         monkeypatch.setitem(sys.modules, "msvcrt", locks())
         monkeypatch.setenv("PATHEXT", ".exe")
+        if name == "win32":
+            monkeypatch.setattr(shutil, "_winapi", PROGRAMS, raising=False)
 
     return take
 
