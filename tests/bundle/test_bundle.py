@@ -1,6 +1,7 @@
 """A bundle is an analysis in one file: run again elsewhere, it gives the same, and what differs is told."""
 
 import csv
+import hashlib
 import json
 import re
 import shutil
@@ -223,31 +224,96 @@ def _empty(content: dict[str, bytes]) -> None:
     del content["bundle.json"]
 
 
+def _large(content: dict[str, bytes]) -> None:
+    content["bundle.json"] += b" " * (1 << 24)
+
+
+def _with(name: str, data: bytes, **asked: object) -> Callable[[dict[str, bytes]], None]:
+    """A change that puts a file there, with its hash, and says other things of the analysis."""
+
+    def change(content: dict[str, bytes]) -> None:
+        record = json.loads(content["bundle.json"])
+        record["files"][name] = {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+        record["analysis"] |= asked
+        content |= {"bundle.json": json.dumps(record).encode(), name: data}
+
+    return change
+
+
+def _without_table(content: dict[str, bytes]) -> None:
+    record = json.loads(content["bundle.json"])
+    del record["files"]["result/analysis.parquet"], content["result/analysis.parquet"]
+    content["bundle.json"] = json.dumps(record).encode()
+
+
+PROGRAM = b"from pathlib import Path\nPath('RAN').touch()\n"
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
         (_damage, "its file 'log/log.csv' is not what was packed"),
-        (_named("../evil.csv"), "has a file '../evil.csv', outside of any folder of its own"),
-        (_named("/evil.csv"), "has a file '/evil.csv', outside of any folder of its own"),
-        (_named("log\\evil.csv"), "has a file 'log\\\\evil.csv', outside of any folder of its own"),
-        (_named("C:evil.csv"), "has a file 'C:evil.csv', outside of any folder of its own"),
-        (_wrong("schema", value=7), "is no bundle, or a damaged one"),
-        (_wrong("analysis", "backend", value=3), "is no bundle, or a damaged one"),
-        (_wrong("analysis", "choices", value=[]), "is no bundle, or a damaged one"),
-        (_wrong("files", "log/log.csv", value=None), "is no bundle, or a damaged one"),
+        (_named("../evil.csv"), "has a file '../evil.csv', outside of its folders"),
+        (_named("/evil.csv"), "has a file '/evil.csv', outside of its folders"),
+        (_named("log\\evil.csv"), "has a file 'log\\\\evil.csv', outside of its folders"),
+        (_named("C:evil.csv"), "has a file 'C:evil.csv', outside of its folders"),
+        (_named("planar3"), "has a file 'planar3', outside of its folders"),
+        (_named("log/../../evil.csv"), "outside of its folders"),
+        (_empty, "is no bundle, or a damaged one: There is no item named"),
+        (_large, "its bundle.json is larger than 16 MiB"),
+        (_wrong("schema", value=7), "is no bundle, or a damaged one: schema is not 1"),
+        (_wrong("analysis", "backend", value=3), "analysis.backend is not a string"),
+        (_wrong("analysis", "kind", value="x"), "analysis.kind is not 'built-in' or 'file'"),
+        (_wrong("analysis", "choices", value=[]), "analysis.choices is not an object"),
+        (_wrong("analysis", "choices", value={"cutof": 7.0}), "has the unknown key 'cutof'; known are"),
+        (_wrong("analysis", "choices", value={"cutoff": "four"}), "cutoff is 'four'; give a number"),
+        (_wrong("analysis", "choices", value={"cutoff": True}), "cutoff is True; give a number"),
+        (_wrong("files", "log/log.csv", value=None), "files.log/log.csv is not an object"),
         (_wrong("files", "log/log.csv", "bytes", value=10**15), "MiB unpacked, and"),
-        (_empty, "is no bundle, or a damaged one"),
+        (_wrong("files", "log/log.csv", "bytes", value=10**30), "is not a whole number"),
+        (_wrong("analysis", "log", value="/log.csv"), "names '/log.csv', which is not in it; do not trust"),
+        (_wrong("analysis", "robot", value="../a.urdf"), "its robot '../a.urdf' is not built in"),
+        (_wrong("analysis", "choices", value={"loads": ["/p.csv"]}), "names '/p.csv', which is not in it"),
+        (_wrong("analysis", "options", value={"constraints": "/c.toml"}), "names '/c.toml', which is not"),
+        (_with("robot/a.py", PROGRAM, robot="robot/a.py"), "its robot 'robot/a.py' is not built in"),
+        (_with("robot/a.py", PROGRAM, robot="robot/a.py", kind="file"), "robot is a file, which is not so"),
+        (_with("robot/a.py", PROGRAM, robot="robot/a.py", kind="program"), "give --trust-python"),
+        (_with("result/analysis.json", b"{}"), "its result is damaged: 'columns'"),
+        (_with("result/analysis.parquet", b"PAR1 and no more"), "its result is damaged: "),
+        (_without_table, "its result lacks analysis.parquet"),
     ],
 )
 def test_a_changed_bundle_is_refused(
     case: Path, change: Callable[[dict[str, bytes]], None], told: str
 ) -> None:
     bundle = analysed(case, "log.csv", "--robot", "planar3")
-    done = run_linkwise("replay", changed(bundle, change), "--out", "again", folder=case.parent)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert told in done.stderr
+    done = run_linkwise("replay", changed(bundle, change), folder=case.parent)
+    assert (done.returncode, told in done.stderr, done.stderr.count("\n")) == (2, True, 1), done.stderr
+    assert not list(case.parent.rglob("RAN"))
     assert not list(case.parent.rglob("evil.csv"))
-    assert not (case.parent / "again").exists()
+
+
+def test_loads_in_a_bundle_that_name_files_outside_are_refused(case: Path) -> None:
+    write_case(case, "", "plate.xml", "body1 CENTER_OF_MASS")
+    outside = shutil.copy(case / "plate.sto", case.parent)
+    text = (case / "plate.xml").read_text().replace("plate.sto", str(outside))
+    bundle = analysed(case, "--opensim-setup", "setup.xml")
+    other = changed(bundle, _with("files/0/plate.xml", text.encode()))
+    done = run_linkwise("replay", other, folder=case.parent)
+    assert (done.returncode, "its files/0/plate.xml names files that are not in it" in done.stderr) == (
+        2,
+        True,
+    )
+
+
+def test_a_result_in_the_place_of_the_bundle_is_refused(case: Path) -> None:
+    words = ["log.csv", "--robot", "planar3", "--out", "out", "--no-page", "--bundle"]
+    assert run_linkwise("analyze", *words, folder=case).returncode == 0
+    done = run_linkwise("replay", "out/bundle.zip", "--out", "out", folder=case)
+    assert (done.returncode, "holds the bundle; give another --out" in done.stderr) == (2, True)
+    assert (case / "out/bundle.zip").is_file()
+    for words in (["--tolerance", "inf"], ["--tolerance", "nan"]):
+        assert run_linkwise("replay", "out/bundle.zip", *words, folder=case).returncode == 2
 
 
 def test_what_is_no_bundle_is_refused(tmp_path: Path) -> None:

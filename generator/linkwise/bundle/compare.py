@@ -10,7 +10,7 @@ import numpy as np
 from linkwise.analysis.run import RECORD
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.escape import listed
+from linkwise.escape import listed, one_line
 from linkwise.extras import extra
 from linkwise.package.decode import parse_json
 
@@ -62,6 +62,11 @@ class ResultComparison:
         if self.worst is None:
             return [*told, "no number differs"]
         one = self.worst
+        if not np.isfinite(one.largest):
+            return [
+                *told,
+                f"{one.column} has a number in one of them only, at sample {one.at}",
+            ]
         where = OF_RECORD[one.at].replace("_", " ") if self.of_record else f"sample {one.at}"
         return [
             *told,
@@ -73,26 +78,35 @@ class ResultComparison:
 def compared(former: Path, now: Path) -> ResultComparison:
     """Return how a result differs from a former one: folders with a record and, where asked for, a table.
 
-    Raises LinkwiseError for results of different numbers of samples.
+    Raises LinkwiseError for results of different numbers of samples, and for a former one that is damaged.
     """
-    records = [_record(former), _record(now)]
+    try:
+        return _compared(former, now)
+    except LinkwiseError:
+        raise
+    except (KeyError, TypeError, ValueError, OSError, extra("pyarrow").ArrowException) as error:
+        raise LinkwiseError(f"its result is damaged: {one_line(str(error), 200)}") from error
+
+
+def _compared(former: Path, now: Path) -> ResultComparison:
+    records = [parse_json((folder / RECORD).read_text(encoding="utf-8")) for folder in (former, now)]
     units = {column["name"]: column["unit"] for column in records[0]["columns"]}
     names = [[column["name"] for column in record["columns"]] for record in records]
     shared = [name for name in names[0] if name in set(names[1])]
     samples = [record["samples"] for record in records]
     if samples[0] != samples[1]:
         raise LinkwiseError(f"the bundle's result has {samples[0]:,} samples, and this one {samples[1]:,}")
-    tables = [_table(former), _table(now)]
+    tables = [_table(folder, record) for folder, record in zip((former, now), records, strict=True)]
     is_of_record = None in tables
     worst, largest = _differences(records if is_of_record else tables, shared, units)
     relative = {name: _share(one.largest, largest[one.unit]) for name, one in worst.items()}
     first = max(relative, key=relative.__getitem__, default=None)
-    is_none = first is None or relative[first] == 0
+    share = 0.0 if first is None else relative[first]
     return ResultComparison(
         len(shared),
         samples[0],
-        0.0 if first is None else relative[first],
-        None if first is None or is_none else worst[first],
+        share,
+        worst[first] if first is not None and share else None,
         tuple(name for name in names[0] if name not in set(names[1])),
         tuple(name for name in names[1] if name not in set(names[0])),
         is_of_record,
@@ -133,16 +147,11 @@ def _values(source: Any, names: Sequence[str]) -> Iterator[Array]:
     yield from (found.column(name).to_numpy().astype(float) for name in names)
 
 
-def _table(folder: Path) -> Any:
-    path = next((folder / name for name in TABLES if (folder / name).is_file()), None)
-    if path is None:
+def _table(folder: Path, record: Mapping[str, Any]) -> Any:
+    """Return the table that a record tells of, or None; raise LinkwiseError where it is not there."""
+    name = next((name for name in TABLES if name in record["files"]), None)
+    if name is None:
         return None
-    return extra("pyarrow.dataset").dataset(path, format=path.suffix[1:])
-
-
-def _record(folder: Path) -> dict[str, Any]:
-    try:
-        found: dict[str, Any] = parse_json((folder / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise LinkwiseError(f"{RECORD} of the bundle cannot be read: {error}") from error
-    return found
+    if not (folder / name).is_file():
+        raise LinkwiseError(f"its result lacks {name}")
+    return extra("pyarrow.dataset").dataset(folder / name, format=name.rpartition(".")[2])

@@ -10,8 +10,10 @@ from typing import Any, Literal
 from linkwise_runtime.version import VERSION
 
 from linkwise.analysis.choices import AnalysisChoices
+from linkwise.errors import LinkwiseError
+from linkwise.escape import short
 from linkwise.option import written
-from linkwise.package.decode import parse_json, require
+from linkwise.package.decode import decode, known_keys, parse_json, require, toml_value
 from linkwise.pipeline import is_program
 from linkwise.robot import Options
 from linkwise.robot.read import is_built_in
@@ -72,11 +74,12 @@ def written_analysis(log: Path, robot: Path, backend: str, given: Mapping[str, A
     """Return an analysis as it was written; backend: the one that computed."""
     options = {one: given_of(one, given) for one in (AnalysisChoices, Options)}
     return WrittenAnalysis(
-        str(log), str(robot), _kind(robot), backend, options[AnalysisChoices], options[Options]
+        str(log), str(robot), kind_of(robot), backend, options[AnalysisChoices], options[Options]
     )
 
 
-def _kind(robot: Path) -> Kind:
+def kind_of(robot: Path) -> Kind:
+    """Return what a robot is."""
     if robot.is_dir():
         return "package"
     if is_program(robot):
@@ -122,8 +125,9 @@ class Bundle:
 
     @property
     def tops(self) -> set[str]:
-        """Names of the files, and of the folders that a log or a robot may be."""
-        return {*self.files, *(str(folder) for name in self.files for folder in PurePosixPath(name).parents)}
+        """Names of the files, and of folders in which they are, which a log or a robot may be."""
+        folders = {str(folder) for name in self.files for folder in PurePosixPath(name).parents}
+        return {*self.files, *folders} - {"."}
 
     def record(self) -> dict[str, Any]:
         """Return this as plain data."""
@@ -134,21 +138,21 @@ class Bundle:
         """Return the contents of a bundle by its record; raises ValueError for any other text."""
         data = parse_json(text)
         require(isinstance(data, dict) and data.get("schema") == SCHEMA, "schema", str(SCHEMA), data)
-        try:
-            asked, files = WrittenAnalysis(**data["analysis"]), data["files"]
-            found = Bundle(
-                asked,
-                dict(data["versions"]),
-                {name: PackedFile(int(one["bytes"]), str(one["sha256"])) for name, one in files.items()},
-                tuple(map(str, data["left_out"])),
-            )
-        except (AttributeError, KeyError, TypeError) as error:
-            raise ValueError(f"{CONTENTS} lacks {error}") from error
-        texts = (asked.log, asked.robot, asked.kind, asked.backend, *found.versions.values())
-        require(all(isinstance(text, str) for text in texts), "analysis", "texts", texts)
-        for given in (asked.choices, asked.options):
-            require(isinstance(given, dict), "analysis", "options by key", given)
-        return found
+        return decode(Bundle, data, "", also=("schema",))
+
+    def require_own(self) -> None:
+        """Raise LinkwiseError for files that are not in the bundle, and for unknown options."""
+        asked = self.analysis
+        for kind, given in ((AnalysisChoices, asked.choices), (Options, asked.options)):
+            kinds = {one.key: one.kind for one in written(kind)}
+            for key, value in known_keys(f"{CONTENTS}: options", given, kinds).items():
+                toml_value(kinds[key], f"{CONTENTS}: {key}", value)
+        tops, has_file = self.tops, asked.kind != "built-in"
+        for path in (asked.log, *asked.files, *([asked.robot] if has_file else [])):
+            if path not in tops:
+                raise LinkwiseError(f"names {short(path, 80)!a}, which is not in it; do not trust it")
+        if not has_file and not is_built_in(asked.robot):
+            raise LinkwiseError(f"its robot {short(asked.robot, 80)!a} is not built in; do not trust it")
 
 
 def versions_here() -> dict[str, str]:

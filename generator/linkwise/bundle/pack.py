@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from linkwise.analysis.loads.external import data_files
 from linkwise.bundle.contents import CONTENTS, RESULT, Bundle, PackedFile, WrittenAnalysis, versions_here
+from linkwise.bundle.references import beside_of, is_within
 from linkwise.errors import LinkwiseError
 from linkwise.escape import json_text, listed
 from linkwise.option import chosen
@@ -100,16 +100,6 @@ class _Packed:
         self.files[name] = PackedFile(size, digest.hexdigest())
 
 
-def beside_of(path: Path) -> list[Path]:
-    """Return the files that a file of an option names and that are read too: data of OpenSim's loads."""
-    if path.suffix.lower() != ".xml":
-        return []
-    try:
-        return [file for file in data_files(path) if file.is_file()]
-    except LinkwiseError:  # not a file of loads
-        return []
-
-
 def _robot_files(analysis: WrittenAnalysis) -> tuple[tuple[Path, ...], tuple[str, ...]]:
     """Return the robot's files, none of a built-in one, and the names of those that are left out."""
     robot = Path(analysis.robot)
@@ -122,7 +112,7 @@ def _robot_files(analysis: WrittenAnalysis) -> tuple[tuple[Path, ...], tuple[str
         if len(kept) < len(files) and not _is_readable(robot, kept, analysis, Path(folder) / "bare"):
             kept = files
         copy = _copied(robot, kept, Path(folder) / "whole")
-        if not _is_within(robot_files(copy, options), folder):
+        if not is_within(robot_files(copy, options), Path(folder)):
             raise LinkwiseError(
                 f"--bundle: {robot} names files by paths of this machine; name them relative to it"
             )
@@ -176,14 +166,10 @@ def _require_relative(path: Path, beside: Sequence[Path]) -> None:
         return
     with tempfile.TemporaryDirectory() as folder:
         copy = _copied(path, [path, *beside], Path(folder))
-        if not _is_within(beside_of(copy), folder):
+        if not is_within(beside_of(copy), Path(folder)):
             raise LinkwiseError(
                 f"--bundle: {path} names {listed(beside)} by paths of this machine; name them relative to it"
             )
-
-
-def _is_within(files: Sequence[Path], folder: str) -> bool:
-    return all(Path(os.path.abspath(file)).is_relative_to(folder) for file in files)
 
 
 def _inside(path: Path) -> Iterator[Path]:

@@ -6,12 +6,21 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from zipfile import BadZipFile, ZipFile
 
 from linkwise.bounded_file import MIB
-from linkwise.bundle.contents import CONTENTS, Bundle, PackedFile
+from linkwise.bundle.contents import CONTENTS, RESULT, Bundle, PackedFile, kind_of
+from linkwise.bundle.references import beside_of, is_within
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import short
 from linkwise.input_file import require_file
+from linkwise.robot import Options, robot_files
 
 CHUNK = MIB
+FOLDERS = (("log",), ("robot",), ("files",), (RESULT,))
+"""Folders of a bundle; a file beside them might be taken for a built-in robot."""
+DAMAGES = (
+    *(BadZipFile, EOFError, KeyError, NotImplementedError),
+    *(OSError, OverflowError, RuntimeError, ValueError),
+)
+"""Errors that zipfile and JSON raise for what is none of theirs."""
 MOST = 16 * MIB
 """Most bytes of a bundle's own record."""
 
@@ -19,7 +28,8 @@ MOST = 16 * MIB
 def unpacked(file: Path, folder: Path) -> Bundle:
     """Write the files of a bundle into a folder, and return its contents, with names below that folder.
 
-    Raises LinkwiseError, which names the file, for what is no bundle, is damaged, or would not fit.
+    Raises LinkwiseError, which names the file, for what is no bundle, is damaged, would not fit, asks for
+    options that are not known here, or names files that are not in it.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with within(str(file)):
@@ -27,22 +37,33 @@ def unpacked(file: Path, folder: Path) -> Bundle:
         try:
             with ZipFile(file) as archive:
                 bundle = _contents(archive)
+                bundle.require_own()
                 _require_room(bundle, folder)
                 for name, told in bundle.files.items():
                     _write(archive, name, told, folder)
-        except (
-            BadZipFile,
-            EOFError,
-            KeyError,
-            NotImplementedError,
-            OSError,
-            RuntimeError,
-            ValueError,
-        ) as error:
-            if isinstance(error, LinkwiseError):
-                raise
-            raise LinkwiseError(f"is no bundle, or a damaged one: {short(str(error), 200)}") from error
+        except LinkwiseError:
+            raise
+        except DAMAGES as error:
+            said = short(str(error.args[0]) if error.args else type(error).__name__, 200)
+            raise LinkwiseError(f"is no bundle, or a damaged one: {said}") from error
+        _require_alone(bundle, folder)
     return bundle
+
+
+def _require_alone(bundle: Bundle, folder: Path) -> None:
+    """Raise LinkwiseError where a robot is not what is said of it, or files name others outside."""
+    asked = bundle.analysis
+    there = [(folder / path, beside_of(folder / path)) for path in asked.files]
+    if asked.kind != "built-in":
+        robot = folder / asked.robot
+        if kind_of(robot) != asked.kind:
+            raise LinkwiseError(f"says that its robot is a {asked.kind}, which is not so; do not trust it")
+        if asked.kind == "file":
+            there.append((robot, list(robot_files(robot, Options()))))
+    for path, beside in there:
+        if not is_within(beside, folder):
+            name = path.relative_to(folder).as_posix()
+            raise LinkwiseError(f"its {name} names files that are not in it; do not trust it")
 
 
 def _contents(archive: ZipFile) -> Bundle:
@@ -63,10 +84,14 @@ def _require_room(bundle: Bundle, folder: Path) -> None:
 
 def _write(archive: ZipFile, name: str, told: PackedFile, folder: Path) -> None:
     parts = PurePosixPath(name).parts
-    if not parts or ".." in parts or name.startswith("/") or PureWindowsPath(name).anchor or "\\" in name:
-        raise LinkwiseError(
-            f"has a file {short(name, 80)!a}, outside of any folder of its own; do not trust it"
-        )
+    if (
+        parts[:1] not in FOLDERS
+        or ".." in parts
+        or name.startswith("/")
+        or PureWindowsPath(name).anchor
+        or "\\" in name
+    ):
+        raise LinkwiseError(f"has a file {short(name, 80)!a}, outside of its folders; do not trust it")
     target, digest, size = folder / name, hashlib.sha256(), 0
     target.parent.mkdir(parents=True, exist_ok=True)
     with archive.open(name) as packed, target.open("wb") as out:

@@ -1,6 +1,9 @@
 """The command `replay`."""
 
+import math
 import tempfile
+from collections.abc import Sequence
+from contextlib import chdir
 from pathlib import Path
 from typing import Annotated
 
@@ -12,12 +15,16 @@ from linkwise.cli import tell
 from linkwise.cli.analyze import analyzed
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed, printable
+from linkwise.input_file import is_inside
 from linkwise.option import chosen
 from linkwise.robot import Options
 
 File = Annotated[Path, typer.Argument(help="Bundle that `linkwise analyze --bundle` wrote", metavar="BUNDLE")]
 Out = Annotated[
-    Path | None, typer.Option(help="Directory to write the new result to; it is not kept if not given")
+    Path | None,
+    typer.Option(
+        help="Directory to write; a former result is replaced; the new one is not kept if not given"
+    ),
 ]
 Backend = Annotated[
     str | None, typer.Option(help="Back end in place of the one that the bundle's result had")
@@ -46,23 +53,30 @@ def replay(
     trust_python: TrustPython = False,
 ) -> None:
     """Run the analysis of a bundle again, and compare its result with the bundle's."""
+    if not math.isfinite(tolerance):
+        raise LinkwiseError(f"--tolerance {tolerance:g}: give a share, such as 1e-9")
+    if out is not None and is_inside(bundle, out):
+        raise LinkwiseError(f"--out {out} is to be replaced and holds the bundle; give another --out")
+    result = None if out is None else out.absolute()
     with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
-        found = unpacked(bundle, place)
+        found = unpacked(bundle, Path(folder))
         with within(str(bundle)):
             _require_trusted(found, trust_python)
-            asked = found.analysis.with_files({name: str(place / name) for name in found.tops})
-            choices, options = chosen(AnalysisChoices, asked.choices), chosen(Options, asked.options)
         tell(*_versions(found))
-        result = out or place / "replayed"
-        _, files = analyzed(result, Path(asked.log), asked.robot, choices, options, backend or asked.backend)
-        with within(str(bundle)):
-            comparison = compared(place / RESULT, result)
-    tell(*comparison.lines, *(map(str, files) if out is not None else ()))
+        with within(str(bundle)), chdir(folder):  # files have the names of the bundle in all that is told
+            files = _analyzed(found, result or Path("replayed"), backend)
+            comparison = compared(Path(RESULT), result or Path("replayed"))
+    tell(*comparison.lines, *(str(out / file.name) for file in files if out is not None))
     is_same = comparison.is_same(tolerance)
     tell(f"{'the same' if is_same else 'NOT the same'}, within {tolerance:g}")
     if not is_same:
         raise typer.Exit(1)
+
+
+def _analyzed(bundle: Bundle, out: Path, backend: str | None) -> Sequence[Path]:
+    asked = bundle.analysis
+    choices, options = chosen(AnalysisChoices, asked.choices), chosen(Options, asked.options)
+    return analyzed(out, Path(asked.log), asked.robot, choices, options, backend or asked.backend)[1]
 
 
 def _require_trusted(bundle: Bundle, trust_python: bool) -> None:
