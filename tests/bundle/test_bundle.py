@@ -318,9 +318,13 @@ def test_a_result_in_the_place_of_the_bundle_is_refused(case: Path) -> None:
 
 def test_what_is_no_bundle_is_refused(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("time,a\n")
-    for name in ("log.csv", "gone.zip", "."):
+    for name, told in (
+        ("log.csv", "is no bundle, or a damaged one: File is not a zip file"),
+        ("gone.zip", "gone.zip: no such file"),
+        (".", "this is a directory; give a bundle that `linkwise analyze --bundle` wrote"),
+    ):
         done = run_linkwise("replay", name, folder=tmp_path)
-        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+        assert (done.returncode, done.stderr.count("\n"), told in done.stderr) == (2, 1, True), done.stderr
 
 
 def test_written_options_come_back_as_they_were(case: Path) -> None:
