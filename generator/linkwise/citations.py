@@ -193,10 +193,10 @@ def record_of(result: Path) -> tuple[Path, dict[str, Any]]:
 def _record_at(result: Path) -> Path:
     """Return the path of a result's record; raises LinkwiseError where there is none."""
     remedy = "give a folder that analyze, study or generate wrote, or the record in it"
-    told = (result,) if result.name in RECORDS else ()
-    found = next(filter(is_file, (*told, *(result / name for name in RECORDS))), None)
-    if found is not None:
-        return found
+    places = [result] if result.name in RECORDS else []
+    for place in (*places, *(result / name for name in RECORDS)):
+        if is_file(place):
+            return place
     lacks = f"{'is' if is_file(result) else 'holds'} none of {', '.join(RECORDS)}"
     if is_file(result / IDENTIFIED) or (is_file(result) and result.name == IDENTIFIED):
         lacks = "identify wrote this, and cite knows the methods of analyses, studies and packages alone"

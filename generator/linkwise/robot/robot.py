@@ -33,16 +33,17 @@ class _Position(sp.Symbol):  # type: ignore[misc]
     """
 
 
-class _Rate(sp.Symbol):  # type: ignore[misc]
+class _TimeDerivative(sp.Symbol):  # type: ignore[misc]
     """Symbol of a derivative by time, which text writes as a quotient and LaTeX with dots."""
 
     precedence = PRECEDENCE["Mul"]
-    """Its place among operations, by which SymPy brackets the text: (d(q)/dt)**2."""
+    """Place among operations, by which SymPy brackets the text: (d(q)/dt)**2."""
     _accent = "dot"
 
     @property
     def _position(self) -> str:
-        return self.name.partition("(")[2].rpartition(")")[0]
+        name: str = self.name
+        return name.partition("(")[2].rpartition(")")[0]
 
     def _latex(self, printer: Any) -> str:
         return rf"\{self._accent}{{{printer._print(sp.Symbol(self._position))}}}"
@@ -51,11 +52,11 @@ class _Rate(sp.Symbol):  # type: ignore[misc]
         return prettyForm(self.name, binding=prettyForm.ADD)
 
 
-class _Velocity(_Rate):
+class _Velocity(_TimeDerivative):
     pass
 
 
-class _Acceleration(_Rate):
+class _Acceleration(_TimeDerivative):
     _accent = "ddot"
 
 
