@@ -167,30 +167,40 @@ FALSE_DISCOVERIES = _article(
 
 RECORDS = ("analysis.json", "study.json", "manifest.json")
 """Records of results, one of which a folder has."""
+IDENTIFIED = "identified.json"
+"""Record of an identification."""
 
 
 def record_of(result: Path) -> tuple[Path, dict[str, Any]]:
     """Return the path of a result's record and its content; of a study, the rows of its tests as `tests`.
 
-    result: the folder that `analyze`, `study` or `generate` wrote
+    result: the folder that `analyze`, `study` or `generate` wrote, or the record in it
 
-    Raises LinkwiseError for a folder without a record, and for a damaged one.
+    Raises LinkwiseError for what has or is no such record, and for a damaged one.
     """
-    path = next((result / name for name in RECORDS if is_file(result / name)), None)
-    if path is None:
-        raise LinkwiseError(
-            f"{result}: holds none of {', '.join(RECORDS)}; give a folder that analyze, study or generate"
-            " wrote"
-        )
+    path = _record_at(result)
     try:
         record = parse_json(path.read_text(encoding="utf-8"))
         require(isinstance(record, dict), "", "an object", record)
     except (OSError, ValueError) as error:
         raise LinkwiseError(f"{path}: is damaged: {error}") from error
-    tests = result / "tests.parquet"
+    tests = path.parent / "tests.parquet"
     if path.name == "study.json" and is_file(tests):
         record["tests"] = extra("pyarrow.parquet").read_table(tests).to_pylist()
     return path, record
+
+
+def _record_at(result: Path) -> Path:
+    """Return the path of a result's record; raises LinkwiseError where there is none."""
+    remedy = "give a folder that analyze, study or generate wrote, or the record in it"
+    places = [result] if result.name in RECORDS else []
+    for place in (*places, *(result / name for name in RECORDS)):
+        if is_file(place):
+            return place
+    lacks = f"{'is' if is_file(result) else 'holds'} none of {', '.join(RECORDS)}"
+    if is_file(result / IDENTIFIED) or (is_file(result) and result.name == IDENTIFIED):
+        lacks = "identify wrote this, and cite knows the methods of analyses, studies and packages alone"
+    raise LinkwiseError(f"{result}: {lacks if result.exists() else 'no such file or folder'}; {remedy}")
 
 
 def citations(record: Mapping[str, Any]) -> Iterator[Citation]:

@@ -7,7 +7,14 @@ from linkwise.dynamics.derive import Method
 from linkwise.dynamics.frame_search import FrameSearch
 from linkwise.dynamics.joint_chain import CommonAxes
 from linkwise.dynamics.link_motion import Origin
-from linkwise.emit.backend import LOOPS, BackendFiles, backends_of, chosen_backends, usual_backends
+from linkwise.emit.backend import (
+    LOOPS,
+    BackendFiles,
+    backends_of,
+    chosen_backends,
+    refuse_unknown,
+    usual_backends,
+)
 from linkwise.emit.c.loop_costs import decomposition_cost, link_costs
 from linkwise.errors import LinkwiseError
 from linkwise.package.entries import KernelKind
@@ -34,8 +41,8 @@ def chosen_kernel(
 ) -> KernelKind:
     """Return the kernel for one of CHOICES and the back ends asked for by name, None for all.
 
-    Raises LinkwiseError for a choice that is not one, and for loops over energies or for a derivation from
-    them, and for closed forms of joints that follow curves, formulas among them.
+    Raises LinkwiseError for a choice that is not one, for an unknown back end, for loops over energies or for
+    a derivation from them, and for closed forms of joints that follow curves, formulas among them.
     """
     if derivation not in get_args(Method):
         raise LinkwiseError(f"no derivation {derivation!r}; choose rule or energy")
@@ -48,6 +55,7 @@ def chosen_kernel(
         )
     if choice == "loops" and derivation == "energy":
         raise LinkwiseError("--kernel loops derives nothing, and --derivation energy does; leave one out")
+    refuse_unknown(backends or ())
     closed = derivation == "energy" or (backends is not None and not set(backends) <= LOOPS.keys())
     if isinstance(system, RigidSystem) and system.curved:
         if choice == "straight" or closed:

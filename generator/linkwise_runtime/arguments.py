@@ -111,7 +111,7 @@ def as_weights(name: str, value: object) -> Numbers:
     else:
         weights = as_array(name, value)
     if not _dtype(weights).startswith(REAL):
-        raise TypeError(f"{name} has dtype {_dtype(weights)}; give zeros and ones, or weights between")
+        raise TypeError(f"{name} has dtype {_dtype(weights)}; give real numbers")
     return weights
 
 

@@ -131,3 +131,8 @@ def test_what_cannot_carry_a_payload_is_named(arm):
         assert str(refusal.value) == message
     with pytest.raises(LinkwiseError, match="'payload tool': another has that name"):
         with_payloads(loaded, carried(["tool=1", "tool=2"], loaded))
+
+
+def test_a_payload_follows_no_joint_so_that_no_flow_is_called_fed_by_it(arm):
+    told = analyze(arm / "log.csv", arm / "arm", payloads=PAYLOADS, induced_power=True).warnings
+    assert not [line for line in told if "flow" in line]

@@ -69,3 +69,15 @@ def test_what_is_no_result_is_refused(tmp_path: Path, text: str | None, told: st
         (tmp_path / "study.json").write_text(text)
     with pytest.raises(LinkwiseError, match=told):
         record_of(tmp_path)
+
+
+def test_a_record_may_be_given_itself_and_other_files_are_told(tmp_path: Path) -> None:
+    record = tmp_path / "analysis.json"
+    record.write_text('{"markers": {}}')
+    assert record_of(record) == record_of(tmp_path) == (record, {"markers": {}})
+    record.rename(tmp_path / "identified.json")
+    for given in (tmp_path, tmp_path / "identified.json"):
+        with pytest.raises(LinkwiseError, match=r": identify wrote this, and cite knows the methods of anal"):
+            record_of(given)
+    with pytest.raises(LinkwiseError, match=r"lost: no such file or folder; give a folder that analyze"):
+        record_of(tmp_path / "lost")

@@ -81,7 +81,10 @@ def test_what_is_there_and_not_the_case_is_refused_by_name_and_stays(tmp_path: P
     assert "notes.txt is not a folder; give another --out" in refused(
         tmp_path, "throw", "--out", "own/notes.txt"
     )
+    (tmp_path / "own/README.md").write_text("mine too")
+    assert "own is not empty; give another --out" in refused(tmp_path, "throw", "--out", "own")
     run_linkwise("example", "throw", folder=tmp_path)
+    assert "throw holds the example throw; give another --out" in refused(tmp_path, "leg", "--out", "throw")
     (tmp_path / "throw/arm.urdf").write_text("<robot/>")
     told = refused(tmp_path, "throw")
     assert "throw holds this example, but arm.urdf was changed; move it away, or give another --out" in told
@@ -101,3 +104,12 @@ def test_a_file_that_is_not_the_published_one_is_never_handed_out(tmp_path: Path
     ):
         write_case(lost, tmp_path / "throw")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_needs_a_name_and_is_typed_so_that_cd_takes_it(tmp_path: Path) -> None:
+    assert "--out place is the folder of one case; name it: arm-log, leg" in refused(
+        tmp_path, "--out", "place"
+    )
+    ended = run_linkwise("example", "throw", "--out=-x", folder=tmp_path)
+    assert "  cd ./-x\n" in ended.stdout
+    assert (tmp_path / "-x/README.md").is_file()

@@ -384,6 +384,12 @@ def test_what_is_no_part_of_a_system_is_refused_by_name(case: str) -> None:
         energy_system("it", **asked)
 
 
+def test_a_mass_that_its_parameter_makes_negative_is_told_with_its_value() -> None:
+    mass = sp.Symbol("m")
+    with pytest.raises(LinkwiseError, match=r"its mass is m = -1\.5, and no body has a negative one$"):
+        energy_system("it", [FLAT], [Particle("a", mass, ROOM)], {mass: -1.5})
+
+
 FUNCTIONS = {
     "a coordinate without a unit": (([X], [X.diff(T) ** 2], {}), "the coordinate x(t) has no unit"),
     "an unknown function": (

@@ -600,3 +600,12 @@ def test_a_table_is_the_spline_through_it_and_goes_on_beyond(tmp_path: Path) -> 
 def test_what_is_no_table_is_told(given: tuple[Any, ...], message: str) -> None:
     with pytest.raises(LinkwiseError, match=message):
         interpolated(X.q, *given)
+
+
+def test_powers_and_products_of_velocities_read_as_such() -> None:
+    theta, m = Coordinate("theta"), sp.Symbol("m")
+    assert str(m * theta.qd**2 / 2) == "m*(d(theta)/dt)**2/2"
+    assert str(1 / theta.qdd) == "1/(d²(theta)/dt²)"
+    assert sp.latex([theta.qd, theta.qdd]) == r"\left[ \dot{\theta}, \  \ddot{\theta}\right]"
+    assert sp.pretty(m * theta.qd) == "m⋅(d(theta)/dt)"
+    assert str(theta.qd) == "d(theta)/dt"

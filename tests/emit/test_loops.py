@@ -352,6 +352,7 @@ def test_formulas_asked_for_by_name_are_derived(monkeypatch: pytest.MonkeyPatch)
             "'formulas' is not there with --kernel loops",
         ),
         (KNEE, {"backends": ["formulas"]}, "follows a curve, and no closed forms are derived for that"),
+        (KNEE, {"backends": ["foo"]}, "no back end 'foo'; choose among numpy, torch,"),
         ("planar3", {"backends": []}, "no back end is asked for; choose among numpy, torch,"),
         ("planar160", {"backends": ["c"]}, "160 joints are too many for C in loops: it answers with"),
         ("planar3", {"kernel": "curved"}, "no kernel 'curved'; choose among auto, straight, loops"),

@@ -90,6 +90,8 @@ def test_a_package_tells_how_it_was_asked_for_whoever_makes_it(tmp_path: Path) -
 def test_a_back_end_that_writes_nothing_keeps_no_package(cache: Path) -> None:
     with pytest.raises(LinkwiseError, match="follows a curve, and no closed forms are derived for that"):
         kept_package(KNEE, "formulas")
+    with pytest.raises(LinkwiseError, match="no back end 'foo'; choose among numpy"):
+        kept_package(KNEE, "foo")
     assert not list(cache.glob("packages/*/*"))
 
 

@@ -209,10 +209,13 @@ def test_wrong_shape_names_the_argument(backend: str, package_of: Callable[[str]
 
 
 MASKS: dict[str, tuple[Any, str]] = {
-    "complex": (np.ones((3, 3), complex), "the mask has dtype complex128; give zeros and ones, or weights"),
-    "a complex tensor": (torch.ones(3, 3, dtype=torch.complex64), "the mask has dtype complex64; give zeros"),
-    "words": ([["1"] * 3] * 3, "the mask has dtype str32; give zeros and ones, or weights between"),
-    "objects": (np.full((3, 3), None), "the mask has dtype object; give zeros and ones, or weights between"),
+    "complex": (np.ones((3, 3), complex), "the mask has dtype complex128; give real numbers"),
+    "a complex tensor": (
+        torch.ones(3, 3, dtype=torch.complex64),
+        "the mask has dtype complex64; give real numbers",
+    ),
+    "words": ([["1"] * 3] * 3, "the mask has dtype str32; give real numbers"),
+    "objects": (np.full((3, 3), None), "the mask has dtype object; give real numbers"),
     "gaps": (np.ma.masked_equal(np.eye(3), 0), "the mask is a masked array; fill its gaps first"),
     "None": (None, "the mask is None; give an array, a tensor or a list"),
     "one number": (1.0, r"the mask has shape \(\); it must be \(3, 3\): order, coordinate"),

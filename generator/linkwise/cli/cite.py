@@ -13,7 +13,9 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def cite(
-    result: Annotated[Path, typer.Argument(help="Folder that analyze, study or generate wrote")],
+    result: Annotated[
+        Path, typer.Argument(help="Folder that analyze, study or generate wrote, or its record")
+    ],
 ) -> None:
     """Print the references of what a result used, as BibTeX."""
     path, record = record_of(result)

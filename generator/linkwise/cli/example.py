@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from linkwise.cli import counted, tell
+from linkwise.errors import LinkwiseError
 from linkwise.example_cases import ExampleCase, example_case, example_cases, write_case
 
 app = typer.Typer(add_completion=False)
@@ -19,6 +20,10 @@ def example(
 ) -> None:
     """Put a whole case into a folder: robot, movement, forces, and what to type next."""
     if name is None:
+        if out is not None:
+            raise LinkwiseError(
+                f"--out {out} is the folder of one case; name it: {', '.join(example_cases())}"
+            )
         cases = example_cases().values()
         width = max(len(case.name) for case in cases)
         tell(*(f"{case.name:{width}}  {case.title}" for case in cases))
@@ -31,6 +36,7 @@ def example(
 
 def _tell_next(case: ExampleCase, folder: Path, written: bool) -> None:
     place = folder.as_posix()
+    place = f"./{place}" if place.startswith("-") else place  # else cd takes it for an option
     tell(f"{'wrote' if written else 'up to date:'} {place}: {counted(len(case.files), 'file')}")
     tell(f"{case.title}; where it is from: {place}/SOURCE.md")
     tell("", "Next, and more of it in its README.md:", "")

@@ -234,6 +234,12 @@ def usual_backends(system: System, kernel: KernelKind) -> tuple[str, ...]:
     return tuple(one.name for one in there if one.usual(system))
 
 
+def refuse_unknown(names: Iterable[str]) -> None:
+    """Raise LinkwiseError for a name that no back end has."""
+    if unknown := [name for name in names if name not in BACKENDS]:
+        raise LinkwiseError(f"no back end {unknown[0]!r}; choose among {', '.join(BACKENDS)}")
+
+
 def chosen_backends(names: Iterable[str], kernel: KernelKind = "straight") -> tuple[BackendFiles, ...]:
     """Return back ends by name, and those that they need, in the registry's order.
 
@@ -242,9 +248,8 @@ def chosen_backends(names: Iterable[str], kernel: KernelKind = "straight") -> tu
     wanted, there = list(names), backends_of(kernel)
     if not wanted:
         raise LinkwiseError(f"no back end is asked for; choose among {', '.join(there)}")
+    refuse_unknown(wanted)
     for name in wanted:
-        if name not in BACKENDS:
-            raise LinkwiseError(f"no back end {name!r}; choose among {', '.join(BACKENDS)}")
         if name not in there:
             raise LinkwiseError(
                 f"the back end {name!r} is not there with --kernel loops, which derives no formulas; choose "

@@ -10,6 +10,8 @@ import sympy as sp
 from linkwise_runtime.file_joints import FileJoint
 from linkwise_runtime.rule.joint_tree import TreeTie
 from linkwise_runtime.structure import PassiveJoint
+from sympy.printing.precedence import PRECEDENCE
+from sympy.printing.pretty.stringpict import prettyForm
 
 from linkwise.errors import LinkwiseError
 from linkwise.robot.curve import Curve
@@ -31,12 +33,31 @@ class _Position(sp.Symbol):  # type: ignore[misc]
     """
 
 
-class _Velocity(sp.Symbol):  # type: ignore[misc]
+class _TimeDerivative(sp.Symbol):  # type: ignore[misc]
+    """Symbol of a derivative by time, which text writes as a quotient and LaTeX with dots."""
+
+    precedence = PRECEDENCE["Mul"]
+    """Place among operations, by which SymPy brackets the text: (d(q)/dt)**2."""
+    _accent = "dot"
+
+    @property
+    def _position(self) -> str:
+        name: str = self.name
+        return name.partition("(")[2].rpartition(")")[0]
+
+    def _latex(self, printer: Any) -> str:
+        return rf"\{self._accent}{{{printer._print(sp.Symbol(self._position))}}}"
+
+    def _pretty(self, printer: Any) -> prettyForm:
+        return prettyForm(self.name, binding=prettyForm.ADD)
+
+
+class _Velocity(_TimeDerivative):
     pass
 
 
-class _Acceleration(sp.Symbol):  # type: ignore[misc]
-    pass
+class _Acceleration(_TimeDerivative):
+    _accent = "ddot"
 
 
 @dataclass(frozen=True)

@@ -150,7 +150,8 @@ def _mass(given: object, values: Values) -> sp.Expr:
     mass = expression_of("mass", given)
     value = sp.sympify(mass.xreplace(dict(values)))
     if value.is_number and value.is_negative:
-        raise LinkwiseError(f"its mass is {mass}, and no body has a negative one")
+        told = str(mass) if mass.is_number else f"{mass} = {float(value):g}"
+        raise LinkwiseError(f"its mass is {told}, and no body has a negative one")
     return mass
 
 

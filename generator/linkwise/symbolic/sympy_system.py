@@ -4,7 +4,8 @@ Generalised speeds become velocities by the system's kinematic differential equa
 generalised forces Q_i = F · ∂v/∂q̇_i + T · ∂ω/∂q̇_i.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import sympy as sp
@@ -47,7 +48,7 @@ def from_sympy(
     """
     if not isinstance(system, System):
         raise LinkwiseError(
-            f"from_sympy takes a sympy.physics.mechanics.System, and got {short(repr(system))}"
+            f"from_sympy takes a sympy.physics.mechanics.System, and got {short(type(system).__name__)}"
         )
     reader = _SystemReader(system)
     links = [link for link in map(reader.link, system.bodies) if _moves(link)]
@@ -79,7 +80,7 @@ class _SystemReader:
     def link(self, body: RigidBody | Particle) -> LinkEnergy:
         """Return the energies of a body, and the loads on it."""
         with within(f"body {body.name!r}"):
-            potential: dict[str, sp.Expr] = {}
+            kinetic, potential = self._kinetic(body), dict[str, sp.Expr]()
             if body.potential_energy != 0:
                 potential[POTENTIAL] = self._plain(body.potential_energy)
             forces: dict[str, dict[sp.Expr, sp.Expr]] = {}
@@ -89,11 +90,12 @@ class _SystemReader:
                 self._loads[at] = (name, None)
                 field = _field(load, body, self.frame)
                 if field is not None and (sp.sympify(body.mass).free_symbols or field in self._fields):
-                    place = body.masscenter.pos_from(self.origin)
+                    with _joined(f"where {body.masscenter.name!r} is"):
+                        place = body.masscenter.pos_from(self.origin)
                     potential[GRAVITY] = potential.get(GRAVITY, 0) - body.mass * field.dot(place)
                 else:
                     self._add(forces, name, load)
-            return LinkEnergy(body.name, self._plain(body.kinetic_energy(self.frame)), potential, 0, forces)
+            return LinkEnergy(body.name, self._plain(kinetic), potential, 0, forces)
 
     def rest(self) -> LinkEnergy | None:
         """Return a link with the loads that act on no body; None where there are none."""
@@ -132,13 +134,16 @@ class _SystemReader:
         for body in bodies:
             own = [load for _, load in self._loads if load is not None and self._acts_on(load, body)]
             fields = [field for load in own if (field := _field(load, body, self.frame)) is not None]
-            if fields or body.kinetic_energy(self.frame) != 0:
+            with within(f"body {body.name!r}"):
+                moves = bool(fields) or self._kinetic(body) != 0
+            if moves:
                 found.append(fields)
         return [field for field in found[0] if all(field in own for own in found)] if len(found) > 1 else []
 
     def _add(self, forces: dict[str, dict[sp.Expr, sp.Expr]], name: str, load: Force | Torque) -> None:
         is_force = isinstance(load, Force)
-        moved = load.point.vel(self.frame) if is_force else load.frame.ang_vel_in(self.frame)
+        with _joined(f"how {load[0].name!r} moves, on which a load acts,"):
+            moved = load.point.vel(self.frame) if is_force else load.frame.ang_vel_in(self.frame)
         moved, vector = (self._plain_vector(one) for one in (moved, load.vector))
         own = forces.setdefault(name, {})
         for q, rate in zip(self.positions, self.rates, strict=True):
@@ -146,11 +151,29 @@ class _SystemReader:
             if along != 0:
                 own[q] = own.get(q, 0) + along
 
+    def _kinetic(self, body: RigidBody | Particle) -> sp.Expr:
+        with _joined("how it moves"):
+            return body.kinetic_energy(self.frame)
+
     def _plain(self, expr: sp.Expr) -> sp.Expr:
         return sp.sympify(expr).xreplace(self._speeds)
 
     def _plain_vector(self, vector: Vector) -> Vector:
         return vector.xreplace(self._speeds)
+
+
+@contextmanager
+def _joined(what: str) -> Iterator[None]:
+    """Say what is not known where SymPy finds no way from a frame or a point to those of the system."""
+    try:
+        yield
+    except LinkwiseError:
+        raise
+    except ValueError as error:
+        raise LinkwiseError(
+            f"nothing says {what} in the system's frame; join it by a joint, or give positions and "
+            "orientations from there"
+        ) from error
 
 
 def _moves(link: LinkEnergy) -> bool:
@@ -183,7 +206,10 @@ def _units(system: System, given: Mapping[sp.Expr, str]) -> dict[sp.Expr, str]:
             known |= dict.fromkeys(joint.coordinates, kind)
     units = {q: given.get(q, known.get(q, "")) for q in system.q}
     if lacking := [q for q, unit in units.items() if not unit]:
-        raise LinkwiseError(f"{listed(lacking)} have no unit; give them, units={{{lacking[0]}: 'rad'}} say")
+        place = list(system.q).index(lacking[0])
+        raise LinkwiseError(
+            f"{listed(lacking)} have no unit; give them, units={{system.q[{place}]: 'rad'}} say"
+        )
     if strange := [q for q in given if q not in units]:
         raise LinkwiseError(f"units names {listed(strange)}, which the system does not have as coordinates")
     return units

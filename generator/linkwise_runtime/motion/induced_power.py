@@ -85,16 +85,19 @@ def fed_by_couplings(tree: JointTree, n: int) -> list[int]:
     """Return the coordinates whose flow contains what couplings feed in behind them.
 
     A coordinate that moves several joints couples these; it feeds in where some of them, and not all, are
-    behind the first joint of a coordinate, with a link between.
+    behind the first joint of a coordinate, with a link between. A joint that never moves, as that of a
+    payload, is coupled to none.
     """
     carried, of = {link.joint for link in tree.links}, [joint.coordinate for joint in tree.joints]
+    moving = [joint.ratio != 0.0 or joint.curve is not None for joint in tree.joints]
     found = []
     for i in range(n):
         chains = [tree.chain(f) for f in range(len(of))]
         first = of.index(i)
         between = [chain[chain.index(first) : -1] if first in chain else () for chain in chains]
         behind = [bool(carried & {*some}) for some in between]
-        parts = ({there for k, there in zip(of, behind, strict=True) if k == own} for own in range(n))
+        moved = [(k, there) for k, there, moves in zip(of, behind, moving, strict=True) if moves]
+        parts = ({there for k, there in moved if k == own} for own in range(n))
         found += [i] if any(len(part) == 2 for part in parts) else []
     return found
 
