@@ -306,6 +306,17 @@ def test_loads_in_a_bundle_that_name_files_outside_are_refused(case: Path) -> No
     )
 
 
+def test_a_robot_in_a_bundle_that_names_files_outside_is_refused(case: Path) -> None:
+    body = '<mujoco><worldbody><body><joint name="shoulder"/><geom size="0.1"/></body></worldbody></mujoco>'
+    (case / "arm.xml").write_text(body)
+    (case.parent / "inner.xml").write_text(body)
+    write_csv(case / "log.csv", smooth(60, 1), ["shoulder"])
+    bundle = analysed(case, "log.csv", "--robot", "arm.xml")
+    text = f'<mujoco><include file="{case.parent}/inner.xml"/></mujoco>'
+    done = run_linkwise("replay", changed(bundle, _with("robot/arm.xml", text.encode())), folder=case.parent)
+    assert (done.returncode, "its robot/arm.xml names files that are not in it" in done.stderr) == (2, True)
+
+
 def test_a_result_in_the_place_of_the_bundle_is_refused(case: Path) -> None:
     words = ["log.csv", "--robot", "planar3", "--out", "out", "--no-page", "--bundle"]
     assert run_linkwise("analyze", *words, folder=case).returncode == 0

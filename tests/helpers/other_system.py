@@ -60,7 +60,7 @@ OF_OS = (
 )
 OF_SIGNAL = ("SIGHUP", "SIGKILL", "SIGPIPE", "SIGALRM", "pthread_sigmask", "pthread_kill", "setitimer")
 PROGRAMS = SimpleNamespace(NeedCurrentDirectoryForExePath=lambda command: False)
-"""What shutil.which asks Windows from Python 3.12 on."""
+"""Answers to shutil.which, which asks Windows from Python 3.12 on."""
 UNFIT = re.compile(r'[<>:"|?*\\\x00-\x1f]|[. ]$|^(con|prn|aux|nul|com[1-9]|lpt[1-9])(\.|$)', re.IGNORECASE)
 LONGEST = 259
 
