@@ -24,6 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--rehearse", action="store_true", help="tell what speaks against it, and go on")
     asked = parser.parse_args(arguments)
     try:
+        checkout.version_of(ROOT)
         face = public_face.public_face(ROOT)
         against = [*checkout.objections(ROOT), *recorded_faces.objections(ROOT, face)]
         for line in against:
