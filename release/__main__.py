@@ -53,9 +53,10 @@ def make(face: str, work: Path) -> None:
         name = wheel.name.split("-")[0]
         bill = target / f"{name}-{version}.cdx.json"
         materials.bill(wheel, tree / project, ROOT / "constraints.txt", bill, work, epoch)
-        place = target / "conda" / name.replace("_", "-") / "recipe.yaml"
-        place.parent.mkdir(parents=True)
+        place = target / f"{name.replace('_', '-')}.recipe.yaml"
         place.write_text(conda_recipe.recipe(tree / project, sources, version), encoding="utf-8")
+    notes = (checkout.section(ROOT, version) or "").strip()
+    (target / "NOTES.md").write_text(f"{notes}\n", encoding="utf-8")
     (target / "SHA256SUMS").write_text(archives.sums(target), encoding="utf-8")
     shutil.rmtree(OUT, ignore_errors=True)
     shutil.copytree(target, OUT)

@@ -76,7 +76,9 @@ def test_a_release_is_made_up_to_the_upload(ready: Path) -> None:
     subprocess.run(
         ["sha256sum", "--check", "--strict", "SHA256SUMS"], cwd=out, check=True, capture_output=True
     )
-    names = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    assert all(path.is_file() for path in out.iterdir()), "the forge's release has no folders"
+    names = {path.name for path in out.iterdir()}
+    assert (out / "NOTES.md").read_text() == "- All of it.\n"
     listed = re.findall(r"^[0-9a-f]{64}  (.+)$", (out / "SHA256SUMS").read_text(), re.MULTILINE)
     assert {*listed, "SHA256SUMS"} == names
     for own, recipe in (("linkwise", "linkwise"), ("linkwise_runtime", "linkwise-runtime")):
@@ -98,9 +100,9 @@ def test_a_release_is_made_up_to_the_upload(ready: Path) -> None:
         brought = {component["name"] for component in bill["components"]}
         assert needs <= brought
         assert not {"pytest", "torch"} & brought
-        says = yaml.safe_load((out / f"conda/{recipe}/recipe.yaml").read_text())
+        says = yaml.safe_load((out / f"{recipe}.recipe.yaml").read_text())
         assert says["package"] == {"name": recipe, "version": VERSION}
-        assert (out / f"conda/{recipe}/recipe.yaml").parent.joinpath(says["source"]["path"]).is_file()
+        assert (out / says["source"]["path"]).is_file()
         assert {"python >=3.11", "numpy >=2"} <= set(says["requirements"]["run"])
     assert (out / f"linkwise-{VERSION}.api.json").read_bytes() == (
         ready / FOLDER / f"{VERSION}.json"
