@@ -225,12 +225,12 @@ def test_pages_of_versions_come_to_stand_side_by_side_on_their_branch(tmp_path: 
     for version in ("1.2.0", "1.3.0"):
         shutil.rmtree(own / "out", ignore_errors=True)
         git(own, "fetch", "--quiet", "origin")
-        subprocess.run([site, "fetch", "out/docs"], cwd=own, check=True)
+        subprocess.run(["bash", site, "fetch", "out/docs"], cwd=own, check=True)
         (own / "out/docs" / version / "_static").mkdir(parents=True)
         (own / "out/docs" / version / "_static/page.css").write_text(version, encoding="utf-8")
         (own / "out/docs/newest").write_text(version, encoding="utf-8")
         subprocess.run(
-            [site, "keep", "out/docs", f"Pages of v{version}"],
+            ["bash", site, "keep", "out/docs", f"Pages of v{version}"],
             cwd=own,
             env=os.environ | SOMEBODY,
             check=True,
@@ -259,7 +259,7 @@ def test_where_packages_are_absent_tests_run_unless_all_are_required(
     for name in ("bash", "dirname"):
         (programs / name).symlink_to(str(shutil.which(name)))
     environment = {"PATH": str(programs), "LINKWISE_REQUIRE": required}
-    done = subprocess.run([script], env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(["bash", script], env=environment, capture_output=True, text=True, check=False)
     called = (tmp_path / "called").read_text(encoding="utf-8").splitlines()
     assert done.returncode == (0 if is_tested else 1)
     assert ("make test" in called) == is_tested
