@@ -24,6 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--rehearse", action="store_true", help="tell what speaks against it, and go on")
     asked = parser.parse_args(arguments)
     try:
+        checkout.version_of(ROOT)
         face = public_face.public_face(ROOT)
         against = [*checkout.objections(ROOT), *recorded_faces.objections(ROOT, face)]
         for line in against:
@@ -52,9 +53,10 @@ def make(face: str, work: Path) -> None:
         name = wheel.name.split("-")[0]
         bill = target / f"{name}-{version}.cdx.json"
         materials.bill(wheel, tree / project, ROOT / "constraints.txt", bill, work, epoch)
-        place = target / "conda" / name.replace("_", "-") / "recipe.yaml"
-        place.parent.mkdir(parents=True)
+        place = target / f"{name.replace('_', '-')}.recipe.yaml"
         place.write_text(conda_recipe.recipe(tree / project, sources, version), encoding="utf-8")
+    notes = (checkout.section(ROOT, version) or "").strip()
+    (target / "NOTES.md").write_text(f"{notes}\n", encoding="utf-8")
     (target / "SHA256SUMS").write_text(archives.sums(target), encoding="utf-8")
     shutil.rmtree(OUT, ignore_errors=True)
     shutil.copytree(target, OUT)

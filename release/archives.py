@@ -89,8 +89,5 @@ def checked(archives: Iterable[Path], version: str) -> None:
 
 def sums(folder: Path) -> str:
     """Return the SHA-256 of every file of a folder, as `sha256sum --check` reads them."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file())
-    return "".join(
-        f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.relative_to(folder).as_posix()}\n"
-        for path in files
-    )
+    files = sorted(folder.iterdir())
+    return "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files)

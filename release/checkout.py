@@ -12,20 +12,31 @@ from linkwise.errors import LinkwiseError
 VERSION = "generator/linkwise_runtime/version.py"
 FRAGMENTS = "changes"
 """Folder of what changed since the last release, a file each, until it is told in CHANGELOG.md."""
-BREAKING = "*.breaking*.md"
-"""Fragments of a change that breaks what was."""
+BREAKING = "?*.breaking.md"
+"""Fragments of a change that breaks what was; those that are empty tell nothing."""
 NOT_PUBLISHED = "not published yet"
 
 
 def version_of(root: Path) -> str:
-    """Return the version of a checkout, where it is written."""
+    """Return the version of a checkout, where it is written; raises LinkwiseError unless it is numbers."""
     [version] = re.findall(r'^VERSION = "(.+)"$', (root / VERSION).read_text(encoding="utf-8"), re.MULTILINE)
+    numbers(version)
     return str(version)
 
 
 def numbers(version: str) -> tuple[int, ...]:
-    """Return a version's numbers, by which versions are in order."""
+    """Return a version's numbers, by which versions are in order; raises LinkwiseError for any other."""
+    if not is_numbers(version):
+        raise LinkwiseError(
+            f"{VERSION}: version {version}: versions of releases are numbers with points, such as 1.2.0; "
+            "set VERSION to one"
+        )
     return tuple(map(int, version.split(".")))
+
+
+def is_numbers(version: str) -> bool:
+    """Return whether a version is numbers with points, as those of releases are."""
+    return re.fullmatch(r"\d+(\.\d+)+", version) is not None
 
 
 def git(root: Path, *arguments: str) -> bytes:
@@ -35,6 +46,24 @@ def git(root: Path, *arguments: str) -> bytes:
         said = done.stderr.decode().strip().splitlines()[-1:]
         raise LinkwiseError(f"{root}: a release is made in a checkout of git, which says: {' '.join(said)}")
     return done.stdout
+
+
+def tags(root: Path) -> dict[str, str]:
+    """Return the tags of released versions by these; none in a folder that is no checkout."""
+    if not (root / ".git").exists():
+        return {}
+    named = git(root, "tag", "--list", "v*").decode().split()
+    return {tag[1:]: tag for tag in named if is_numbers(tag[1:])}
+
+
+def tags_of_head(root: Path) -> list[str]:
+    """Return the tags of the last commit."""
+    return git(root, "tag", "--points-at", "HEAD").decode().split()
+
+
+def is_released(root: Path, version: str) -> bool:
+    """Return whether a version is tagged at another commit than the last."""
+    return version in tags(root) and f"v{version}" not in tags_of_head(root)
 
 
 def epoch(root: Path) -> str:
@@ -57,9 +86,11 @@ def objections(root: Path) -> Iterator[str]:
     if changed:
         more = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
         yield f"{changed[0][3:]}{more}: not committed; commit or remove it"
-    tags = git(root, "tag", "--points-at", "HEAD").decode().split()
-    if f"v{version}" not in tags and git(root, "tag", "--list", f"v{version}").strip():
+    if is_released(root, version):
         yield f"{VERSION}: version {version} is tagged already, at another commit; raise VERSION"
+    for tag in tags_of_head(root):
+        if re.match(r"v\d", tag) and tag != f"v{version}":
+            yield f"{VERSION}: the last commit is tagged {tag}, and is of version {version}; remove the tag"
     told = section(root, version)
     if told is None:
         yield f"CHANGELOG.md: begins with no section of {version}; tell there what changed"
@@ -85,6 +116,14 @@ def section(root: Path, version: str) -> str | None:
 
 
 def is_breaking_told(root: Path, version: str) -> bool:
-    """Return whether a fragment, or the changelog's section of this version, tells a change that breaks."""
-    headings = re.findall(r"^###.*$", section(root, version) or "", re.MULTILINE)
-    return bool(fragments(root, BREAKING)) or any("breaking" in line.lower() for line in headings)
+    """Return whether a fragment, or the changelog's section of this version, tells a change that breaks.
+
+    A section tells it below `### Breaking`, which is what towncrier writes; one that is released tells
+    nothing of later changes.
+    """
+    if any(
+        (root / FRAGMENTS / name).read_text(encoding="utf-8").strip() for name in fragments(root, BREAKING)
+    ):
+        return True
+    told = "" if is_released(root, version) else section(root, version) or ""
+    return re.search(r"^### Breaking[ \t]*\n\s*(?!#)\S", told, re.MULTILINE) is not None

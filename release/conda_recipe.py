@@ -19,7 +19,7 @@ ADDRESSES = {"homepage": "homepage", "repository": "repository", "documentation"
 
 
 def recipe(project: Path, sources: Path, version: str) -> str:
-    """Return the recipe of the project in a folder, whose archive of sources lies two folders above it.
+    """Return the recipe of the project in a folder, whose archive of sources lies beside it.
 
     Raises LinkwiseError where rattler-build's reader does not take it.
     """

@@ -8,7 +8,6 @@ import ast
 import json
 import re
 from collections.abc import Iterable, Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -17,23 +16,27 @@ from griffe import (
     AliasResolutionError,
     Attribute,
     Class,
+    Expr,
+    ExprAttribute,
+    ExprName,
     Function,
     GriffeLoader,
     Module,
+    ModulesCollection,
     Object,
     Parameter,
     ParameterKind,
     Parameters,
 )
-from linkwise.cli.app import COMMANDS, REPORTS, command_of
 from linkwise.errors import LinkwiseError
+
+from release.command_line import LINE, commands
 
 PACKAGES = ("linkwise", "linkwise_runtime", "generated.planar3")
 SINGLE = re.compile(r"^\.\. auto(?:function|class|exception):: ([\w.]+)$", re.MULTILINE)
 SEVERAL = re.compile(r"^\.\. automodule:: ([\w.]+)\n   :members: (.+)$", re.MULTILINE)
-NAMED = ParameterKind.keyword_only
-LINE = 0
-"""Line of every name: griffe asks for one, and where a name stands is nothing to its users."""
+REQUIRED = "REQUIRED"
+"""What `option` is given where there is no default."""
 
 
 def public_face(root: Path) -> Module:
@@ -55,9 +58,9 @@ def public_face(root: Path) -> Module:
             added(place, plain(name, loader.modules_collection[path]))
         except (AliasResolutionError, KeyError) as error:
             raise LinkwiseError(f"{path}: is told to be public, and is not there") from error
-    commands = added(face, Module("commands"))
-    for command in flags():
-        added(commands, command)
+    program = added(face, Module("commands"))
+    for command in commands():
+        added(program, command)
     return face
 
 
@@ -82,8 +85,10 @@ def plain(name: str, found: Object | Alias) -> Object:
     """Return a name of its own with what users see of it: signatures, public members, inherited ones too."""
     if isinstance(found, Alias):
         return plain(name, found.final_target)
+    constants = found.modules_collection
     if isinstance(found, Function):
-        return function(name, map(signed, found.parameters), text(found.returns))
+        parameters = (signed(parameter, constants) for parameter in found.parameters)
+        return function(name, parameters, text(found.returns))
     if not isinstance(found, Class):
         return Attribute(name, annotation=text(getattr(found, "annotation", None)), lineno=LINE)
     made = Class(name, bases=[str(base) for base in found.bases], lineno=LINE)
@@ -95,7 +100,7 @@ def plain(name: str, found: Object | Alias) -> Object:
         str, found.bases
     ):  # of which griffe makes no `__init__`, as it does of dataclasses
         fields = [each for each in found.members.values() if isinstance(each, Attribute) and each.annotation]
-        added(made, function("__init__", map(filling, fields)))
+        added(made, function("__init__", (filling(field, constants) for field in fields)))
     return made
 
 
@@ -104,42 +109,53 @@ def function(name: str, parameters: Iterable[Parameter], returns: str | None = N
     return Function(name, parameters=Parameters(*parameters), returns=returns, lineno=LINE)
 
 
-def filling(field: Attribute) -> Parameter:
+def filling(field: Attribute, constants: ModulesCollection) -> Parameter:
     """Return the parameter that fills a field of a named tuple."""
-    kind = ParameterKind.positional_or_keyword
-    return Parameter(field.name, annotation=text(field.annotation), kind=kind, default=text(field.value))
+    kind, default = ParameterKind.positional_or_keyword, valued(field.value, constants)
+    return Parameter(field.name, annotation=text(field.annotation), kind=kind, default=default)
 
 
-def signed(parameter: Parameter) -> Parameter:
+def signed(parameter: Parameter, constants: ModulesCollection) -> Parameter:
     """Return a parameter whose default is what is declared by `option`, if it is, without words of help."""
-    default = None if parameter.default is None else str(parameter.default)
+    default = valued(parameter.default, constants)
     if default is not None and default.startswith("option("):
         call = ast.parse(default, mode="eval").body
         assert isinstance(call, ast.Call)
         default = ast.unparse(call.args[0])
-    default = None if default == "REQUIRED" else default
+    default = None if default == REQUIRED else default
     return Parameter(
         parameter.name, annotation=text(parameter.annotation), kind=parameter.kind, default=default
     )
 
 
+def valued(expression: str | Expr | None, constants: ModulesCollection) -> str | None:
+    """Return an expression as it is written, but with values for names of constants of the modules."""
+    if not isinstance(expression, Expr):
+        return expression
+    if isinstance(expression, ExprName | ExprAttribute) and str(expression) != REQUIRED:
+        found = constant(expression.canonical_path, constants)
+        if found is not None:
+            return valued(found.value, constants)
+    if isinstance(expression, ExprName | ExprAttribute):
+        return str(expression)
+    return "".join(valued(part, constants) or "" for part in expression.iterate(flat=False))
+
+
+def constant(path: str, constants: ModulesCollection) -> Attribute | None:
+    """Return what is set at the top of a module, by its path, if that is there and read."""
+    try:
+        named = constants[path]
+        found = named.final_target if isinstance(named, Alias) else named
+    except (AliasResolutionError, KeyError):
+        return None
+    if isinstance(found, Attribute) and isinstance(found.parent, Module) and found.value is not None:
+        return found
+    return None
+
+
 def text(expression: object) -> str | None:
     """Return an expression as it is written."""
     return None if expression is None else str(expression)
-
-
-def flags() -> Iterator[Function]:
-    """Yield each command as a function of its arguments and flags."""
-    for name in (*COMMANDS, *(f"report_{name}" for name in REPORTS)):
-        command = command_of(import_module(f"linkwise.cli.{name}").app)
-        parameters = []
-        for asked in command.params:
-            default = None if asked.required else repr(asked.default)
-            is_flag = asked.opts[0].startswith("-")
-            for spelling in (*asked.opts, *asked.secondary_opts):
-                kind = NAMED if is_flag else ParameterKind.positional_only
-                parameters.append(Parameter(spelling, kind=kind, default=default))
-        yield function(name, parameters)
 
 
 def written(face: Module) -> str:
@@ -161,6 +177,6 @@ def lines(found: dict[str, Any], ending: str, depth: int = 0, key: str = "") -> 
     yield f"{' ' * depth}}}}}{ending}"
 
 
-def read(path: Path) -> Module:
-    """Return the face that a file holds."""
-    return Module.from_json(path.read_text(encoding="utf-8"))
+def read(face: str) -> Module:
+    """Return the face that is written so."""
+    return Module.from_json(face)

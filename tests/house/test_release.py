@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tarfile
+import tomllib
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -16,9 +17,9 @@ from helpers.installation import ROOT, copied
 from linkwise import LinkwiseError
 from linkwise_runtime.version import VERSION
 
-from release.checkout import objections
-from release.public_face import public_face
-from release.recorded_faces import FOLDER, record, untold
+from release.checkout import is_breaking_told, objections
+from release.public_face import public_face, written
+from release.recorded_faces import FOLDER, broken, record, untold
 from release.recorded_faces import objections as face_objections
 
 pytestmark = pytest.mark.ship
@@ -54,8 +55,8 @@ def ready(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for fragment in (folder / "changes").glob("*.*.md"):
         fragment.unlink()
     (folder / "CHANGELOG.md").write_text(f"# Changes\n\n## {VERSION}\n\n- All of it.\n", encoding="utf-8")
-    record(folder)
     git(folder, "init", "--quiet")
+    record(folder)
     return committed(folder)
 
 
@@ -75,7 +76,9 @@ def test_a_release_is_made_up_to_the_upload(ready: Path) -> None:
     subprocess.run(
         ["sha256sum", "--check", "--strict", "SHA256SUMS"], cwd=out, check=True, capture_output=True
     )
-    names = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    assert all(path.is_file() for path in out.iterdir()), "the forge's release has no folders"
+    names = {path.name for path in out.iterdir()}
+    assert (out / "NOTES.md").read_text() == "- All of it.\n"
     listed = re.findall(r"^[0-9a-f]{64}  (.+)$", (out / "SHA256SUMS").read_text(), re.MULTILINE)
     assert {*listed, "SHA256SUMS"} == names
     for own, recipe in (("linkwise", "linkwise"), ("linkwise_runtime", "linkwise-runtime")):
@@ -97,9 +100,9 @@ def test_a_release_is_made_up_to_the_upload(ready: Path) -> None:
         brought = {component["name"] for component in bill["components"]}
         assert needs <= brought
         assert not {"pytest", "torch"} & brought
-        says = yaml.safe_load((out / f"conda/{recipe}/recipe.yaml").read_text())
+        says = yaml.safe_load((out / f"{recipe}.recipe.yaml").read_text())
         assert says["package"] == {"name": recipe, "version": VERSION}
-        assert (out / f"conda/{recipe}/recipe.yaml").parent.joinpath(says["source"]["path"]).is_file()
+        assert (out / says["source"]["path"]).is_file()
         assert {"python >=3.11", "numpy >=2"} <= set(says["requirements"]["run"])
     assert (out / f"linkwise-{VERSION}.api.json").read_bytes() == (
         ready / FOLDER / f"{VERSION}.json"
@@ -113,6 +116,10 @@ def left_about(folder: Path) -> None:
 def tagged(folder: Path) -> None:
     git(folder, "tag", f"v{VERSION}")
     git(folder, "commit", "--quiet", "--allow-empty", "--message", "Later")
+
+
+def tagged_as_another(folder: Path) -> None:
+    git(folder, "tag", "v9.9.9")
 
 
 def untold_version(folder: Path) -> None:
@@ -136,6 +143,7 @@ def fragment(folder: Path) -> None:
     [
         (left_about, "left-about.txt: not committed; commit or remove it"),
         (tagged, f"version {VERSION} is tagged already, at another commit; raise VERSION"),
+        (tagged_as_another, f"the last commit is tagged v9.9.9, and is of version {VERSION}; remove the tag"),
         (untold_version, f"CHANGELOG.md: begins with no section of {VERSION}; tell there what changed"),
         (
             said_to_be_unpublished,
@@ -193,6 +201,107 @@ def test_a_change_that_breaks_users_is_told_and_raises_more_than_the_last_number
         LinkwiseError, match=r"^linkwise\.read_system: is told to be public, and is not there$"
     ):
         public_face(repository)
+
+
+def raised(folder: Path, version: str) -> None:
+    changed(folder / "generator/linkwise_runtime/version.py", f'"{VERSION}"', f'"{version}"')
+    changed(folder / "CHANGELOG.md", f"## {VERSION}", f"## {version}")
+
+
+def test_a_released_face_is_the_one_in_its_tag(repository: Path) -> None:
+    git(repository, "tag", f"v{VERSION}")
+    changed(
+        repository / "generator/linkwise/package_cache.py", "def kept_package(", "def kept_package(new: int, "
+    )
+    with pytest.raises(LinkwiseError, match=f"version {VERSION} is tagged, and its face stays"):
+        record(repository)
+    face = public_face(repository)
+    (repository / FOLDER / f"{VERSION}.json").write_text(written(face), encoding="utf-8")
+    committed(repository)
+    assert "linkwise.kept_package(new)" in " ".join(untold(repository, face))
+    raised(repository, "0.2.0")
+    record(repository)
+    rewritten, *broken_ones = face_objections(repository, face)
+    assert rewritten.startswith(f"{FOLDER}/{VERSION}.json: is not the face that v{VERSION} has")
+    assert any(line.startswith("linkwise.kept_package(new)") for line in broken_ones), broken_ones
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        "### Nothing breaking\n\n- All.",
+        "### Non-breaking\n\n- All.",
+        "#### Breaking\n\n- All.",
+        "### Breaking\n\n### New\n\n- All.",
+    ],
+)
+def test_only_a_heading_of_towncriers_kind_tells_that_something_breaks(told: str, repository: Path) -> None:
+    changelog = repository / "CHANGELOG.md"
+    changelog.write_text(f"# Changes\n\n## {VERSION}\n\n{told}\n", encoding="utf-8")
+    assert not is_breaking_told(repository, VERSION)
+    [kind] = {
+        each["name"]
+        for each in tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["towncrier"][
+            "type"
+        ]
+        if each["directory"] == "breaking"
+    }
+    changelog.write_text(f"# Changes\n\n## {VERSION}\n\n### {kind}\n\n- All.\n", encoding="utf-8")
+    assert is_breaking_told(repository, VERSION)
+    tagged(repository)
+    assert not is_breaking_told(repository, VERSION), "what is released tells nothing of later changes"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "is_told"),
+    [
+        ("41.breaking.md", "`weight` is gone.", True),
+        ("41.breaking.md", " \n", False),
+        ("41.unbreaking.md", "Whole again.", False),
+        (".breaking.md", "Of nothing.", False),
+    ],
+)
+def test_only_a_fragment_with_words_tells_that_something_breaks(
+    name: str, text: str, is_told: bool, repository: Path
+) -> None:
+    (repository / "changes").mkdir(exist_ok=True)
+    (repository / "changes" / name).write_text(text, encoding="utf-8")
+    assert is_breaking_told(repository, VERSION) == is_told
+
+
+def test_a_default_that_a_constant_holds_is_in_the_face(repository: Path) -> None:
+    changed(repository / "generator/linkwise/analysis/loads/__init__.py", 'WORLD = "world"', 'WORLD = "all"')
+    assert untold(repository, public_face(repository)) == [
+        "linkwise.Load.__init__(axes): parameter default was changed"
+    ]
+
+
+def test_choices_of_flags_and_flags_of_the_program_are_in_the_face(repository: Path) -> None:
+    face = public_face(repository)
+    text = written(face)
+    assert broken(text, face) == []
+    assert broken(text.replace('"--kind=both"', '"--kind=neither"'), face) == [
+        "commands.motion(--kind=neither): parameter was removed"
+    ]
+    assert broken(text.replace('"--base=fixed"', '"--base=hung"', 1), face) == [
+        "commands.generate(--base=hung): parameter was removed"
+    ]
+    assert broken(text.replace('"--cmake-dir"', '"--bazel-dir"'), face) == [
+        "commands.linkwise(--bazel-dir): parameter was removed"
+    ]
+
+
+def test_a_version_before_a_release_is_refused_in_a_line(repository: Path) -> None:
+    raised(repository, "1.0.0rc1")
+    committed(repository)
+    for module in ("release", "release.recorded_faces"):
+        done = subprocess.run(
+            [sys.executable, "-m", module], cwd=repository, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 2
+        *_, line = done.stderr.splitlines()
+        assert "version 1.0.0rc1: versions of releases are numbers with points" in line
+        assert "Traceback" not in done.stderr
 
 
 def test_no_change_breaks_users_untold() -> None:
