@@ -36,7 +36,7 @@ PACKAGES = ("linkwise", "linkwise_runtime", "generated.planar3")
 SINGLE = re.compile(r"^\.\. auto(?:function|class|exception):: ([\w.]+)$", re.MULTILINE)
 SEVERAL = re.compile(r"^\.\. automodule:: ([\w.]+)\n   :members: (.+)$", re.MULTILINE)
 REQUIRED = "REQUIRED"
-"""What `option` is given where there is no default."""
+"""Default of an option that has none."""
 
 
 def public_face(root: Path) -> Module:
