@@ -1,4 +1,4 @@
-"""ResultComparison of two results of one analysis, column by column."""
+"""Comparison of two results of one analysis, column by column."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -63,7 +63,7 @@ class WrittenAnalysis:
 
     @property
     def files(self) -> Iterator[str]:
-        """Paths that options name, each once."""
+        """Paths of files that options name, in the order of the options."""
         for kind, given in ((AnalysisChoices, self.choices), (Options, self.options)):
             for one in written(kind):
                 value = given.get(one.key) if one.option.is_file else None
