@@ -15,6 +15,8 @@ FROM_FILE = 2
 """Kind of a coordinate's task whose values are in a file."""
 ACCURACY = 1e-8
 """OpenSim's usual 1e-5 ends its search up to 0.3 mrad from where markers are met exactly."""
+DIGITS = 17
+"""Digits after the point: OpenSim's usual eight move accelerations by up to 2e-4 m/s² at 100 Hz."""
 IN_METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}
 
 
@@ -61,7 +63,7 @@ def inverse_kinematics(
     tool.setMarkerDataFileName(str(markers))
     tool.setStartTime(float(time[0]))
     tool.setEndTime(float(time[-1]))
-    _run(tool, folder)
+    _run(osim, tool, folder)
     files = sorted(folder.glob(f"*{LOCATIONS}"))
     if not files or not (folder / MOTION).is_file():
         raise LinkwiseError(f"{markers.name}: OpenSim's inverse kinematics ends without a motion")
@@ -82,8 +84,9 @@ def inverse_kinematics(
     )
 
 
-def _run(tool: Any, folder: Path) -> None:
+def _run(osim: Any, tool: Any, folder: Path) -> None:
     """Have a tool write the motion, and where the model's markers are in it, into a folder."""
+    osim.IO.SetPrecision(DIGITS)  # which whoever used OpenSim before, in this process, may have set too
     tool.set_accuracy(ACCURACY)
     tool.setOutputMotionFileName(str(folder / MOTION))
     tool.setResultsDir(str(folder))
