@@ -279,7 +279,7 @@ def test_other_folders_profiles_and_topics_are_named(tmp_path: Path) -> None:
 def test_a_file_cut_off_is_named(tmp_path: Path, write: Callable[[Path], Path]) -> None:
     path = write(tmp_path)
     content = path.read_bytes()
-    for count in (len(content) // 3, len(content) - 40):
+    for count in (len(content) // 3, len(content) - 40, len(content) - 1):
         path.write_bytes(content[:count])
         with pytest.raises(
             LinkwiseError,

@@ -149,6 +149,8 @@ MCAP_MAGIC, MCAP_BEFORE, MCAP_OF_ROS = b"\x89MCAP0\r\n", 8 + 1 + 8, "ros2"
 """First bytes of an MCAP file, number of bytes before the length of its profile, and the profile of ROS 2."""
 ROS1_MAGIC = b"#ROSBAG V2.0\n"
 """First line of a ROS 1 bag; in any other file the library searches for its end up to the file's end."""
+SQLITE_PAGE, SQLITE_LARGEST = slice(16, 18), 65536
+"""Where a database of SQLite has the bytes of a page, and those of the largest."""
 MEND = "mend it with `mcap recover` or `ros2 bag reindex`, or record it again"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 NAMED = 10_000
@@ -232,6 +234,9 @@ def _opened(path: Path) -> Iterator[Any]:
     with read_as("a bag of ROS", path, MEND):
         if is_ros1:
             _require_ros1(path)
+        for file in (path, *(path.iterdir() if path.is_dir() else ())):
+            if file.suffix.lower() == ".db3":
+                _require_whole_pages(file)
         with module.Reader(path) as bag:
             yield bag
 
@@ -241,6 +246,16 @@ def _require_ros1(path: Path) -> None:
     with path.open("rb") as file:
         if file.read(len(ROS1_MAGIC)) != ROS1_MAGIC:
             raise ValueError(f"its first line is not {ROS1_MAGIC.decode().strip()!r}")
+
+
+def _require_whole_pages(path: Path) -> None:
+    """Raise ValueError for a database of SQLite whose last page is cut: SQLite reads zeros there."""
+    with path.open("rb") as file:
+        head = file.read(SQLITE_PAGE.stop)
+    size = int.from_bytes(head[SQLITE_PAGE], "big")
+    size = SQLITE_LARGEST if size == 1 else size  # which two bytes cannot hold
+    if size and (rest := path.stat().st_size % size):
+        raise ValueError(f"{rest} of {size} bytes of its last page are there")
 
 
 def _profile(path: Path) -> str:
