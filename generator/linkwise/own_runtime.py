@@ -16,7 +16,7 @@ def require_own_runtime() -> str:
     again = "install linkwise again, with --force-reinstall, and no linkwise-runtime beside it"
     try:
         from linkwise_runtime.version import VERSION
-    except ImportError:
+    except ModuleNotFoundError:
         raise ImportError(f"linkwise_runtime, which linkwise brings along, is gone; {again}") from None
     with suppress(metadata.PackageNotFoundError):  # run from a checkout, it is nowhere installed
         installed = metadata.version("linkwise")

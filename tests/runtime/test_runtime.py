@@ -2,6 +2,7 @@
 
 import ast
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -370,3 +371,10 @@ def test_another_runtime_in_the_place_of_linkwises_own_is_refused(monkeypatch: p
     told = f"^linkwise 10.1.0 finds linkwise_runtime {version.VERSION} in its place; install linkwise again"
     with pytest.raises(ImportError, match=told):
         require_own_runtime.__wrapped__()
+
+
+def test_a_python_without_its_lock_is_refused_in_one_line() -> None:
+    start = "import sys; sys._is_gil_enabled = lambda: False; from linkwise.__main__ import main; main()"
+    ended = subprocess.run([sys.executable, "-c", start], capture_output=True, text=True, check=False)
+    assert ended.returncode == 2
+    assert re.fullmatch(r"linkwise: error: linkwise has never .* PYTHON_GIL=1 .*\n", ended.stderr)
