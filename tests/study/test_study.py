@@ -275,6 +275,19 @@ def test_files_that_a_study_no_longer_asks_for_go(tmp_path: Path) -> None:
     assert not {"old.svg", "old.pdf", "curves.parquet"} & {path.name for path in (tmp_path / "out").iterdir()}
 
 
+def test_words_for_what_a_figure_does_not_show_are_told_with_the_nearest_that_it_does(tmp_path: Path) -> None:
+    figure = '\n[[figure]]\nname = "torques"\ncolumns = ["tau/*"]\nby = "condition"\n'
+    words = '"tau/joint3" = "ankle", condition = "pace", slow = "at ease"'
+    file = write_study(tmp_path, HEAD, QUICK, CHOICES, figure, f"names = {{ {words} }}\n", TRIALS, subjects=1)
+    assert not run_study(file, tmp_path / "out", Here()).warnings
+    file.write_text(file.read_text().replace('"tau/joint3"', '"tau/joint4"'))
+    (told,) = run_study(file, tmp_path / "out", Here()).warnings
+    assert told.startswith(
+        "[[figure]]: 'names' has 'tau/joint4', which nothing in it is called; nearest are 'tau/"
+    )
+    assert not (tmp_path / "out/torques.svg").exists()
+
+
 def test_curves_that_do_not_vary_are_told_and_the_rest_is_made(tmp_path: Path) -> None:
     columns = 'columns = ["tau_load/**", "tau/*"]\n'
     compare = f'\n[[compare]]\nfactor = "condition"\nbetween = ["slow", "fast"]\n{columns}'

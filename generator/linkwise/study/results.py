@@ -12,6 +12,8 @@ from linkwise.study.folder import GROUPS, MEAN_CURVES, STUDY_PAGE, SUMMARIES, TE
 from linkwise.study.normalised import normalised, of_several_masses, of_their_robots, told_of_bodies
 from linkwise.study.page import study_page
 from linkwise.study.plan import StudyPlan
+from linkwise.study.plan_checks import check_names
+from linkwise.study.spread import columns_of_trials
 from linkwise.study.summary import summaries
 from linkwise.study.tables import curve_rows, group_rows, parquet, summary_rows
 from linkwise.study.tested_rows import rows_of_tests
@@ -53,6 +55,7 @@ def together(
         files[TESTS] = parquet(rows_of_tests(tests))
     progress("together", 2, 3)
     try:
+        check_names(plan, columns_of_trials(trials))
         files |= dict(band_figures(plan.figures, trials, tests))
     except LinkwiseError as error:
         told.append(str(error))
