@@ -21,7 +21,8 @@ from linkwise_runtime.quantities import AppliedLoad
 
 from linkwise.analysis.contacts.ground import Standing
 from linkwise.analysis.loads.placed import PlacedLoad, model_pose
-from linkwise.analysis.opened_robot import OpenedRobot, body_frame
+from linkwise.analysis.named_bodies import body_frame
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.result_quantities import PASSIVE, REACTION_OF
 from linkwise.analysis.result_rows import Place, ResultRows
 from linkwise.analysis.settings import Convention

@@ -11,7 +11,8 @@ from linkwise.analysis.contacts.pressed import PRESSED
 from linkwise.analysis.cutoff_range import CutoffRange
 from linkwise.analysis.loads import Load, Loads, Muscles
 from linkwise.analysis.markers import MarkerChoices
-from linkwise.analysis.opened_robot import OpenedRobot, named_body
+from linkwise.analysis.named_bodies import named_body
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.request import Outputs, Request
 from linkwise.analysis.settings import Payload, Processing, Reading
 from linkwise.errors import LinkwiseError

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.opened_robot import OpenedRobot, body_frame
+from linkwise.analysis.named_bodies import body_frame
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 

@@ -1,20 +1,15 @@
-"""A generated robot package as the analysis uses it: names, a back end that works here, bodies, an oracle.
-
-Loads, payloads and contacts find the bodies of the robot's file here, by name.
-"""
+"""A generated robot package as the analysis uses it: names, a back end that works here, bodies, an oracle."""
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from linkwise_runtime.chosen_names import known_as, nearest_first
 from linkwise_runtime.constraints.independent_joints import loose_base
 from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.file_joints import FileJoint, Order
 from linkwise_runtime.qpos_motion import Qpos
-from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
+from linkwise_runtime.rule.joint_tree import JointTree
 from linkwise_runtime.structure import PassiveJoint, Structure
 
 from linkwise.analysis.constrained_model import ConstrainedModel
@@ -24,7 +19,7 @@ from linkwise.analysis.samples import FollowingJoint
 from linkwise.analysis.settings import Payload
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
-from linkwise.escape import listed, without_ending
+from linkwise.escape import without_ending
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import Package
 from linkwise.package.share_word import share_word
@@ -293,40 +288,3 @@ class OpenedRobot:
     def with_own(self, field: str) -> tuple[int, ...]:
         """Return the numbers of the joints that have a passive element, by the name of its number."""
         return tuple(sorted({own.coordinate for own in self.passive if getattr(own, field)}))
-
-
-def body_frame(what: str, body: str, robot: OpenedRobot) -> TreeFrame:
-    """Return the frame of a body of the robot's file.
-
-    what: how the message begins
-
-    Raises LinkwiseError, which lists the nearest names first, where there is no such body.
-    """
-    tree = robot.package.manifest.tree
-    frames = {} if tree is None else {frame.name: frame for frame in tree.frames}
-    name = known_as(body, frames)
-    if name is None:
-        near = listed(nearest_first(body, frames))
-        raise LinkwiseError(f"{what} {body!r}: {robot.name} has no such body; its bodies are {near}")
-    return frames[name]
-
-
-def named_body(text: str, robot: OpenedRobot) -> tuple[str, str]:
-    """Return the name and the body of NAME:BODY; the name is empty for BODY alone.
-
-    A body whose own name contains a colon is found too.
-    """
-    tree = robot.package.manifest.tree
-    name, colon, body = text.partition(":")
-    if not colon or (tree is not None and any(frame.name == text for frame in tree.frames)):
-        return "", text
-    return name, body
-
-
-def told_apart(
-    what: str, names: Sequence[str], others: Sequence[str], mend: str = "tell them apart as NAME:BODY"
-) -> None:
-    """Raise LinkwiseError for a name that is given twice, or that another object has already."""
-    twice = [name for name, count in Counter(names).items() if count > 1 or name in others]
-    if twice:
-        raise LinkwiseError(f"{what} {listed(map(repr, twice))}: another has that name; {mend}")

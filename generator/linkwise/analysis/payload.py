@@ -11,7 +11,8 @@ from linkwise_runtime.quantities import Energy
 from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame, TreeJoint, TreeLink
 
 from linkwise.analysis.constrained_model import ConstrainedModel, tied_in_tree
-from linkwise.analysis.opened_robot import OpenedRobot, body_frame, told_apart
+from linkwise.analysis.named_bodies import body_frame, told_apart
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.settings import Payload
 from linkwise.analysis.term_rows import NAMES, TermArrays
 from linkwise.arrays import Array

@@ -21,7 +21,8 @@ from linkwise.analysis.logs import Log, open_log
 from linkwise.analysis.markers import SUFFIXES
 from linkwise.analysis.markers.followed import followed
 from linkwise.analysis.measured_torques import measured_torques, torque_columns
-from linkwise.analysis.opened_robot import OpenedRobot, told_apart
+from linkwise.analysis.named_bodies import told_apart
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.phases import phase_columns, placed_phases
 from linkwise.analysis.request import Request
 from linkwise.analysis.samples import Samples, read_samples

@@ -10,10 +10,9 @@ import sympy as sp
 from linkwise_runtime.file_joints import FileJoint
 from linkwise_runtime.rule.joint_tree import TreeTie
 from linkwise_runtime.structure import PassiveJoint
-from sympy.printing.precedence import PRECEDENCE
-from sympy.printing.pretty.stringpict import prettyForm
 
 from linkwise.errors import LinkwiseError
+from linkwise.robot.coordinate_symbols import Acceleration, Position, Velocity
 from linkwise.robot.curve import Curve
 from linkwise.robot.display import description_table, link_table
 from linkwise.robot.notes import Note
@@ -24,40 +23,6 @@ Scalar: TypeAlias = float | sp.Expr
 Vec3: TypeAlias = tuple[Scalar, Scalar, Scalar]
 Mat3: TypeAlias = tuple[Vec3, Vec3, Vec3]
 Rotation: TypeAlias = tuple[tuple[float, float, float], ...]
-
-
-class _Position(sp.Symbol):  # type: ignore[misc]
-    """Symbol of a position.
-
-    Symbols of different classes differ even if their names agree, so a joint may have any name.
-    """
-
-
-class _TimeDerivative(sp.Symbol):  # type: ignore[misc]
-    """Symbol of a derivative by time, which text writes as a quotient and LaTeX with dots."""
-
-    precedence = PRECEDENCE["Mul"]
-    """Place among operations, by which SymPy brackets the text: (d(q)/dt)**2."""
-    _accent = "dot"
-
-    @property
-    def _position(self) -> str:
-        name: str = self.name
-        return name.partition("(")[2].rpartition(")")[0]
-
-    def _latex(self, printer: Any) -> str:
-        return rf"\{self._accent}{{{printer._print(sp.Symbol(self._position))}}}"
-
-    def _pretty(self, printer: Any) -> prettyForm:
-        return prettyForm(self.name, binding=prettyForm.ADD)
-
-
-class _Velocity(_TimeDerivative):
-    pass
-
-
-class _Acceleration(_TimeDerivative):
-    _accent = "ddot"
 
 
 @dataclass(frozen=True)
@@ -74,17 +39,17 @@ class Coordinate:
     @property
     def q(self) -> sp.Symbol:
         """The coordinate as a SymPy symbol."""
-        return _Position(self.name, real=True)
+        return Position(self.name, real=True)
 
     @property
     def qd(self) -> sp.Symbol:
         """Velocity of the coordinate as a SymPy symbol."""
-        return _Velocity(f"d({self.name})/dt", real=True)
+        return Velocity(f"d({self.name})/dt", real=True)
 
     @property
     def qdd(self) -> sp.Symbol:
         """Acceleration of the coordinate as a SymPy symbol."""
-        return _Acceleration(f"d²({self.name})/dt²", real=True)
+        return Acceleration(f"d²({self.name})/dt²", real=True)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from linkwise.analysis.contacts import Contacts
 from linkwise.analysis.contacts.ground import GroundContacts
 from linkwise.analysis.contacts.pressed import PRESSED
 from linkwise.analysis.loads.placed import moving_joints
-from linkwise.analysis.opened_robot import OpenedRobot, body_frame
+from linkwise.analysis.named_bodies import body_frame
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 

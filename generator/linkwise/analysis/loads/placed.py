@@ -15,7 +15,8 @@ from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.rule.joint_tree import JointTree, TreeFrame
 
 from linkwise.analysis.loads import FORCE, MOMENT, POINT, WORLD
-from linkwise.analysis.opened_robot import OpenedRobot, body_frame
+from linkwise.analysis.named_bodies import body_frame
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 

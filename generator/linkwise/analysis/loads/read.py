@@ -15,7 +15,8 @@ from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loads import FORCE, MOMENT, PARTS, POINT, WIDTH, WORLD, Load, LoadColumns, Loads
 from linkwise.analysis.loads.placed import LoadFrame, PlacedLoad, PlacedWrench, load_frame_of
 from linkwise.analysis.logs import open_log
-from linkwise.analysis.opened_robot import OpenedRobot, named_body, told_apart
+from linkwise.analysis.named_bodies import named_body, told_apart
+from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.samples import finite_blocks, slowness
 from linkwise.analysis.settings import Lowpass, Reading
 from linkwise.arrays import Array
