@@ -102,10 +102,13 @@ def test_a_number_that_differs_is_told_with_column_and_sample(case: Path, table:
     done = run_linkwise("replay", other, "--out", "other", folder=case.parent)
     assert done.returncode == 1, done.stderr
     assert "\nNOT the same, within 1e-09\n" in done.stdout
+    of_record = re.search(r"numbers of the record; largest difference: (\S+), (\S+):", done.stdout)
+    assert of_record is not None
+    assert 1e-9 < float(of_record[1]) < 1e-2
     found = re.search(r"largest difference: (\S+) \S.* in (\S+), (.*); (\S+) of the largest", done.stdout)
-    assert found is not None
-    assert 1e-9 < float(found[4]) < 1e-2
-    if table == "csv":
+    assert (found is None) == (table == "none")
+    assert found is None or 1e-9 < float(found[4]) < 1e-2
+    if found is not None and table == "csv":
         with ZipFile(bundle) as archive:
             was = read_table(archive.read("result/analysis.csv").decode())
         now = read_table((case.parent / "other/analysis.csv").read_text())
@@ -125,7 +128,45 @@ def test_columns_that_only_one_result_has_are_not_the_same(case: Path) -> None:
     done = run_linkwise("replay", asked_otherwise(bundle, columns=["tau/*"]), folder=case.parent)
     assert done.returncode == 1
     assert "columns not here: " in done.stdout
-    assert "no number differs" in done.stdout
+    assert "no number of them differs" in done.stdout
+    assert re.search(r"\d+ numbers not here: .*work/of_joints/joint2/net", done.stdout)
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("work", "of_joints", 1, "given"), 0.5),
+        (("cutoff_sweep", "joint_torques", 0, "change"), 0.5),
+        (("processing", "lowpass", "cutoff"), 12.0),
+        (("closure", "terms_relative"), 0.5),
+        (("columns", 5, "peak_magnitude"), 1e6),
+    ],
+)
+def test_numbers_of_the_record_are_compared_beside_a_table(
+    case: Path, place: tuple[str | int, ...], value: float
+) -> None:
+    words = ["log.csv", "--robot", "planar3", "--cutoff", 6, "--cutoff-sweep", "4,6,8"]
+    bundle = analysed(case, *words)
+    replayed(bundle)
+
+    def change(content: dict[str, bytes]) -> None:
+        told, record = (json.loads(content[name]) for name in ("bundle.json", "result/analysis.json"))
+        part = record
+        for key in place[:-1]:
+            part = part[key]
+        part[place[-1]] = value
+        data = content["result/analysis.json"] = json.dumps(record).encode()
+        told["files"]["result/analysis.json"] = {
+            "bytes": len(data),
+            "sha256": hashlib.sha256(data).hexdigest(),
+        }
+        content["bundle.json"] = json.dumps(told).encode()
+
+    done = run_linkwise("replay", changed(bundle, change), folder=case.parent)
+    assert done.returncode == 1, done.stderr
+    assert "no number of them differs" in done.stdout
+    worst = rf"numbers of the record; largest difference: \S+, {place[0]}/\S*{place[-1]}: \S+ before"
+    assert re.search(worst, done.stdout), done.stdout
 
 
 def test_another_number_of_samples_is_told(case: Path) -> None:

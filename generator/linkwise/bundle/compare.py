@@ -1,4 +1,4 @@
-"""Comparison of two results of one analysis, column by column."""
+"""Comparison of two results of one analysis: tables column by column, and the numbers of their records."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ import numpy as np
 
 from linkwise.analysis.run import RECORD
 from linkwise.arrays import Array
+from linkwise.bundle.record_numbers import RecordComparison
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed, one_line
 from linkwise.extras import extra
@@ -17,8 +18,6 @@ from linkwise.package.decode import parse_json
 TABLES = ("analysis.parquet", "analysis.csv")
 AT_ONCE = 256
 """Columns that are compared at once, which bounds memory."""
-OF_RECORD = ("mean_magnitude", "peak_magnitude")
-"""Entries of a column in a record, where there is no table."""
 
 
 @dataclass(frozen=True)
@@ -40,39 +39,36 @@ class ResultComparison:
     """
 
     columns: int
+    """Number of columns of tables that both have; 0 where one has no table."""
     samples: int
     relative: float
     worst: Difference | None
     missing: tuple[str, ...]
     added: tuple[str, ...]
-    of_record: bool
-    """True where there is no table: means and peaks were compared."""
+    record: RecordComparison
 
     def is_same(self, tolerance: float) -> bool:
         """Return whether all numbers agree within a share of the largest with their unit."""
-        return not (self.missing or self.added) and self.relative <= tolerance
+        is_same = not (self.missing or self.added) and self.relative <= tolerance
+        return is_same and self.record.is_same(tolerance)
 
     @property
     def lines(self) -> list[str]:
         """Text of the comparison."""
-        what = "mean and peak of" if self.of_record else f"{self.samples:,} samples of"
-        told = [f"compared: {what} {self.columns:,} columns"]
+        told = [f"compared: {self.samples:,} samples of {self.columns:,} columns"] if self.columns else []
         for names, where in ((self.missing, "not here"), (self.added, "not in the bundle")):
             told += [f"{len(names)} columns {where}: {listed(names)}"] if names else []
-        if self.worst is None:
-            return [*told, "no number differs"]
         one = self.worst
-        if not np.isfinite(one.largest):
-            return [
-                *told,
-                f"{one.column} has a number in one of them only, at sample {one.at}",
-            ]
-        where = OF_RECORD[one.at].replace("_", " ") if self.of_record else f"sample {one.at}"
-        return [
-            *told,
-            f"largest difference: {one.largest:.3g} {one.unit} in {one.column}, {where};"
-            f" {self.relative:.1e} of the largest number in {one.unit or 'that unit'}",
-        ]
+        if one is None:
+            told += ["no number of them differs"] if self.columns else []
+        elif not np.isfinite(one.largest):
+            told.append(f"{one.column} has a number in one of them only, at sample {one.at}")
+        else:
+            told.append(
+                f"largest difference: {one.largest:.3g} {one.unit} in {one.column}, sample {one.at};"
+                f" {self.relative:.1e} of the largest number in {one.unit or 'that unit'}"
+            )
+        return [*told, *self.record.lines]
 
 
 def compared(former: Path, now: Path) -> ResultComparison:
@@ -97,8 +93,8 @@ def _compared(former: Path, now: Path) -> ResultComparison:
     if samples[0] != samples[1]:
         raise LinkwiseError(f"the bundle's result has {samples[0]:,} samples, and this one {samples[1]:,}")
     tables = [_table(folder, record) for folder, record in zip((former, now), records, strict=True)]
-    is_of_record = None in tables
-    worst, largest = _differences(records if is_of_record else tables, shared, units)
+    shared = [] if None in tables else shared
+    worst, largest = _differences(tables, shared, units)
     relative = {name: _share(one.largest, largest[one.unit]) for name, one in worst.items()}
     first = max(relative, key=relative.__getitem__, default=None)
     share = 0.0 if first is None else relative[first]
@@ -109,7 +105,7 @@ def _compared(former: Path, now: Path) -> ResultComparison:
         worst[first] if first is not None and share else None,
         tuple(name for name in names[0] if name not in set(names[1])),
         tuple(name for name in names[1] if name not in set(names[0])),
-        is_of_record,
+        RecordComparison.of(*records),
     )
 
 
@@ -138,11 +134,7 @@ def _share(difference: float, largest: float) -> float:
 
 
 def _values(source: Any, names: Sequence[str]) -> Iterator[Array]:
-    """Yield the columns of a table, or of a record, as arrays."""
-    if isinstance(source, Mapping):
-        told = {column["name"]: column for column in source["columns"]}
-        yield from (np.array([float(told[name][key]) for key in OF_RECORD]) for name in names)
-        return
+    """Yield the columns of a table as arrays."""
     found = source.to_table(columns=list(names))
     yield from (found.column(name).to_numpy().astype(float) for name in names)
 
