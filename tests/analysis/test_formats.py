@@ -1,6 +1,7 @@
 """Bags and files of arrays: the same movement gives what its CSV gives, the unclear is refused."""
 
 import contextlib
+import shutil
 import sqlite3
 import zipfile
 from collections.abc import Callable
@@ -286,6 +287,31 @@ def test_a_file_cut_off_is_named(tmp_path: Path, write: Callable[[Path], Path]) 
             match=rf"^{path}: not an? .* or damaged \(.*\); (write the file|mend it with .*) again$",
         ):
             analyze(path, PLANAR3)
+
+
+def test_what_a_recorder_left_beside_a_database_is_not_left_out(tmp_path: Path) -> None:
+    bag = sqlite(tmp_path)
+    with contextlib.closing(sqlite3.connect(bag / "bag.db3")) as base:
+        base.execute("pragma journal_mode = wal")
+        base.execute("update messages set timestamp = timestamp")
+        base.commit()
+        shutil.copytree(bag, tmp_path / "copy")
+    for copy in (tmp_path / "copy", tmp_path / "copy/bag.db3"):
+        with pytest.raises(LinkwiseError, match=r"bag\.db3-wal has what .* last, .*`sqlite3 bag\.db3 "):
+            analyze(copy, PLANAR3)
+    with contextlib.closing(sqlite3.connect(tmp_path / "copy/bag.db3")) as base:
+        base.execute("pragma journal_mode = delete")
+    np.testing.assert_allclose(analyze(tmp_path / "copy", PLANAR3).q, Q, rtol=1e-12)
+
+
+@pytest.mark.parametrize("write", [folder, sqlite])
+def test_a_bag_with_fewer_messages_than_it_promises_is_refused(
+    tmp_path: Path, write: Callable[[Path], Path]
+) -> None:
+    told = write(tmp_path) / "metadata.yaml"
+    told.write_text(told.read_text().replace("message_count: 80", "message_count: 99"))
+    with pytest.raises(LinkwiseError, match=r"80 messages of /\w+ are there, and 99 are promised; add"):
+        analyze(told.parent, PLANAR3)
 
 
 def test_units_of_datasets_count(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ Messages carry joints in any order, and not each of them all joints.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -12,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.logs.checks import named_once, read_as
+from linkwise.analysis.logs.bag_files import opened_bag
+from linkwise.analysis.logs.checks import named_once
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
-from linkwise.escape import listed, short
+from linkwise.escape import listed
 from linkwise.extras import extra
-from linkwise.input_file import require_file
 
 STAMPED, RECORDED = "stamped", "recorded"
 """Quantities of the columns of time: the message's own stamp, and the recorder's time."""
@@ -145,13 +144,6 @@ def _repeats(
     raise LinkwiseError(f"message {state.number}: its stamp {how}; {BY_RECORDER}")
 
 
-MCAP_MAGIC, MCAP_BEFORE, MCAP_OF_ROS = b"\x89MCAP0\r\n", 8 + 1 + 8, "ros2"
-"""First bytes of an MCAP file, number of bytes before the length of its profile, and the profile of ROS 2."""
-ROS1_MAGIC = b"#ROSBAG V2.0\n"
-"""First line of a ROS 1 bag; in any other file the library searches for its end up to the file's end."""
-SQLITE_PAGE, SQLITE_LARGEST = slice(16, 18), 65536
-"""Where a database of SQLite has the bytes of a page, and those of the largest."""
-MEND = "mend it with `mcap recover` or `ros2 bag reindex`, or record it again"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 NAMED = 10_000
 """Messages at the beginning of a topic that are searched for the names of joints."""
@@ -177,7 +169,7 @@ class BagLog:
     @classmethod
     def open(cls, path: Path, topic: str | None) -> "BagLog":
         """Find the topic, and the joints in its first messages; raise LinkwiseError where there are none."""
-        with _opened(path) as bag:
+        with opened_bag(path) as bag:
             name = _chosen_topic(bag.topics, topic)
             states = list(islice(_states(bag, name), NAMED))
             size = bag.topics[name].msgcount
@@ -205,67 +197,18 @@ class BagLog:
     def read(self, columns: Sequence[int], rows: int = 65536) -> Iterator[tuple[Array, int]]:
         """Yield blocks (at most `rows`, len(columns)) and the number of messages read so far.
 
-        Raises LinkwiseError, naming the message, for one that has only some of the joints, and for stamps
-        that run backwards.
+        Raises LinkwiseError, naming the message, for one that has only some of the joints, for stamps that
+        run backwards, and at the end where there are fewer messages than are promised.
         """
-        cells = [self.cells[self.columns[at]] for at in columns]
-        with _opened(self.path) as bag:
-            yield from rows_of(_states(bag, self.topic), cells, rows)
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    """Open a bag and give the library's reader."""
-    if path.is_dir() and not (path / "metadata.yaml").is_file():
-        raise LinkwiseError(
-            f"{path}: this is a directory, not that of a bag: it has no metadata.yaml; give a file"
-        )
-    for file in path.iterdir() if path.is_dir() else ():
-        if not file.is_dir():
-            with within(str(file)):
-                require_file(file)
-    if (profile := _profile(path)) != MCAP_OF_ROS:
-        raise LinkwiseError(
-            f"{path}: MCAP with the profile {short(profile)!r}, and not {MCAP_OF_ROS!r}; record it with ros2"
-            " bag, or write the joints as .csv or .npz"
-        )
-    is_ros1 = path.is_file() and path.suffix.lower() == ".bag"
-    module = extra("rosbags.rosbag1" if is_ros1 else "rosbags.rosbag2")
-    with read_as("a bag of ROS", path, MEND):
-        if is_ros1:
-            _require_ros1(path)
-        for file in (path, *(path.iterdir() if path.is_dir() else ())):
-            if file.suffix.lower() == ".db3":
-                _require_whole_pages(file)
-        with module.Reader(path) as bag:
-            yield bag
-
-
-def _require_ros1(path: Path) -> None:
-    """Raise ValueError for a file that does not begin like a bag of ROS 1."""
-    with path.open("rb") as file:
-        if file.read(len(ROS1_MAGIC)) != ROS1_MAGIC:
-            raise ValueError(f"its first line is not {ROS1_MAGIC.decode().strip()!r}")
-
-
-def _require_whole_pages(path: Path) -> None:
-    """Raise ValueError for a database of SQLite whose last page is cut: SQLite reads zeros there."""
-    with path.open("rb") as file:
-        head = file.read(SQLITE_PAGE.stop)
-    size = int.from_bytes(head[SQLITE_PAGE], "big")
-    size = SQLITE_LARGEST if size == 1 else size  # which two bytes cannot hold
-    if size and (rest := path.stat().st_size % size):
-        raise ValueError(f"{rest} of {size} bytes of its last page are there")
-
-
-def _profile(path: Path) -> str:
-    """Return the profile in the header of an MCAP file; the profile of ROS 2 for other files."""
-    if not path.is_file() or path.suffix.lower() != ".mcap":
-        return MCAP_OF_ROS
-    with path.open("rb") as file:
-        is_mcap = file.read(MCAP_BEFORE).startswith(MCAP_MAGIC)
-        length = int.from_bytes(file.read(4), "little")
-        return file.read(min(length, 99)).decode("ascii", "replace") if is_mcap else MCAP_OF_ROS
+        cells, number = [self.cells[self.columns[at]] for at in columns], 0
+        with opened_bag(self.path) as bag:
+            for block, number in rows_of(_states(bag, self.topic), cells, rows):
+                yield block, number
+            if number < self.size:
+                raise LinkwiseError(
+                    f"{number:,} messages of {self.topic} are there, and {self.size:,} are promised; add the"
+                    " files that are missing, or write its metadata anew with `ros2 bag reindex`"
+                )
 
 
 def _chosen_topic(topics: Mapping[str, Any], wanted: str | None) -> str:
