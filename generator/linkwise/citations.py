@@ -1,5 +1,6 @@
 """References for what a result was made by, as BibTeX: only for methods that this result used."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -167,12 +168,18 @@ FALSE_DISCOVERIES = _article(
 
 RECORDS = ("analysis.json", "study.json", "manifest.json")
 """Records of results, one of which a folder has."""
+OF_PRODUCT = re.compile(r"sd(-\w+)*/(tau_qdd|tau_qd|power\w*)/")
+"""Columns of deviations of products: a share times its cause's motion, and a torque times a velocity."""
+SUMMARY = "summary.parquet"
+"""A study's table with a row for each trial and column."""
 IDENTIFIED = "identified.json"
 """Record of an identification."""
 
 
 def record_of(result: Path) -> tuple[Path, dict[str, Any]]:
-    """Return the path of a result's record and its content; of a study, the rows of its tests as `tests`.
+    """Return the path of a result's record and its content; of a study, rows of its tables as well.
+
+    These are `tests`, and `columns` of its summary.
 
     result: the folder that `analyze`, `study` or `generate` wrote, or the record in it
 
@@ -184,10 +191,14 @@ def record_of(result: Path) -> tuple[Path, dict[str, Any]]:
         require(isinstance(record, dict), "", "an object", record)
     except (OSError, ValueError) as error:
         raise LinkwiseError(f"{path}: is damaged: {error}") from error
-    tests = path.parent / "tests.parquet"
-    if path.name == "study.json" and is_file(tests):
-        record["tests"] = extra("pyarrow.parquet").read_table(tests).to_pylist()
+    if path.name == "study.json":
+        record |= {"tests": _rows(path.with_name("tests.parquet")), "columns": _rows(path.with_name(SUMMARY))}
     return path, record
+
+
+def _rows(table: Path) -> list[dict[str, Any]]:
+    """Return the rows of a study's table; none where it was not asked for."""
+    return extra("pyarrow.parquet").read_table(table).to_pylist() if is_file(table) else []
 
 
 def _record_at(result: Path) -> Path:
@@ -226,7 +237,7 @@ def citations(record: Mapping[str, Any]) -> Iterator[Citation]:
     for uncertain in _uncertain(record):
         if uncertain.get("presets"):
             yield _because(SEGMENTS, "how uncertain segments of a person are")
-        if uncertain.get("motion"):
+        if uncertain.get("motion") and any(map(OF_PRODUCT.match, _columns(record))):
             yield _because(PRODUCTS, "deviations of shares and powers by noise of the motion")
     tests = record.get("tests") or []
     if any(test["threshold"] == test["threshold"] for test in tests):  # a test of means has none: NaN
@@ -237,6 +248,11 @@ def citations(record: Mapping[str, Any]) -> Iterator[Citation]:
     for name, one in (("holm", HOLM), ("fdr-bh", FALSE_DISCOVERIES)):
         if name in corrections:
             yield _because(one, f"p corrected for several columns, {name}")
+
+
+def _columns(record: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the names of an analysis's or a study's columns."""
+    yield from (row.get("name") or row["column"] for row in record.get("columns") or [])
 
 
 def _uncertain(record: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:

@@ -32,7 +32,15 @@ def keys(record: dict[str, Any]) -> list[str]:
         ({"residuals": {"of": [{}], "largest_net_external_force_N": None}}, []),
         ({"residuals": {"of": [{}], "largest_net_external_force_N": 800.0}}, ["hicks2015"]),
         ({"uncertain": {"presets": {"zatsiorsky-men": {}}, "motion": None}}, ["zatsiorsky2002"]),
-        ({"uncertain": {"assumed": [{"motion": {"angle": 1}}, {"motion": {}}]}}, ["goodman1960"]),
+        ({"uncertain": {"motion": {"angle": 1}}, "columns": [{"name": "sd/tau/hip"}]}, []),
+        ({"uncertain": {"motion": {"angle": 1}}, "columns": [{"name": "sd/power/hip"}]}, ["goodman1960"]),
+        (
+            {
+                "uncertain": {"assumed": [{"motion": {"angle": 1}}, {"motion": {}}]},
+                "columns": [{"column": "sd-motion/tau_qd/hip/foot/knee"}],
+            },
+            ["goodman1960"],
+        ),
         ({"tests": [{"threshold": float("nan"), "correction": "none"}]}, ["hedges1981"]),
         (
             {"tests": [{"threshold": 3.1, "correction": "holm"}, {"threshold": 3.1, "correction": "fdr-bh"}]},
