@@ -188,6 +188,82 @@ def test_a_marker_that_is_never_seen_is_lacking(walk: Walk, tmp_path: Path) -> N
     assert np.abs(result.q - walk.known().q).max() < 1e-4
 
 
+def test_joints_that_no_seen_marker_tells_are_named_with_the_time(walk: Walk, tmp_path: Path) -> None:
+    """OpenSim holds them where they were, and its markers are all met."""
+    foot = [at for at, name in enumerate(walk.names) if name.startswith("foot")]
+    unseen = walk.markers.copy()
+    unseen[20:30, foot[1:]] = np.nan
+    walk.trc(tmp_path / "one.trc", unseen, walk.time)
+    assert not any("no marker" in line for line in walk.followed(tmp_path / "one.trc").warnings)
+    unseen[20:30, foot[0]] = np.nan
+    walk.trc(tmp_path / "none.trc", unseen, walk.time)
+    result = walk.followed(tmp_path / "none.trc")
+    assert result.record()["markers"]["root_mean_square"] < 1e-6
+    (told,) = (line for line in result.warnings if "no marker" in line)
+    assert "no marker that is seen tells ankle in 10 frames between 0.2 and 0.29 s" in told
+    unseen[:, foot] = np.nan
+    walk.trc(tmp_path / "never.trc", unseen, walk.time)
+    (told,) = (line for line in walk.followed(tmp_path / "never.trc").warnings if "no marker" in line)
+    assert "no marker tells ankle: what they are is OpenSim's" in told
+    unseen[20:30] = np.nan
+    walk.trc(tmp_path / "blind.trc", unseen, walk.time)
+    with pytest.raises(LinkwiseError, match=r"none .* is seen in 10 frames between 0\.2 and 0\.29 s; fill"):
+        walk.followed(tmp_path / "blind.trc")
+
+
+def test_a_coordinate_with_a_task_of_its_own_is_told_by_that(walk: Walk, tmp_path: Path) -> None:
+    tasks = osim.IKTaskSet()
+    for name in walk.names:
+        if not name.startswith("foot"):
+            task = osim.IKMarkerTask()
+            task.setName(name)
+            task.setWeight(1.0)
+            tasks.cloneAndAppend(task)
+    tasks.printToXML(str(tmp_path / "markers.xml"))
+    own = osim.IKCoordinateTask()
+    own.setName("ankle")
+    own.setValueType(osim.IKCoordinateTask.ManualValue)
+    own.setValue(0.1)
+    own.setWeight(1.0)
+    tasks.cloneAndAppend(own)
+    tasks.printToXML(str(tmp_path / "both.xml"))
+    for file, is_told in (("markers.xml", True), ("both.xml", False)):
+        found = walk.followed(walk.folder / "walk.c3d", tasks=tmp_path / file).warnings
+        assert any("no marker tells ankle" in line for line in found) == is_told
+
+
+def test_a_marker_at_the_origin_is_not_seen_in_text_either(walk: Walk, tmp_path: Path) -> None:
+    zeros = walk.markers.copy()
+    zeros[20:30, 5] = 0.0
+    walk.trc(tmp_path / "zeros.trc", zeros, walk.time)
+    result = walk.followed(tmp_path / "zeros.trc")
+    assert np.abs(result.q - walk.known().q).max() < 1e-4
+    assert any(f"not seen there: {walk.names[5]}" in line for line in result.warnings)
+
+
+def test_a_head_that_is_not_of_its_rows_is_told(walk: Walk, tmp_path: Path) -> None:
+    walk.trc(tmp_path / "walk.trc", walk.markers, walk.time)
+    lines = (tmp_path / "walk.trc").read_text().splitlines(keepends=True)
+    (tmp_path / "cut.trc").write_text("".join(lines[:-40]))
+    found = walk.followed(tmp_path / "cut.trc").warnings
+    assert any("its head says 121 frames, and 81 are there" in line for line in found)
+    lines[2] = lines[2].replace("100", "200", 1)
+    (tmp_path / "fast.trc").write_text("".join(lines))
+    found = walk.followed(tmp_path / "fast.trc").warnings
+    assert any("its head says 200 Hz, and its times 100 Hz, which are taken" in line for line in found)
+
+
+def test_gaps_of_a_plate_are_refused(walk: Walk, tmp_path: Path) -> None:
+    held = walk.force.copy()
+    walk.force[50:53] = np.nan
+    try:
+        walk.c3d(tmp_path / "gaps.c3d")
+    finally:
+        walk.force[:] = held
+    with pytest.raises(LinkwiseError, match=r"gaps\.c3d.*plate 1: 3 of its 121 samples have no numbers"):
+        walk.followed(tmp_path / "gaps.c3d", "1=foot")
+
+
 def test_weights_are_those_of_a_file(walk: Walk, tmp_path: Path) -> None:
     tasks = osim.IKTaskSet()
     for name in walk.names:

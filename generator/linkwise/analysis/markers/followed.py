@@ -1,6 +1,5 @@
 """From markers to a log of joint coordinates, and from plates to loads."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.markers import SUFFIXES, MarkerChoices
 from linkwise.analysis.markers.c3d import RecordedC3D, read_c3d
 from linkwise.analysis.opensim.inverse_kinematics import MOTION, FollowedMarkers, inverse_kinematics
+from linkwise.analysis.opensim.trc_file import write_trc
 from linkwise.analysis.settings import Lowpass
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
@@ -19,12 +19,6 @@ from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.own_opensim import asked_of_opensim
 from linkwise.progress import Progress
-
-HEAD = (
-    *("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units"),
-    *("OrigDataRate", "OrigDataStartFrame", "OrigNumFrames"),
-)
-"""Names of the numbers in the third line of a .trc file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +93,7 @@ def followed(
     if log.suffix.lower() == ".c3d":
         recorded = read_c3d(log, asked.axes)
         markers = folder / f"{log.stem}.trc"
-        _write_trc(markers, recorded)
+        write_trc(markers, recorded.time, recorded.names, recorded.markers)
         told.append(f"{recorded.axes} of the laboratory are x of the model, and up")
         given, notes = _plates(log, asked, recorded)
         loads, told = replace(loads, given=(*loads.given, *given)), [*told, *notes]
@@ -115,6 +109,7 @@ def followed(
     progress("inverse kinematics", 1, 1)
     for names, what in ((found.lacking, "not in the recording"), (found.unknown, "not in the model")):
         told += [f"markers {what}: {listed(names)}"] if names else []
+    told += found.told
     motion = folder / MOTION
     motion.write_bytes(found.motion)
     return MarkerLog(motion, loads, found, log.name, tuple(told))
@@ -154,20 +149,3 @@ def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tup
             )
         )
     return tuple(found), told
-
-
-def _write_trc(path: Path, recorded: RecordedC3D) -> None:
-    count, rate = len(recorded.time), 1.0 / float(np.diff(recorded.time).mean())
-    names = [name.replace("\t", " ") for name in recorded.names]
-
-    def lines() -> Iterator[str]:
-        yield f"PathFileType\t4\t(X/Y/Z)\t{path.name}"
-        yield "\t".join(HEAD)
-        yield f"{rate:.10g}\t{rate:.10g}\t{count}\t{len(names)}\tm\t{rate:.10g}\t1\t{count}"
-        yield "Frame#\tTime\t" + "\t\t\t".join(names) + "\t\t"
-        yield "\t\t" + "\t".join(f"{axis}{at}" for at in range(1, 1 + len(names)) for axis in "XYZ")
-        yield ""
-        for number, (time, places) in enumerate(zip(recorded.time, recorded.markers, strict=True), 1):
-            yield "\t".join([str(number), f"{time:.9g}", *(f"{x:.9g}" for x in places.ravel())])
-
-    path.write_text("\n".join(lines()) + "\n", encoding="utf-8")

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.opensim.trc_file import read_trc
+from linkwise.analysis.opensim.untold_coordinates import untold_coordinates
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
@@ -17,7 +19,6 @@ ACCURACY = 1e-8
 """OpenSim's usual 1e-5 ends its search up to 0.3 mrad from where markers are met exactly."""
 DIGITS = 17
 """Digits after the point: OpenSim's usual eight move accelerations by up to 2e-4 m/s² at 100 Hz."""
-IN_METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,8 @@ class FollowedMarkers:
     """Markers of the model that the recording lacks, or never sees."""
     unknown: tuple[str, ...]
     """Markers of the recording that the model lacks."""
+    told: tuple[str, ...]
+    """Lines on what is odd in the recording, and on coordinates that markers do not tell at some times."""
 
 
 def inverse_kinematics(
@@ -41,26 +44,26 @@ def inverse_kinematics(
 ) -> FollowedMarkers:
     """Return what the tool finds; osim: the module of OpenSim; folder: where it may write.
 
-    Raises LinkwiseError where model and recording share fewer than three markers.
+    Raises LinkwiseError where model and recording share fewer than three markers, and where none is seen.
     """
     opened = osim.Model(str(model))
     opened.initSystem()
     own = [opened.getMarkerSet().get(at).getName() for at in range(opened.getMarkerSet().getSize())]
-    time, there, places = _recorded(osim, markers)
-    twice = [name for name in dict.fromkeys(there) if there.count(name) > 1]
-    if twice:
-        raise LinkwiseError(f"{markers.name}: several markers are named {listed(twice)}; rename them")
-    seen = [name for name, path in zip(there, places.swapaxes(0, 1), strict=True) if np.isfinite(path).any()]
-    names = [name for name in own if name in seen]
+    recorded = read_trc(osim, markers, folder)
+    time = recorded.time
+    names = [name for name in own if name in recorded.seen]
     if len(names) < 3:
         raise LinkwiseError(
             f"{markers.name}: {len(names)} of its markers are in {model}, which has {listed(own[:8])}; the"
-            f" recording has {listed(seen[:8])}; name them alike"
+            f" recording has {listed(recorded.seen[:8])}; name them alike"
         )
+    shown = recorded.of(names)
+    _require_some(markers.name, time, shown)
     tool = osim.InverseKinematicsTool()
     tool.setModel(opened)
-    tool.set_IKTaskSet(_tasks(osim, tasks, names))
-    tool.setMarkerDataFileName(str(markers))
+    followed = _tasks(osim, tasks, names)
+    tool.set_IKTaskSet(followed)
+    tool.setMarkerDataFileName(str(recorded.file))
     tool.setStartTime(float(time[0]))
     tool.setEndTime(float(time[-1]))
     _run(osim, tool, folder)
@@ -73,15 +76,27 @@ def inverse_kinematics(
     at = [[labels.index(f"{name}_t{axis}") for axis in "xyz"] for name in used]
     when = np.asarray(found.getIndependentColumn(), dtype=float)
     row = np.searchsorted((time[1:] + time[:-1]) / 2, when)  # the file's times are rounded
-    given = places[row][:, [there.index(name) for name in used]]
+    given = recorded.of(used)[row]
+    untold = untold_coordinates(osim, osim.Model(str(model)), followed, folder / MOTION, time, names, shown)
     return FollowedMarkers(
         (folder / MOTION).read_bytes(),
         when,
         tuple(used),
         np.linalg.norm(rows[:, np.array(at)] - given, axis=2),
-        tuple(name for name in own if name not in seen),
-        tuple(name for name in there if name not in own),
+        tuple(name for name in own if name not in recorded.seen),
+        tuple(name for name in recorded.names if name not in own),
+        (*recorded.told, *untold),
     )
+
+
+def _require_some(file: str, time: Array, shown: Array) -> None:
+    """Raise LinkwiseError where no marker is seen, at which OpenSim's search ends."""
+    blind = time[~np.isfinite(shown).any(axis=(1, 2))]
+    if len(blind):
+        raise LinkwiseError(
+            f"{file}: none of the model's markers is seen in {len(blind)} frames between {blind[0]:.6g} and"
+            f" {blind[-1]:.6g} s; fill the gap, or cut the recording there"
+        )
 
 
 def _run(osim: Any, tool: Any, folder: Path) -> None:
@@ -93,19 +108,6 @@ def _run(osim: Any, tool: Any, folder: Path) -> None:
     tool.set_report_marker_locations(True)
     tool.set_report_errors(False)
     tool.run()
-
-
-def _recorded(osim: Any, markers: Path) -> tuple[Array, list[str], Array]:
-    """Return time (S,), names, and places (S, M, 3) in m."""
-    table = osim.TimeSeriesTableVec3(str(markers))
-    names = list(table.getColumnLabels())
-    unit = table.getTableMetaDataString("Units") if table.hasTableMetaDataKey("Units") else "m"
-    if unit not in IN_METRES:
-        raise LinkwiseError(f"{markers.name}: its unit is {unit!r}; lengths are read in {listed(IN_METRES)}")
-    flat = table.flatten()  # which its matrix does not keep
-    rows = flat.getMatrix().to_numpy().copy()
-    time = np.asarray(table.getIndependentColumn(), dtype=float)
-    return time, names, IN_METRES[unit] * rows.reshape(len(time), len(names), 3)
 
 
 def _tasks(osim: Any, tasks: Path | None, names: list[str]) -> Any:
