@@ -122,6 +122,8 @@ def case_blind() -> None:
         setattr(os, name, wrapped)
     SYSTEM["lexists"] = lexists
     shutil._use_fd_functions = False  # type: ignore[attr-defined]
+    if hasattr(shutil, "_rmtree_impl"):  # which Python 3.14 decides on at import
+        shutil._rmtree_impl = shutil._rmtree_unsafe  # type: ignore[attr-defined]
     io.open = builtins.open = _blind(builtins.open, 1)
 
 

@@ -8,6 +8,7 @@ all trials are there, they are those of a study that nobody interrupted.
 
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -31,6 +32,8 @@ SECONDS = 5.0
 START = 0.5
 """Seconds in which Python itself begins, before linkwise can have a say."""
 TOLD = "linkwise: interrupted\n"
+PROGRESS = re.compile(r"^(trials|together): \d+%\n", re.MULTILINE)
+"""Lines that a study writes where it takes long, as on a machine with other work."""
 ENDED = (130, -signal.SIGINT)
 """Exit statuses: of linkwise, and of Python where it executes text, or after the program's last word."""
 
@@ -84,6 +87,7 @@ def struck(
         os.killpg(study.pid, signal.SIGKILL)
         return False, 60.0, "it did not end"
     took, status, complaint = time.monotonic() - start, study.returncode, ""
+    told = PROGRESS.sub("", told)
     done = bool(said) and not told
     if status not in (0, *ENDED)[not done :] or not (done or told == TOLD):
         complaint = f"status {status}, and it said {told!r}"
