@@ -71,5 +71,7 @@ def foreign_text(path: str, text: bytes, source: Source) -> str | None:
         in_c = ending in ("h", "c") and not is_copied(path)
         folder = path.rpartition("/")[0]
         return next(foreign_includes(text.decode(), folder, source.files), None) if in_c else None
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:  # the last by Python's parser
-        return f"cannot be read ({' '.join(str(error).split()) or 'it is nested too deeply'})"
+    except (RecursionError, MemoryError):  # the last by Python's parser
+        return "cannot be read (it is nested too deeply)"
+    except (SyntaxError, ValueError) as error:
+        return f"cannot be read ({' '.join(str(error).split())})"

@@ -73,7 +73,8 @@ class CalledBack:
         before = sys.unraisablehook
 
         def hear(told: Any) -> None:
-            if told.object is self:
+            # From Python 3.14 on, the object is told in the text alone.
+            if told.object is self or (told.object is None and repr(self) in (told.err_msg or "")):
                 self.error = told.exc_value
             else:
                 before(told)
