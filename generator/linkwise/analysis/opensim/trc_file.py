@@ -81,12 +81,19 @@ def read_trc(osim: Any, path: Path, folder: Path) -> RecordedMarkers:
 
 def _odd(head: Mapping[str, str], time: Array) -> Iterator[str]:
     """Yield lines on numbers of the head that are not those of the rows, whose count and times are taken."""
-    frames, rate = (float(head.get(key) or "nan") for key in ("NumFrames", "DataRate"))
+    frames, rate = (_number(head.get(key, "")) for key in ("NumFrames", "DataRate"))
     if np.isfinite(frames) and frames != len(time):
         yield f"its head says {frames:.0f} frames, and {len(time)} are there"
     own = 1.0 / float(np.diff(time).mean()) if len(time) > 1 else rate
     if abs(own - rate) > OFF * rate:
         yield f"its head says {rate:g} Hz, and its times {own:.6g} Hz, which are taken"
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")
 
 
 def write_trc(path: Path, time: Array, names: Sequence[str], places: Array) -> None:

@@ -33,11 +33,13 @@ def untold_coordinates(
     state = model.initSystem()
     seen = np.asarray(np.isfinite(shown).all(axis=2))
     free = [one for one in _all(model.getCoordinateSet()) if not one.isConstrained(state)]
-    weights = {one.getName(): one for one in _all(tasks) if one.getApply() and one.getWeight() > 0.0}
-    used = [at for at, name in enumerate(names) if name in weights]
+    asked = [one for one in _all(tasks) if one.getApply() and one.getWeight() > 0.0]
+    coordinates = {one.getName() for one in asked if osim.IKCoordinateTask.safeDownCast(one) is not None}
+    markers = {one.getName() for one in asked if osim.IKMarkerTask.safeDownCast(one) is not None}
+    used = [at for at, name in enumerate(names) if name in markers]
     _pose(osim, model, state, motion, int(seen[:, used].sum(axis=1).argmax()))
     slopes = _jacobian(model, state, free, [names[at] for at in used])
-    own = np.array([one.getName() in weights for one in free], dtype=float)
+    own = np.array([one.getName() in coordinates for one in free], dtype=float)
     patterns, which = np.unique(seen[:, used], axis=0, return_inverse=True)
     untold = np.array([_untold(slopes[pattern].reshape(-1, len(free)), own) for pattern in patterns])
     held = untold[which.ravel()]
@@ -62,7 +64,8 @@ def _pose(osim: Any, model: Any, state: Any, motion: Path, row: int) -> None:
     """Bring the model to a row of a motion."""
     table = osim.TimeSeriesTable(str(motion))
     is_degrees = table.getTableMetaDataString("inDegrees") == "yes"
-    values = dict(zip(table.getColumnLabels(), table.getRowAtIndex(row).to_numpy(), strict=True))
+    numbers = table.getRowAtIndex(min(row, table.getNumRows() - 1)).to_numpy()
+    values = dict(zip(table.getColumnLabels(), numbers, strict=True))
     for one in _all(model.getCoordinateSet()):
         value = float(values.get(one.getName(), one.getValue(state)))
         is_angle = is_degrees and one.getMotionType() == ROTATIONAL and one.getName() in values
