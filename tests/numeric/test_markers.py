@@ -253,15 +253,26 @@ def test_a_head_that_is_not_of_its_rows_is_told(walk: Walk, tmp_path: Path) -> N
     assert any("its head says 200 Hz, and its times 100 Hz, which are taken" in line for line in found)
 
 
-def test_gaps_of_a_plate_are_refused(walk: Walk, tmp_path: Path) -> None:
-    held = walk.force.copy()
-    walk.force[50:53] = np.nan
+def test_gaps_of_a_plate_that_bears_something_are_refused(walk: Walk, tmp_path: Path) -> None:
+    held = walk.force.copy(), walk.free.copy()
+    walk.force[10:13], walk.free[10:13] = (
+        (0.0, 5.0, 0.0),
+        np.nan,
+    )  # less than 20 N, without a centre of pressure
     try:
+        walk.c3d(tmp_path / "idle.c3d")
+        walk.force[50:53] = np.nan
         walk.c3d(tmp_path / "gaps.c3d")
     finally:
-        walk.force[:] = held
-    with pytest.raises(LinkwiseError, match=r"gaps\.c3d.*plate 1: 3 of its 121 samples have no numbers"):
+        walk.force[:], walk.free[:] = held
+    found = walk.followed(tmp_path / "idle.c3d", "1=foot").load_torque
+    assert np.isfinite(found).all()
+    assert not found[11].any()
+    with pytest.raises(
+        LinkwiseError, match=r"gaps\.c3d: plate 1: 3 of its 121 samples .*, first the 51th; fill"
+    ):
         walk.followed(tmp_path / "gaps.c3d", "1=foot")
+    assert any("plate 1 bears up to" in line for line in walk.followed(tmp_path / "gaps.c3d").warnings)
 
 
 def test_weights_are_those_of_a_file(walk: Walk, tmp_path: Path) -> None:

@@ -20,7 +20,10 @@ OF_PRESSURE = 1
 
 @dataclass(frozen=True, eq=False)
 class PlateWrench:
-    """Wrench of a plate on a body: force, and moment about `place`, (S, 3) each, and that place (3,)."""
+    """Wrench of a plate on a body: force, and moment about `place`, (S, 3) each, and that place (3,).
+
+    NaN is where the file has no number.
+    """
 
     force: Array
     moment: Array
@@ -85,10 +88,7 @@ def _recorded(file: Any, axes: str) -> RecordedC3D:
     found[(found == 0.0).all(axis=2)] = np.nan  # as some programs write what is not seen
     kinds = file["parameters"].get("FORCE_PLATFORM", {}).get("TYPE", {}).get("value", ())
     given = file["data"].get("platform", ())
-    plates = tuple(
-        _plate(one, int(kind), turn, f"plate {number}")
-        for number, (one, kind) in enumerate(zip(given, kinds, strict=False), 1)
-    )
+    plates = tuple(_plate(one, int(kind), turn) for one, kind in zip(given, kinds, strict=False))
     every = float(file["header"]["analogs"]["frame_rate"] or rate)
     count = len(plates[0].force) if plates else 0
     return RecordedC3D(
@@ -101,13 +101,11 @@ def _recorded(file: Any, axes: str) -> RecordedC3D:
     )
 
 
-def _plate(given: Any, kind: int, turn: Array, what: str) -> PlateWrench:
+def _plate(given: Any, kind: int, turn: Array) -> PlateWrench:
     """Return the wrench about the middle of a plate, which unlike a centre of pressure is always there.
 
     kind: the plate's type. Files have of type 1 the centre of pressure and the free moment; the moment that
-    ezc3d 1.7 makes of these has the wrong sign. what: how a message about the plate begins
-
-    Raises LinkwiseError for gaps; where nothing presses, there is no centre of pressure, and that is no gap.
+    ezc3d 1.7 makes of these has the wrong sign.
     """
     scale = _metres(str(given["unit_position"]), "a plate's corners")
     moments = {"Nm": 1.0, "N.m": 1.0, "Nmm": 1e-3, "N.mm": 1e-3}.get(str(given["unit_moment"]))
@@ -121,15 +119,8 @@ def _plate(given: Any, kind: int, turn: Array, what: str) -> PlateWrench:
         moment = np.cross(centre * scale - place, force) + free * moments
     else:
         moment = _turned(given["moment"], turn) * moments
-    idle = (force == 0.0).all(axis=1, keepdims=True)
-    moment = np.where(idle & np.isnan(moment), 0.0, moment)
-    if gaps := np.flatnonzero(np.isnan(force + moment).any(axis=1)).tolist():
-        raise LinkwiseError(
-            f"{what}: {len(gaps)} of its {len(force)} samples have no numbers, the first the {gaps[0] + 1}th;"
-            " fill the gap"
-        )
     # The ground presses and does not pull: a force that points down is that on the plate.
-    is_turned = float(force[:, 1].sum()) < 0.0
+    is_turned = float(np.nansum(force[:, 1])) < 0.0
     sign = -1.0 if is_turned else 1.0
     return PlateWrench(sign * force, sign * moment, place, is_turned)
 

@@ -125,7 +125,8 @@ def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tup
         )
     found, told = [], []
     for number, plate in enumerate(recorded.plates, 1):
-        most = float(np.linalg.norm(plate.force, axis=1).max(initial=0.0))
+        size = np.linalg.norm(plate.force, axis=1)
+        most = float(np.nan_to_num(size).max(initial=0.0))
         if number not in bodies:
             if most > asked.least:
                 told.append(f"plate {number} bears up to {most:.4g} N and is left out; --plate {number}=BODY")
@@ -133,7 +134,12 @@ def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tup
         if plate.is_turned:
             told.append(f"plate {number}: its forces point down, as on the plate, and are turned round")
         wrench = np.column_stack([plate.force, plate.moment])
-        wrench[np.linalg.norm(plate.force, axis=1) < asked.least] = 0.0
+        wrench[size < asked.least] = 0.0  # where a file may have no centre of pressure
+        if gaps := np.flatnonzero(np.isnan(wrench).any(axis=1)).tolist():
+            raise LinkwiseError(
+                f"{log}: plate {number}: {len(gaps)} of its {len(wrench)} samples have no numbers, first the"
+                f" {gaps[0] + 1}th; fill the gap"
+            )
         if asked.cutoff is not None:
             rate = 1.0 / float(np.diff(recorded.plate_time[:2])[0])
             lowpass(wrench, rate, Lowpass(asked.cutoff), flag="--loads-cutoff")
