@@ -37,7 +37,7 @@ OPTIONS = {
 }
 SHARED: dict[str, Path] = {}
 """Packages of the session, by robot."""
-LARGEST = 480 if sys.version_info < (3, 14) else 520
+LARGEST = 480
 """MB that a process of tests may hold, when it is through with a file, beyond what it held as tests began."""
 BEGAN: list[int] = []
 """MB that it held then: imports of all files of tests, which libraries and Python's own cache decide on."""

@@ -255,10 +255,8 @@ def test_a_head_that_is_not_of_its_rows_is_told(walk: Walk, tmp_path: Path) -> N
 
 def test_gaps_of_a_plate_that_bears_something_are_refused(walk: Walk, tmp_path: Path) -> None:
     held = walk.force.copy(), walk.free.copy()
-    walk.force[10:13], walk.free[10:13] = (
-        (0.0, 5.0, 0.0),
-        np.nan,
-    )  # less than 20 N, without a centre of pressure
+    walk.force[10:13] = 0.0, 5.0, 0.0  # less than 20 N
+    walk.free[10:13] = np.nan
     try:
         walk.c3d(tmp_path / "idle.c3d")
         walk.force[50:53] = np.nan
