@@ -39,6 +39,8 @@ SHARED: dict[str, Path] = {}
 """Packages of the session, by robot."""
 LARGEST = 480
 """MB that a process of tests may hold, when it is through with a file, beyond what it held as tests began."""
+SEARCHED = os.environ.get("LD_LIBRARY_PATH")
+"""Folders in which programs that tests start look for libraries, before any file of tests is imported."""
 BEGAN: list[int] = []
 """MB that it held then: imports of all files of tests, which libraries and Python's own cache decide on."""
 COMPILES = "torch.compile("
@@ -121,7 +123,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Keep what is imported by now out of the search for garbage."""
+    """Keep imports out of the search for garbage, and OpenSim's folder out of the environment.
+
+    Its import sends all programs that start later to its own CasADi.
+    """
+    os.environ.pop("LD_LIBRARY_PATH", None)
+    if SEARCHED is not None:
+        os.environ["LD_LIBRARY_PATH"] = SEARCHED
     gc.collect()
     gc.freeze()
     if sys.platform == "linux":
