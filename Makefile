@@ -3,7 +3,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: docs pictures demo demo-control test lint generate control bench corpus opensim crash random fuzz same mutate report clean
+.PHONY: docs pictures demo demo-control test test-most test-large lint generate control bench corpus opensim crash random fuzz same mutate report clean
 .PHONY: ship sums pythons licences calls embedded exports identity release rehearsal api
 
 $(READY): pyproject.toml constraints.txt
@@ -57,8 +57,10 @@ KEPT = LINKWISE_TEST_CACHE=$(CURDIR)/.cache/tests TORCHINDUCTOR_CACHE_DIR=$(CURD
 
 # Two files of tests at a time; the rooms with most robots begin in processes of their own, as memory is bounded.
 LARGE = tests/numeric tests/runtime
-test: $(READY)
+test: test-most test-large
+test-most: $(READY)
 	$(KEPT) $(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not (ship or browser)" $(LARGE:%=--ignore=%)
+test-large: $(READY)
 	$(KEPT) $(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not (ship or browser)" $(LARGE)
 
 # What leaves the house, as others get it: pages in a browser, wheels, CMake's projects, exports, other processors and
@@ -111,9 +113,10 @@ fuzz: $(READY)
 same: $(READY)
 	$(BIN)/python tests/tools/same_bytes.py
 
-# The tests in Python 3.12, 3.13 and 3.14, where these are: an hour, and gigabytes where torch comes with what GPUs need.
+# `make test ship` in Python 3.12, 3.13 and 3.14, where these are: an hour each, and gigabytes where torch comes with what
+# GPUs need; ONLY="3.12 3.14" takes some.
 pythons: $(READY)
-	$(BIN)/python tests/tools/pythons.py
+	$(BIN)/python tests/tools/pythons.py $(ONLY:%=--only %)
 
 # Authors, keywords, classifiers and URLs of pyproject.toml, brought to all other files that have some.
 identity: $(READY)

@@ -242,20 +242,32 @@ def test_a_verdict_hangs_on_code_and_not_on_what_is_said_of_it(tmp_path: Path) -
         assert found(text.replace(*other)) != own, other
 
 
-def test_what_caught_a_mutant_is_tried_first_once_the_text_is_another(
+def test_what_caught_a_change_or_others_beside_it_is_tried_first_once_the_text_is_another(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mutant, files = some_mutants()[0], (tmp_path / "survived.json", tmp_path / "caught.json")
-    Record(*files).add(mutant, "killed", f"{BY}[one]")
+    mutant, beside, *_ = some_mutants()
+    of_room = next(mutants("generator/linkwise/errors.py", rooms.text_of("generator/linkwise/errors.py")))
+    of_another = next(mutants(path := "generator/linkwise/cli/app.py", rooms.text_of(path)))
+    files = (tmp_path / "survived.json", tmp_path / "caught.json")
+    by = [f"tests/house/test_mutation.py::{name}" for name in ("one", "two", "three", "four", "gone")]
+    monkeypatch.setattr("mutation.decide.NOT_COUNTED", {})
+    monkeypatch.setattr(verdicts, "is_there", lambda test: test in by[:4])
+    first = Record(*files)
+    for one, test in zip((mutant, beside, of_room, of_another), by, strict=False):
+        first.add(one, "killed", f"{test}[a parameter]")
+    first.add(some_mutants()[2], "killed", by[4])
     monkeypatch.setattr(verdicts, "digest_of_code", lambda path: "new")
+    monkeypatch.setattr(verdicts, "digest_of_test", lambda file, test: test)
     reach = Map(tmp_path / "reach")
-    seconds = {"tests/graphs/test_graphs.py::quick": 1.0, BY: 2.0}
-    monkeypatch.setattr(reach, "files", {"tests/graphs/test_graphs.py": Reached("", seconds, {}, {})})
-    monkeypatch.setattr(reach, "tests", lambda path, line: (list(seconds.items()), []))
-    record = Record(*files)
-    assert not record.decided(mutant)
-    stages = [tests for tests, _ in Decider(reach, record).stages("single-files", mutant)]
-    assert stages == [[BY], ["tests/graphs/test_graphs.py::quick"]]
+    decider = Decider(reach, Record(*files))
+    assert not decider.record.decided(mutant)
+    kin = [tests for tests, _ in decider.kin("single-files", mutant)]
+    assert kin == [[by[0]], [by[1]], [by[2]]]
+    assert decider.recall("single-files", mutant, Scripted([PASSES] * 3)) is None  # type: ignore[arg-type]
+    again = Decider(reach, Record(*files))
+    assert list(again.kin("single-files", mutant)) == []
+    monkeypatch.setattr(verdicts, "digest_of_test", lambda file, test: f"{test}, another")
+    assert [tests for tests, _ in again.kin("single-files", mutant)] == kin
 
 
 def test_what_a_mutant_survived_is_not_run_again_on_it(

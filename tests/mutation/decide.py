@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from threading import Lock
 
 from mutation.mutants import Mutant
-from mutation.reach import Map, digest, test_of
-from mutation.rooms import NOT_COUNTED, ROOMS
+from mutation.reach import Map, digest
+from mutation.rooms import NOT_COUNTED, ROOMS, files_of
 from mutation.tree import ROOT, Ended, Tree, say
 from mutation.verdicts import Record
 
@@ -19,6 +19,10 @@ BESIDE = 40.0
 """Seconds of the other tests of the same files."""
 UNKNOWN = 300.0
 """Seconds for a file that a room names, which no map has measured: new ones, and those of `make ship`."""
+KIN = 8
+"""Tests that caught other changes of the same file, and as many of its room, which need no map."""
+OF_KIN = 60.0
+"""Seconds for these, which no map may have measured."""
 
 
 class Decider:
@@ -31,11 +35,22 @@ class Decider:
         self.unsteady: dict[str, str] = {}
         self._lock = Lock()
 
+    def kin(self, room: str, mutant: Mutant) -> Iterator[tuple[list[str], float]]:
+        """What caught this change of another text, then what caught others of its file and of its room."""
+        before = self.record.caught_before(mutant)
+        left_out = self.record.survived(mutant) | set(NOT_COUNTED)
+        groups = ([before] if before else []), *map(self.record.catchers, ([mutant.path], files_of(room)))
+        for ranked in groups:
+            tests = [name for name in ranked if not left_out & {name, name.partition("::")[0]}][:KIN]
+            left_out |= set(tests)
+            if tests:
+                yield tests, OF_KIN
+
     def stages(self, room: str, mutant: Mutant) -> Iterator[tuple[list[str], float]]:
         """Tests of each process, and their seconds: what reaches the change, else what the room names.
 
-        First what caught it before; what it is known to survive is left out. Last what the room names and no
-        map has measured: tests of `make ship`.
+        What it is known to survive is left out. Last what the room names and no map has measured: tests of
+        `make ship`.
         """
         tried = self.record.survived(mutant)
         near, far = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
@@ -43,11 +58,6 @@ class Decider:
         if not near:
             near, limits, last = last, (*STAGES[:2], float("inf")), []
         last = [item for item in last if item[0] in ROOMS[room].tests]
-        before = test_of(self.record.caught_before(mutant))
-        known = self.reach.files.get(before.partition("::")[0])
-        if known and before in known.seconds:
-            yield [before], known.seconds[before]
-            tried = tried | {before}
         close, beside, apart = (
             iter([item for item in part if not tried & {item[0], item[0].partition("::")[0]}])
             for part in (near, far, last)
@@ -73,24 +83,42 @@ class Decider:
             found += list(known.seconds.items()) if known and known.seconds else [(name, UNKNOWN)]
         return sorted(found, key=lambda item: item[1])
 
+    def recall(self, room: str, mutant: Mutant, tree: Tree) -> tuple[str, str] | None:
+        """The verdict where tests that need no map catch it; else None, and they are not run again on it."""
+        for tests, seconds in self.kin(room, mutant):
+            if verdict := self._caught(mutant, tests, seconds, tree):
+                return verdict
+            self.record.passes(mutant, tests)
+        return None
+
     def decide(self, room: str, mutant: Mutant, tree: Tree) -> tuple[str, str]:
         """Killed, too slow or survived; and by which test, or after how many seconds of tests."""
+        if verdict := self.recall(room, mutant, tree):
+            return verdict
         total = 0.0
         for tests, seconds in self.stages(room, mutant):
             total += seconds
-            while True:
-                left = [*(name for name in NOT_COUNTED if "::" in name), *self.unsteady]
-                with tree.changed(mutant):
-                    ended = tree.tested(tests, 60 + 4 * seconds, left)
-                if ended.passed:
-                    break
-                if self._trusted(ended, tests, seconds, left, tree):
-                    return ("too slow" if ended.too_slow else "killed"), ended.by or tests[0]
-                if not ended.by:
-                    raise SystemExit(f"{' '.join(tests)} end with {ended.code} without a mutant, too")
+            if verdict := self._caught(mutant, tests, seconds, tree):
+                return verdict
+        kept = self.record.verdicts.get(mutant.key)
+        if not total and kept and kept.verdict == "survived":
+            return "survived", kept.by
         if not total and self.record.survived(mutant):
-            return "survived", self.record.verdicts[mutant.key].by
+            return "survived", "what caught changes beside it"
         return "survived", f"{total:.0f} s of tests" if total else "nothing reaches it"
+
+    def _caught(self, mutant: Mutant, tests: list[str], seconds: float, tree: Tree) -> tuple[str, str] | None:
+        """Killed or too slow, and by which test; None where all of them pass that can be trusted."""
+        while True:
+            left = [*(name for name in NOT_COUNTED if "::" in name), *self.unsteady]
+            with tree.changed(mutant):
+                ended = tree.tested(tests, 60 + 4 * seconds, left)
+            if ended.passed:
+                return None
+            if self._trusted(ended, tests, seconds, left, tree):
+                return ("too slow" if ended.too_slow else "killed"), ended.by or tests[0]
+            if not ended.by:
+                raise SystemExit(f"{' '.join(tests)} end with {ended.code} without a mutant, too")
 
     def _trusted(self, ended: Ended, tests: list[str], seconds: float, left: list[str], tree: Tree) -> bool:
         """Return whether what failed fails because of the mutant; if not, it is told and does not count any

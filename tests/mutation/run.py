@@ -5,9 +5,10 @@
 Each mutant runs in a process forked from one that has the heavy libraries, in a copy of the tree. It is
 killed when a test that may notice it fails, or takes far more processor time than without it. What survives
 is to be killed by a test, or listed in equivalents.json with the reason why nothing that is promised changes.
-First the files of tests that are new run once under coverage, which tells what they reach. --minutes ends
-the sweep, and the next one goes on from there, in any clone: what is caught is in caught.json. --write puts
-the scores into docs/trust.md.
+First each is put to the tests that caught it when its file was another, or caught other changes of its room.
+For what is left, files of tests that are new run once under coverage, which tells what they reach. --minutes
+ends the sweep, and the next one goes on from there, in any clone: what is caught is in caught.json. --write
+puts the scores into docs/trust.md.
 """
 
 import argparse
@@ -83,11 +84,22 @@ def swept(options: argparse.Namespace) -> bool:
         trees = [Tree(Path(folder) / str(k)) for k in range(options.jobs)]
         unknown = [name for name in test_files() if name not in reach.files]
         if unknown:
-            say(f"{len(unknown)} files of tests run under coverage first")
-        for name in side_by_side(unknown, reach.add, trees, end):
-            say(f"mapped: {name}")
-        if any(name not in reach.files for name in test_files()):
-            return False
+            todo = in_turn(options.only, record)
+
+            def recall(item: tuple[str, Mutant], tree: Tree) -> None:
+                if verdict := decider.recall(*item, tree):
+                    record.add(item[1], *verdict)
+
+            asked = sum(1 for _ in side_by_side(todo, recall, trees, end))
+            left = in_turn(options.only, record)
+            say(f"{len(todo) - len(left)} of {asked} mutants caught by what caught others")
+            if left and asked == len(todo):
+                say(f"{len(unknown)} files of tests run under coverage first")
+                for name in side_by_side(unknown, reach.add, trees, end):
+                    say(f"mapped: {name}")
+            if left and any(name not in reach.files for name in unknown):
+                return False
+        todo = in_turn(options.only, record)
 
         def decide(item: tuple[str, Mutant], tree: Tree) -> None:
             room, mutant = item
@@ -96,7 +108,6 @@ def swept(options: argparse.Namespace) -> bool:
             if verdict == "survived":
                 say(f"survives: {mutant.key} (line {mutant.line}; {by})")
 
-        todo = in_turn(options.only, record)
         done = sum(1 for _ in side_by_side(todo, decide, trees, end))
     say(f"{done} of {len(todo)} mutants decided")
     return done == len(todo) and not decider.unsteady

@@ -1,10 +1,14 @@
 """Verdicts kept on disk, so that a sweep goes on where it stopped and runs nothing twice."""
 
+import ast
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
+from threading import Lock
 
 from mutation.mutants import Mutant
 from mutation.reach import digest, digest_of_code, digest_of_test, test_of
@@ -46,7 +50,9 @@ class Record:
         of_paths = json.loads(caught.read_text(encoding="utf-8")) if caught.is_file() else {}
         for path, changes in of_paths.items():
             self.verdicts |= {f"{path}: {change}": _read(told) for change, told in changes.items()}
+        self.passed: dict[str, list[str]] = kept.get("passed", {})
         self.sound: dict[str, str] = {}
+        self._saving = Lock()
         now = {name: digest(ROOT / name) for name in test_files()}
         texts = "".join(f"{name} {text}\n" for name, text in now.items())
         self.all_tests = hashlib.sha256(texts.encode()).hexdigest()[:16]
@@ -70,43 +76,86 @@ class Record:
     def caught_before(self, mutant: Mutant) -> str:
         """The test that caught a mutant of another text, or did so when it was another itself; else empty."""
         kept = self.verdicts.get(mutant.key)
-        return kept.by if kept is not None and kept.verdict in CAUGHT and "::" in kept.by else ""
+        by = test_of(kept.by) if kept is not None and kept.verdict in CAUGHT else ""
+        return by if is_there(by) else ""
+
+    def catchers(self, paths: Collection[str]) -> list[str]:
+        """Tests that have caught changes of these files and are still there, those that caught most first."""
+        caught = {
+            key: test_of(verdict.by)
+            for key, verdict in list(self.verdicts.items())
+            if verdict.verdict in CAUGHT and key.partition(": ")[0] in paths
+        }
+        counts = Counter(test for test in caught.values() if is_there(test))
+        return [test for test, _ in counts.most_common()]
 
     def survived(self, mutant: Mutant) -> set[str]:
-        """Files of tests, as they are now, that this mutant of the text as it is has survived before."""
+        """Tests, and files of them, as they are now, that pass with this change of the text as it is."""
         kept, now = self.verdicts.get(mutant.key), self.suites[self.all_tests]
-        if kept is None or kept.verdict in CAUGHT or kept.source != digest_of_code(ROOT / mutant.path):
-            return set()
-        return {name for name, text in self.suites.get(kept.tests, {}).items() if now.get(name) == text}
+        source = digest_of_code(ROOT / mutant.path)
+        told = (one.split(" ") for one in self.passed.get(mutant.key, ()))
+        found = {
+            test
+            for test, text, tests in told
+            if text == source and is_there(test) and tests == self.tests("killed", test)
+        }
+        if kept is None or kept.verdict in CAUGHT or kept.source != source:
+            return found
+        return found | {
+            name for name, text in self.suites.get(kept.tests, {}).items() if now.get(name) == text
+        }
+
+    def passes(self, mutant: Mutant, tests: Sequence[str]) -> None:
+        """Keep that these tests pass with a change that is not decided yet."""
+        source = digest_of_code(ROOT / mutant.path)
+        told = [f"{test} {source} {self.tests('killed', test)}" for test in tests]
+        self.passed.setdefault(mutant.key, []).extend(told)
+        self.save()
 
     def add(self, mutant: Mutant, verdict: str, by: str) -> None:
         """Keep a verdict."""
         tests = self.tests(verdict, by)
         self.verdicts[mutant.key] = Verdict(verdict, by, digest_of_code(ROOT / mutant.path), tests)
+        self.passed.pop(mutant.key, None)
         self.save()
 
     def save(self) -> None:
         """Write all to disk, each file at once."""
         caught: dict[str, dict[str, str]] = {}
         survived = {}
-        for key, verdict in sorted(self.verdicts.items()):
+        for key, verdict in sorted(self.verdicts.copy().items()):
             path, _, change = key.partition(": ")
             if verdict.verdict in CAUGHT:
                 told = f"{verdict.source} {verdict.tests} {verdict.verdict}: {verdict.by}"
                 caught.setdefault(path, {})[change] = told
             else:
                 survived[key] = asdict(verdict)
-        suites = {kept.tests: self.suites.get(kept.tests, {}) for kept in self.verdicts.values()}
+        suites = {kept.tests: self.suites.get(kept.tests, {}) for kept in self.verdicts.copy().values()}
         suites = {tests: files for tests, files in suites.items() if files}
-        for file, data in ((self.caught, caught), (self.file, {"survived": survived, "suites": suites})):
-            beside = file.with_suffix(".new")
-            beside.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-            beside.replace(file)
+        rest = {"survived": survived, "passed": self.passed.copy(), "suites": suites}
+        for file, data in ((self.caught, caught), (self.file, rest)):
+            with self._saving:
+                beside = file.with_suffix(".new")
+                beside.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+                beside.replace(file)
 
     def keep(self, keys: Collection[str]) -> None:
         """Forget all other mutants: of texts that have gone."""
         self.verdicts = {key: verdict for key, verdict in self.verdicts.items() if key in keys}
+        self.passed = {key: tests for key, tests in self.passed.items() if key in keys}
         self.save()
+
+
+def is_there(test: str) -> bool:
+    """Return whether a file has this test, FILE::NAME."""
+    file, _, name = test.partition("::")
+    return bool(name) and (ROOT / file).is_file() and name in _tests_in(ROOT / file)
+
+
+@cache
+def _tests_in(file: Path) -> frozenset[str]:
+    body = ast.parse(file.read_text(encoding="utf-8")).body
+    return frozenset(node.name for node in body if isinstance(node, ast.FunctionDef))
 
 
 def _read(told: str) -> Verdict:

@@ -1,6 +1,6 @@
-"""Run the tests with the other Pythons that are here: `make pythons`.
+"""Run `make test ship` with the other Pythons that are here: `make pythons`.
 
-Each has an environment of its own in out/pythons, with what constraints.txt pins, and runs the tests there.
+Each has an environment of its own in out/pythons, with what constraints.txt pins.
 """
 
 import argparse
@@ -24,39 +24,24 @@ def interpreter(version: str) -> str | None:
     return None
 
 
-def environment(version: str, place: Path, extras: str = "") -> str | None:
-    """The Python of an environment with linkwise and these extras; None where this version is not here."""
-    base = interpreter(version)
-    if base is None:
-        return None
-    subprocess.run([base, "-m", "venv", str(place / version)], check=True)
-    python = str(place / version / "bin/python")
-    wanted = f"{ROOT}[{extras}]" if extras else str(ROOT)
-    pins = ["--constraint", str(ROOT / "constraints.txt")]
-    subprocess.run([python, "-m", "pip", "install", "--quiet", *pins, "--editable", wanted], check=True)
-    return python
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Exit status 1 where a test fails, and where no Python of those asked for is here."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", choices=NEWER, action="append", help="may be repeated")
-    parser.add_argument("--extras", default="all,test")
-    parser.add_argument("tests", nargs="*", help="words for pytest")
     wanted = parser.parse_args(arguments)
     endings = {}
     for version in wanted.only or NEWER:
-        python = environment(version, ROOT / "out/pythons", wanted.extras)
+        python = interpreter(version)
         if python is None:
-            print(f"{version}: no such Python here, not run")
+            endings[version] = "not here"
             continue
-        print(f"{version}:", flush=True)
-        run = [python, "-m", "pytest", "--numprocesses", "2", "--dist", "loadfile", "-rs", *wanted.tests]
-        endings[version] = subprocess.run(run, cwd=ROOT, check=False).returncode
-    print(
-        *(f"{version}: {'failed' if status else 'passed'}" for version, status in endings.items()), sep="\n"
-    )
-    return int(not endings or any(endings.values()))
+        told = subprocess.run([python, "--version"], check=True, capture_output=True, text=True).stdout
+        print(f"{told.strip()}:", flush=True)
+        words = ["make", "--keep-going", f"PYTHON={python}", f"VENV=out/pythons/{version}", "test", "ship"]
+        status = subprocess.run(words, cwd=ROOT, check=False).returncode
+        endings[version] = "failed" if status else "passed"
+    print(*(f"{version} {ending}" for version, ending in endings.items()), sep=", ")
+    return int("failed" in endings.values() or "passed" not in endings.values())
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from tools.pythons import NEWER, environment
+from tools.pythons import NEWER, interpreter
 
 ROOT = Path(__file__).parents[2]
 OPTIONAL = ("torch", "mujoco", "scipy", "pyarrow", "matplotlib", "plotly")
@@ -117,6 +117,18 @@ def make_locales(place: Path) -> Path:
             command = ["localedef", "-i", name, "-f", charset, str(place / f"{name}.{charset}")]
             subprocess.run(command, capture_output=True, check=False)
     return place
+
+
+def environment(version: str, place: Path) -> str | None:
+    """The Python of an environment with linkwise alone; None where this version is not here."""
+    base = interpreter(version)
+    if base is None:
+        return None
+    subprocess.run([base, "-m", "venv", str(place / version)], check=True)
+    python = str(place / version / "bin/python")
+    pins = ["--constraint", str(ROOT / "constraints.txt")]
+    subprocess.run([python, "-m", "pip", "install", "--quiet", *pins, "--editable", str(ROOT)], check=True)
+    return python
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
