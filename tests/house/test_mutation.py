@@ -156,7 +156,7 @@ FAILS, PASSES = Ended(1, BY), Ended(0)
 def decider(tmp_path: Path) -> Decider:
     """One that has a room's three files of tests to ask."""
     made = Decider(Map(tmp_path / "reach"), Record(tmp_path / "survived.json", tmp_path / "caught.json"))
-    made.stages = lambda room, mutant: iter([(["a"], 1.0), (["b"], 2.0)])  # type: ignore[method-assign]
+    made.stages = lambda room, mutant, whole: iter([(["a"], 1.0), (["b"], 2.0)])  # type: ignore[method-assign]
     return made
 
 
@@ -242,32 +242,43 @@ def test_a_verdict_hangs_on_code_and_not_on_what_is_said_of_it(tmp_path: Path) -
         assert found(text.replace(*other)) != own, other
 
 
-def test_what_caught_a_change_or_others_beside_it_is_tried_first_once_the_text_is_another(
+def test_what_caught_a_mutant_is_tried_first_once_the_text_is_another_with_a_map_or_without(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mutant, beside, *_ = some_mutants()
-    of_room = next(mutants("generator/linkwise/errors.py", rooms.text_of("generator/linkwise/errors.py")))
-    of_another = next(mutants(path := "generator/linkwise/cli/app.py", rooms.text_of(path)))
-    files = (tmp_path / "survived.json", tmp_path / "caught.json")
-    by = [f"tests/house/test_mutation.py::{name}" for name in ("one", "two", "three", "four", "gone")]
-    monkeypatch.setattr("mutation.decide.NOT_COUNTED", {})
-    monkeypatch.setattr(verdicts, "is_there", lambda test: test in by[:4])
-    first = Record(*files)
-    for one, test in zip((mutant, beside, of_room, of_another), by, strict=False):
-        first.add(one, "killed", f"{test}[a parameter]")
-    first.add(some_mutants()[2], "killed", by[4])
+    mutant, files = some_mutants()[0], (tmp_path / "survived.json", tmp_path / "caught.json")
+    by = "tests/graphs/test_graphs.py::slow"
+    monkeypatch.setattr(verdicts, "is_there", lambda test: test == by)
+    monkeypatch.setattr(verdicts, "digest_of_test", lambda file, test: "same")
+    Record(*files).add(mutant, "killed", f"{by}[one]")
     monkeypatch.setattr(verdicts, "digest_of_code", lambda path: "new")
-    monkeypatch.setattr(verdicts, "digest_of_test", lambda file, test: test)
     reach = Map(tmp_path / "reach")
     decider = Decider(reach, Record(*files))
     assert not decider.record.decided(mutant)
-    kin = [tests for tests, _ in decider.kin("single-files", mutant)]
-    assert kin == [[by[0]], [by[1]], [by[2]]]
-    assert decider.recall("single-files", mutant, Scripted([PASSES] * 3)) is None  # type: ignore[arg-type]
+    assert [tests for tests, _ in decider.stages("single-files", mutant, whole=False)] == [[by]]
+    seconds = {"tests/graphs/test_graphs.py::quick": 1.0, by: 2.0}
+    monkeypatch.setattr(reach, "files", {"tests/graphs/test_graphs.py": Reached("", seconds, {}, {})})
+    monkeypatch.setattr(reach, "tests", lambda path, line: (list(seconds.items()), []))
+    stages = list(decider.stages("single-files", mutant))
+    assert stages == [([by], 2.0), (["tests/graphs/test_graphs.py::quick"], 1.0)]
+
+
+def test_what_passes_before_the_map_is_whole_decides_nothing_and_is_not_run_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mutant, files = some_mutants()[0], (tmp_path / "survived.json", tmp_path / "caught.json")
+    quick, slow = (f"tests/graphs/test_graphs.py::{name}" for name in ("quick", "slow"))
+    monkeypatch.setattr(verdicts, "is_there", lambda test: True)
+    monkeypatch.setattr(verdicts, "digest_of_test", lambda file, test: "same")
+    reach = Map(tmp_path / "reach")
+    monkeypatch.setattr(reach, "tests", lambda path, line: ([(quick, 20.0), (slow, 50.0)], []))
+    first = Decider(reach, Record(*files))
+    tree: Any = Scripted([PASSES, PASSES])
+    assert first.decide("single-files", mutant, tree, whole=False) is None
     again = Decider(reach, Record(*files))
-    assert list(again.kin("single-files", mutant)) == []
-    monkeypatch.setattr(verdicts, "digest_of_test", lambda file, test: f"{test}, another")
-    assert [tests for tests, _ in again.kin("single-files", mutant)] == kin
+    assert again.record.decided(mutant) is None
+    assert list(again.stages("single-files", mutant, whole=False)) == []
+    monkeypatch.setattr(verdicts, "digest_of_test", lambda file, test: "another")
+    assert next(again.stages("single-files", mutant))[0] == [quick]
 
 
 def test_what_a_mutant_survived_is_not_run_again_on_it(

@@ -9,7 +9,7 @@ from threading import Lock
 
 from mutation.mutants import Mutant
 from mutation.reach import Map, digest
-from mutation.rooms import NOT_COUNTED, ROOMS, files_of
+from mutation.rooms import NOT_COUNTED, ROOMS
 from mutation.tree import ROOT, Ended, Tree, say
 from mutation.verdicts import Record
 
@@ -19,10 +19,8 @@ BESIDE = 40.0
 """Seconds of the other tests of the same files."""
 UNKNOWN = 300.0
 """Seconds for a file that a room names, which no map has measured: new ones, and those of `make ship`."""
-KIN = 8
-"""Tests that caught other changes of the same file, and as many of its room, which need no map."""
-OF_KIN = 60.0
-"""Seconds for these, which no map may have measured."""
+UNMEASURED = 60.0
+"""Seconds for a test that caught a change before, where no map has measured it yet."""
 
 
 class Decider:
@@ -35,32 +33,27 @@ class Decider:
         self.unsteady: dict[str, str] = {}
         self._lock = Lock()
 
-    def kin(self, room: str, mutant: Mutant) -> Iterator[tuple[list[str], float]]:
-        """What caught this change of another text, then what caught others of its file and of its room."""
-        before = self.record.caught_before(mutant)
-        left_out = self.record.survived(mutant) | set(NOT_COUNTED)
-        groups = ([before] if before else []), *map(self.record.catchers, ([mutant.path], files_of(room)))
-        for ranked in groups:
-            tests = [name for name in ranked if not left_out & {name, name.partition("::")[0]}][:KIN]
-            left_out |= set(tests)
-            if tests:
-                yield tests, OF_KIN
-
-    def stages(self, room: str, mutant: Mutant) -> Iterator[tuple[list[str], float]]:
+    def stages(self, room: str, mutant: Mutant, whole: bool = True) -> Iterator[tuple[list[str], float]]:
         """Tests of each process, and their seconds: what reaches the change, else what the room names.
 
-        What it is known to survive is left out. Last what the room names and no map has measured: tests of
-        `make ship`.
+        First what caught it before; what it is known to survive is left out. Last what the room names and no
+        map has measured: tests of `make ship`. Where the map is not whole, quick ones of what it knows to
+        reach the change are all.
         """
         tried = self.record.survived(mutant)
+        before = self.record.caught_before(mutant)
+        if before and not tried & {before, before.partition("::")[0]}:
+            known = self.reach.files.get(before.partition("::")[0])
+            yield [before], known.seconds.get(before, UNMEASURED) if known else UNMEASURED
+            tried |= {before}
         near, far = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
-        limits, last = STAGES, self._named(room)
-        if not near:
+        limits, last = STAGES if whole else STAGES[:2], self._named(room)
+        if not near and whole:
             near, limits, last = last, (*STAGES[:2], float("inf")), []
-        last = [item for item in last if item[0] in ROOMS[room].tests]
+        last = [item for item in last if item[0] in ROOMS[room].tests and whole]
         close, beside, apart = (
             iter([item for item in part if not tried & {item[0], item[0].partition("::")[0]}])
-            for part in (near, far, last)
+            for part in (near, far if whole else [], last)
         )
         every = (*((close, limit) for limit in limits), (beside, BESIDE), (apart, float("inf")))
         for ranked, limit in every:
@@ -83,28 +76,24 @@ class Decider:
             found += list(known.seconds.items()) if known and known.seconds else [(name, UNKNOWN)]
         return sorted(found, key=lambda item: item[1])
 
-    def recall(self, room: str, mutant: Mutant, tree: Tree) -> tuple[str, str] | None:
-        """The verdict where tests that need no map catch it; else None, and they are not run again on it."""
-        for tests, seconds in self.kin(room, mutant):
-            if verdict := self._caught(mutant, tests, seconds, tree):
-                return verdict
-            self.record.passes(mutant, tests)
-        return None
+    def decide(self, room: str, mutant: Mutant, tree: Tree, whole: bool = True) -> tuple[str, str] | None:
+        """Killed, too slow or survived; and by which test, or after how many seconds of tests.
 
-    def decide(self, room: str, mutant: Mutant, tree: Tree) -> tuple[str, str]:
-        """Killed, too slow or survived; and by which test, or after how many seconds of tests."""
-        if verdict := self.recall(room, mutant, tree):
-            return verdict
+        None where tests pass and the map of what they reach is not whole.
+        """
         total = 0.0
-        for tests, seconds in self.stages(room, mutant):
+        for tests, seconds in self.stages(room, mutant, whole):
             total += seconds
             if verdict := self._caught(mutant, tests, seconds, tree):
                 return verdict
+            self.record.passes(mutant, tests)
+        if not whole:
+            return None
         kept = self.record.verdicts.get(mutant.key)
         if not total and kept and kept.verdict == "survived":
             return "survived", kept.by
         if not total and self.record.survived(mutant):
-            return "survived", "what caught changes beside it"
+            return "survived", "all that reach it"
         return "survived", f"{total:.0f} s of tests" if total else "nothing reaches it"
 
     def _caught(self, mutant: Mutant, tests: list[str], seconds: float, tree: Tree) -> tuple[str, str] | None:

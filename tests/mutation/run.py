@@ -5,10 +5,10 @@
 Each mutant runs in a process forked from one that has the heavy libraries, in a copy of the tree. It is
 killed when a test that may notice it fails, or takes far more processor time than without it. What survives
 is to be killed by a test, or listed in equivalents.json with the reason why nothing that is promised changes.
-First each is put to the tests that caught it when its file was another, or caught other changes of its room.
-For what is left, files of tests that are new run once under coverage, which tells what they reach. --minutes
-ends the sweep, and the next one goes on from there, in any clone: what is caught is in caught.json. --write
-puts the scores into docs/trust.md.
+First each is put to the test that caught it when its file was another. For what is left, files of tests that
+are new run once under coverage, which tells what they reach, and mutants are put to them folder by folder.
+--minutes ends the sweep, and the next one goes on from there, in any clone: what is caught is in caught.json.
+--write puts the scores into docs/trust.md.
 """
 
 import argparse
@@ -17,6 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import groupby
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TypeVar
@@ -83,34 +84,27 @@ def swept(options: argparse.Namespace) -> bool:
     with tempfile.TemporaryDirectory() as folder:
         trees = [Tree(Path(folder) / str(k)) for k in range(options.jobs)]
         unknown = [name for name in test_files() if name not in reach.files]
-        if unknown:
+        folders = [list(files) for _, files in groupby(unknown, key=lambda name: name.rpartition("/")[0])]
+        every = todo = in_turn(options.only, record)
+        for new in ([], *folders):
+            for name in side_by_side(new, reach.add, trees, end):
+                say(f"mapped: {name}")
+            whole = all(name in reach.files for name in test_files())
+
+            def decide(item: tuple[str, Mutant], tree: Tree, whole: bool = whole) -> None:
+                room, mutant = item
+                if verdict := decider.decide(room, mutant, tree, whole):
+                    record.add(mutant, *verdict)
+                    if verdict[0] == "survived":
+                        say(f"survives: {mutant.key} (line {mutant.line}; {verdict[1]})")
+
+            for _ in side_by_side(todo, decide, trees, end):
+                pass
             todo = in_turn(options.only, record)
-
-            def recall(item: tuple[str, Mutant], tree: Tree) -> None:
-                if verdict := decider.recall(*item, tree):
-                    record.add(item[1], *verdict)
-
-            asked = sum(1 for _ in side_by_side(todo, recall, trees, end))
-            left = in_turn(options.only, record)
-            say(f"{len(todo) - len(left)} of {asked} mutants caught by what caught others")
-            if left and asked == len(todo):
-                say(f"{len(unknown)} files of tests run under coverage first")
-                for name in side_by_side(unknown, reach.add, trees, end):
-                    say(f"mapped: {name}")
-            if left and any(name not in reach.files for name in unknown):
-                return False
-        todo = in_turn(options.only, record)
-
-        def decide(item: tuple[str, Mutant], tree: Tree) -> None:
-            room, mutant = item
-            verdict, by = decider.decide(room, mutant, tree)
-            record.add(mutant, verdict, by)
-            if verdict == "survived":
-                say(f"survives: {mutant.key} (line {mutant.line}; {by})")
-
-        done = sum(1 for _ in side_by_side(todo, decide, trees, end))
-    say(f"{done} of {len(todo)} mutants decided")
-    return done == len(todo) and not decider.unsteady
+            say(f"{len(every) - len(todo)} of {len(every)} mutants decided")
+            if not todo or time.monotonic() > end:
+                break
+    return not todo and not decider.unsteady
 
 
 def main() -> None:

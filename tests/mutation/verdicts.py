@@ -3,7 +3,6 @@
 import ast
 import hashlib
 import json
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -50,7 +49,8 @@ class Record:
         of_paths = json.loads(caught.read_text(encoding="utf-8")) if caught.is_file() else {}
         for path, changes in of_paths.items():
             self.verdicts |= {f"{path}: {change}": _read(told) for change, told in changes.items()}
-        self.passed: dict[str, list[str]] = kept.get("passed", {})
+        self.passed: dict[str, list[list[str]]] = kept.get("passed", {})
+        """By mutant: a test that passes with it, the digests of the changed file's code and of the test."""
         self.sound: dict[str, str] = {}
         self._saving = Lock()
         now = {name: digest(ROOT / name) for name in test_files()}
@@ -79,24 +79,13 @@ class Record:
         by = test_of(kept.by) if kept is not None and kept.verdict in CAUGHT else ""
         return by if is_there(by) else ""
 
-    def catchers(self, paths: Collection[str]) -> list[str]:
-        """Tests that have caught changes of these files and are still there, those that caught most first."""
-        caught = {
-            key: test_of(verdict.by)
-            for key, verdict in list(self.verdicts.items())
-            if verdict.verdict in CAUGHT and key.partition(": ")[0] in paths
-        }
-        counts = Counter(test for test in caught.values() if is_there(test))
-        return [test for test, _ in counts.most_common()]
-
     def survived(self, mutant: Mutant) -> set[str]:
         """Tests, and files of them, as they are now, that pass with this change of the text as it is."""
         kept, now = self.verdicts.get(mutant.key), self.suites[self.all_tests]
         source = digest_of_code(ROOT / mutant.path)
-        told = (one.split(" ") for one in self.passed.get(mutant.key, ()))
         found = {
             test
-            for test, text, tests in told
+            for test, text, tests in self.passed.get(mutant.key, ())
             if text == source and is_there(test) and tests == self.tests("killed", test)
         }
         if kept is None or kept.verdict in CAUGHT or kept.source != source:
@@ -108,7 +97,7 @@ class Record:
     def passes(self, mutant: Mutant, tests: Sequence[str]) -> None:
         """Keep that these tests pass with a change that is not decided yet."""
         source = digest_of_code(ROOT / mutant.path)
-        told = [f"{test} {source} {self.tests('killed', test)}" for test in tests]
+        told = [[test, source, self.tests("killed", test)] for test in tests]
         self.passed.setdefault(mutant.key, []).extend(told)
         self.save()
 
