@@ -1,6 +1,8 @@
 """From markers and plates to torques: OpenSim's inverse kinematics, and C3D files that ezc3d writes."""
 
 import json
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -251,6 +253,110 @@ def test_a_head_that_is_not_of_its_rows_is_told(walk: Walk, tmp_path: Path) -> N
     (tmp_path / "fast.trc").write_text("".join(lines))
     found = walk.followed(tmp_path / "fast.trc").warnings
     assert any("its head says 200 Hz, and its times 100 Hz, which are taken" in line for line in found)
+
+
+def test_cells_and_rows_of_text_are_read_whole_or_refused_with_their_line(walk: Walk, tmp_path: Path) -> None:
+    walk.trc(tmp_path / "walk.trc", walk.markers, walk.time)
+    lines = (tmp_path / "walk.trc").read_text().splitlines(keepends=True)
+    (tmp_path / "blank.trc").write_text("".join([*lines[:50], "\n", *lines[50:]]))
+    assert walk.followed(tmp_path / "blank.trc").total == len(walk.time)
+    frame, time, x, *rest = lines[50].split("\t")
+    for cells, told in (
+        ((time, "0.05abc"), "line 51: '0.05abc' is no number"),
+        ((time, x.replace(".", ",")), "is no number; write a point in its place"),
+        ((time, "inf"), "line 51: 'inf' is no number"),
+        ((time, "1e300"), "line 51: a marker is farther than 10000 m away"),
+        (("", x), "line 51: it has no time"),
+        (("0", x), "line 51: its time is not after that of the row before it"),
+        ((time, x, "0.1"), "line 51 has 39 cells, and 38 are those of its markers"),
+    ):
+        odd = "\t".join([frame, *cells, *rest]).replace("\t\n", "\n")
+        (tmp_path / "odd.trc").write_text("".join([*lines[:50], odd, *lines[51:]]))
+        with pytest.raises(LinkwiseError, match=re.escape(told)):
+            walk.followed(tmp_path / "odd.trc")
+    for text in (
+        "".join(lines[1:]),
+        "".join(lines[:7]),
+        "".join(lines).replace(f"{walk.names[0]}\t", "\t", 1),
+    ):
+        (tmp_path / "head.trc").write_text(text)
+        with pytest.raises(LinkwiseError, match=r"PathFileType|no motion|three columns for each"):
+            walk.followed(tmp_path / "head.trc")
+
+
+def test_what_tells_a_coordinate_hangs_on_the_pose(walk: Walk, tmp_path: Path) -> None:
+    """Pelvis and foot alone tell hip, knee and ankle while the knee is bent, and not while it is straight."""
+    leg = [at for at, name in enumerate(walk.names) if name.startswith(("thigh", "shank"))]
+    held = walk.q.copy(), walk.markers.copy()
+    unseen = {"straight": slice(0, 10), "bent": slice(50, 70)}
+    try:
+        walk.q[:, COORDINATES.index("knee")] *= np.linspace(0, 1, len(walk.time)) ** 2 > 0.01
+        walk.markers = walk._seen()[1]
+        straight = np.abs(walk.q[:, COORDINATES.index("knee")]) < 1e-6
+        assert straight[unseen["straight"]].all()
+        assert not straight[unseen["bent"]].any()
+        for name, when in unseen.items():
+            markers = walk.markers.copy()
+            markers[when.start : when.stop, leg] = np.nan
+            walk.trc(tmp_path / f"{name}.trc", markers, walk.time)
+    finally:
+        walk.q, walk.markers = held
+    for name, is_told in (("straight", True), ("bent", False)):
+        warnings = walk.followed(tmp_path / f"{name}.trc").warnings
+        assert any("no marker that is seen tells" in line for line in warnings) == is_told, name
+
+
+def test_tasks_that_weigh_nothing_are_refused_and_none_at_all_are_all(walk: Walk, tmp_path: Path) -> None:
+    def tasks(names: Sequence[str], weight: float = 1.0) -> Path:
+        made = osim.IKTaskSet()
+        for name in names:
+            task = osim.IKMarkerTask()
+            task.setName(name)
+            task.setWeight(weight)
+            made.cloneAndAppend(task)
+        made.printToXML(str(tmp_path / "tasks.xml"))
+        return tmp_path / "tasks.xml"
+
+    log = walk.folder / "walk.c3d"
+    assert not any("no marker" in line for line in walk.followed(log, tasks=tasks(())).warnings)
+    for names, weight in ((["nose"], 1.0), (walk.names, 0.0)):
+        with pytest.raises(LinkwiseError, match="none of its tasks is of a marker that model and recording"):
+            walk.followed(log, tasks=tasks(names, weight))
+    unseen = walk.markers.copy()
+    unseen[20:30, 3:] = np.nan
+    walk.trc(tmp_path / "blind.trc", unseen, walk.time)
+    with pytest.raises(LinkwiseError, match="that have a task is seen in 10 frames between"):
+        walk.followed(tmp_path / "blind.trc", tasks=tasks(walk.names[3:]))
+
+
+def test_markers_far_from_the_models_are_told(walk: Walk, tmp_path: Path) -> None:
+    walk.trc(tmp_path / "far.trc", 1.3 * walk.markers, walk.time)
+    assert any("look at the unit, the names" in line for line in walk.followed(tmp_path / "far.trc").warnings)
+
+
+def test_a_c3d_file_that_was_cut_short_is_refused(walk: Walk, tmp_path: Path) -> None:
+    whole = (walk.folder / "walk.c3d").read_bytes()
+    (tmp_path / "cut.c3d").write_bytes(whole[: len(whole) - 5000])
+    with pytest.raises(
+        LinkwiseError, match=r"cut\.c3d: its head says 121 frames, and \d+ are there: it was cut"
+    ):
+        walk.followed(tmp_path / "cut.c3d")
+
+
+def test_what_a_plate_says_while_it_is_bare_counts_for_nothing(walk: Walk, tmp_path: Path) -> None:
+    held = walk.force.copy()
+    walk.force[:] = [0.0, -8.0, 0.0]  # as of a plate that is not at zero: more in sum than the one step
+    walk.force[60] = [0.0, 300.0, 0.0]
+    try:
+        walk.c3d(tmp_path / "drift.c3d")
+        walk.force[60] = [0.0, 10.0, 0.0]
+        walk.c3d(tmp_path / "bare.c3d")
+    finally:
+        walk.force[:] = held
+    found = walk.followed(tmp_path / "drift.c3d", "1=foot")
+    assert not any("turned round" in line for line in found.warnings)
+    bare = walk.followed(tmp_path / "bare.c3d", "1=foot")
+    assert any("plate 1 never bears 20 N: it loads foot with nothing" in line for line in bare.warnings)
 
 
 def test_gaps_of_a_plate_that_bears_something_are_refused(walk: Walk, tmp_path: Path) -> None:

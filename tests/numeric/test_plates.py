@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from helpers.answers import relative_error
 from linkwise.analysis.markers.c3d import read_c3d
+from linkwise.analysis.markers.force_plates import PlateWrench
+from linkwise.errors import LinkwiseError
 
 ezc3d: Any = pytest.importorskip("ezc3d")
 
@@ -58,21 +60,21 @@ def of_voltages(force: np.ndarray, moment: np.ndarray) -> Channels:
     return np.linalg.solve(MIXED, wrench), ["V"] * 6, origin
 
 
-@pytest.mark.parametrize(
-    ("kind", "channels"), [(1, of_pressure), (2, of_moments), (3, of_sensors), (4, of_voltages)]
-)
-def test_a_plate_of_each_type_gives_the_wrench_about_its_middle(
-    kind: int, channels: Callable[[np.ndarray, np.ndarray], Channels], tmp_path: Path
-) -> None:
+@pytest.fixture
+def wrench() -> tuple[np.ndarray, np.ndarray]:
+    """A force and a moment about the plate's middle, (S, 3), in the model's axes."""
     time = np.arange(50) / 100
     force = np.column_stack([30 * np.sin(3 * time), 700 + 50 * np.sin(5 * time), 5 + 9 * time])
-    moment = np.column_stack([10 * np.sin(4 * time), 3 + time, 20 * np.cos(2 * time)])
-    values, units, origin = channels((force @ LAB.T @ PLATE).T, (moment @ LAB.T @ PLATE).T)
-    file, count = ezc3d.c3d(), len(values)
+    return force, np.column_stack([10 * np.sin(4 * time), 3 + time, 20 * np.cos(2 * time)])
+
+
+def plate_of(path: Path, kind: int, values: np.ndarray, units: list[str], origin: list[float]) -> PlateWrench:
+    """What is read of a file with one plate, whose channels (C, S) are in these units."""
+    file, (count, samples) = ezc3d.c3d(), values.shape
     file["parameters"]["POINT"]["RATE"]["value"] = [100.0]
     file["parameters"]["POINT"]["LABELS"]["value"] = ["heel"]
     file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
-    file["data"]["points"] = np.ones((4, 1, len(time)))
+    file["data"]["points"] = np.ones((4, 1, samples))
     named = {"LABELS": [f"c{at}" for at in range(count)], "UNITS": units, "RATE": [100.0]}
     for name, value in {**named, "SCALE": [1.0] * count, "OFFSET": [0] * count}.items():
         file["parameters"]["ANALOG"][name]["value"] = value
@@ -89,9 +91,47 @@ def test_a_plate_of_each_type_gives_the_wrench_about_its_middle(
         file["parameters"]["FORCE_PLATFORM"][name]["value"] = value
     if kind == 4:
         file.add_parameter("FORCE_PLATFORM", "CAL_MATRIX", MIXED[:, :, None])
-    file.write(str(tmp_path / "plate.c3d"))
-    (plate,) = read_c3d(tmp_path / "plate.c3d", "+X,+Z").plates
+    file.write(str(path / "plate.c3d"))
+    (plate,) = read_c3d(path / "plate.c3d", "+X,+Z").plates
+    return plate
+
+
+@pytest.mark.parametrize("metres", [False, True], ids=["as said", "in m and Nm, where they are"])
+@pytest.mark.parametrize(
+    ("kind", "channels"), [(1, of_pressure), (2, of_moments), (3, of_sensors), (4, of_voltages)]
+)
+def test_a_plate_of_each_type_gives_the_wrench_about_its_middle(
+    kind: int,
+    channels: Callable[[np.ndarray, np.ndarray], Channels],
+    metres: bool,
+    wrench: tuple[np.ndarray, np.ndarray],
+    tmp_path: Path,
+) -> None:
+    force, moment = wrench
+    values, units, origin = channels((force @ LAB.T @ PLATE).T, (moment @ LAB.T @ PLATE).T)
+    if metres:
+        values = values / np.array([[1000.0 if unit in ("mm", "Nmm") else 1.0] for unit in units])
+        units = [unit.replace("mm", "m") for unit in units]
+    plate = plate_of(tmp_path, kind, values, units, origin)
     assert relative_error(plate.force, force) < 1e-6
     assert relative_error(plate.moment, moment) < 1e-6
     assert plate.place == pytest.approx(LAB.T @ MIDDLE)
-    assert not plate.is_turned
+    assert not plate.told
+
+
+def test_units_of_a_plate_are_refused_where_they_are_unknown_and_told_where_they_are_not_said(
+    wrench: tuple[np.ndarray, np.ndarray], tmp_path: Path
+) -> None:
+    force, moment = wrench
+    values, _, origin = of_moments((force @ LAB.T @ PLATE).T, (moment @ LAB.T @ PLATE).T)
+    for units, told in (
+        (["kN"] * 3 + ["Nmm"] * 3, r"plate 1: ANALOG:UNITS of a force is 'kN'; N are read"),
+        (["V"] * 6, "of a force is 'V'"),
+        (["N"] * 3 + ["Nm", "Nm", "Nmm"], "of a moment is 'Nm', 'Nmm'; Nm, N.m, "),
+        (["N", "", "N", "Nmm", "Nmm", "Nmm"], "of a force is '', 'N'"),
+    ):
+        with pytest.raises(LinkwiseError, match=told):
+            plate_of(tmp_path, 2, values, units, origin)
+    plate = plate_of(tmp_path, 2, values, [""] * 6, origin)
+    assert relative_error(plate.moment, moment) < 1e-6
+    assert plate.told == ("plate 1: the unit of a force is not said; N and N times POINT:UNITS are taken",)

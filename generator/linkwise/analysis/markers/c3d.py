@@ -1,44 +1,34 @@
 """Markers and wrenches of plates in a C3D file, by ezc3d: in m, N and N·m, in axes of OpenSim's models."""
 
+import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.markers.force_plates import PlateWrench, plate_wrenches
+from linkwise.analysis.opensim.recorded_markers import METRES, RecordedMarkers, recorded_markers
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.extras import extra
 from linkwise.input_file import require_file
 
-METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 AXES = {"X": 0, "Y": 1, "Z": 2}
-OF_PRESSURE = 1
-"""Type of plates whose channels are a force, its centre of pressure, and a free moment."""
-
-
-@dataclass(frozen=True, eq=False)
-class PlateWrench:
-    """Wrench of a plate on a body: force, and moment about `place`, (S, 3) each, and that place (3,).
-
-    NaN is where the file has no number.
-    """
-
-    force: Array
-    moment: Array
-    place: Array
-    is_turned: bool
-    """True if the file has what the body gives to the plate."""
+HEAD, COUNTS, BLOCK = 10, "HH", 512
+"""Bytes of the header up to its numbers of the first and the last frame, these two, and bytes of a block."""
+BIG_ENDIAN = b"\x56"
+"""Byte in the parameters of a file whose numbers begin with the large end; MIPS processors wrote it so."""
+MOST = 65535
+"""Number of the last frame in a file of more frames than the header can count."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedC3D:
-    """Markers (S, M, 3) with NaN where one is not seen, at `time` (S,) in s, and plates at theirs."""
+    """Markers, and plates at instants of their own, in s."""
 
-    time: Array
-    names: tuple[str, ...]
-    markers: Array
+    markers: RecordedMarkers
     plate_time: Array
     plates: tuple[PlateWrench, ...]
     axes: str
@@ -60,7 +50,22 @@ def read_c3d(path: Path, axes: str) -> RecordedC3D:
             file = library.c3d(str(path), extract_forceplat_data=True)
         except (OSError, ValueError, RuntimeError, IndexError) as error:
             raise LinkwiseError(f"ezc3d does not read it: {' '.join(str(error).split())}") from None
+        _require_whole(path, int(file["data"]["points"].shape[2]))
         return _recorded(file, axes)
+
+
+def _require_whole(path: Path, frames: int) -> None:
+    """Raise LinkwiseError where fewer frames are there than the header says: ezc3d reads what is left."""
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+        file.seek((head[0] - 1) * BLOCK + 3)
+        order = ">" if file.read(1) == BIG_ENDIAN else "<"
+    first, last = struct.unpack(order + COUNTS, head[-4:])
+    if last < MOST and frames < last - first + 1:
+        raise LinkwiseError(
+            f"its head says {last - first + 1} frames, and {frames} are there: it was cut short; export or"
+            " copy it again"
+        )
 
 
 def _recorded(file: Any, axes: str) -> RecordedC3D:
@@ -83,63 +88,21 @@ def _recorded(file: Any, axes: str) -> RecordedC3D:
     turn = _turn(told, "--c3d-axes" if axes else "POINT:X_SCREEN and Y_SCREEN")
     rate = float(file["parameters"]["POINT"]["RATE"]["value"][0])
     begin = float(file["header"]["points"]["first_frame"]) / rate
-    scale = _metres(_text(point, "UNITS"), "POINT:UNITS")
-    found = places[:, kept] * scale
-    found[(found == 0.0).all(axis=2)] = np.nan  # as some programs write what is not seen
-    kinds = file["parameters"].get("FORCE_PLATFORM", {}).get("TYPE", {}).get("value", ())
-    given = file["data"].get("platform", ())
-    plates = tuple(_plate(one, int(kind), turn) for one, kind in zip(given, kinds, strict=False))
+    unit = _text(point, "UNITS")
+    if unit not in METRES:
+        raise LinkwiseError(f"POINT:UNITS is {unit!r}; lengths are read in {listed(METRES)}")
+    markers = recorded_markers(
+        begin + np.arange(len(places)) / rate, names, places[:, kept] * METRES[unit] @ turn.T
+    )
+    plates = tuple(plate_wrenches(file, METRES[unit], turn))
     every = float(file["header"]["analogs"]["frame_rate"] or rate)
     count = len(plates[0].force) if plates else 0
-    return RecordedC3D(
-        begin + np.arange(len(places)) / rate,
-        tuple(names),
-        found @ turn.T,
-        begin + np.arange(count) / every,
-        plates,
-        told,
-    )
-
-
-def _plate(given: Any, kind: int, turn: Array) -> PlateWrench:
-    """Return the wrench about the middle of a plate, which unlike a centre of pressure is always there.
-
-    kind: the plate's type. Files have of type 1 the centre of pressure and the free moment; the moment that
-    ezc3d 1.7 makes of these has the wrong sign.
-    """
-    scale = _metres(str(given["unit_position"]), "a plate's corners")
-    moments = {"Nm": 1.0, "N.m": 1.0, "Nmm": 1e-3, "N.mm": 1e-3}.get(str(given["unit_moment"]))
-    if moments is None or str(given["unit_force"]) != "N":
-        raise LinkwiseError(
-            f"plates are in {given['unit_force']} and {given['unit_moment']}; N and Nmm are read"
-        )
-    force, place = _turned(given["force"], turn), turn @ np.mean(given["corners"], axis=1) * scale
-    if kind == OF_PRESSURE:
-        centre, free = (_turned(given[name], turn) for name in ("center_of_pressure", "Tz"))
-        moment = np.cross(centre * scale - place, force) + free * moments
-    else:
-        moment = _turned(given["moment"], turn) * moments
-    # The ground presses and does not pull: a force that points down is that on the plate.
-    is_turned = float(np.nansum(force[:, 1])) < 0.0
-    sign = -1.0 if is_turned else 1.0
-    return PlateWrench(sign * force, sign * moment, place, is_turned)
-
-
-def _turned(vectors: Any, turn: Array) -> Array:
-    """Return vectors (3, S) as rows in the model's axes."""
-    found: Array = np.asarray(vectors, dtype=float).T @ turn.T
-    return found
+    return RecordedC3D(markers, begin + np.arange(count) / every, plates, told)
 
 
 def _text(group: Any, name: str) -> str:
     values = group[name]["value"] if name in group else []
     return str(values[0]).strip() if len(values) else ""
-
-
-def _metres(unit: str, what: str) -> float:
-    if unit not in METRES:
-        raise LinkwiseError(f"{what} is {unit!r}; lengths are read in {listed(METRES)}")
-    return METRES[unit]
 
 
 def _turn(text: str, source: str) -> Array:

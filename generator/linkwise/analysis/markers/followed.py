@@ -11,7 +11,7 @@ from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.markers import SUFFIXES, MarkerChoices
 from linkwise.analysis.markers.c3d import RecordedC3D, read_c3d
 from linkwise.analysis.opensim.inverse_kinematics import MOTION, FollowedMarkers, inverse_kinematics
-from linkwise.analysis.opensim.trc_file import write_trc
+from linkwise.analysis.opensim.trc_file import read_trc
 from linkwise.analysis.settings import Lowpass
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
@@ -19,6 +19,9 @@ from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.own_opensim import asked_of_opensim
 from linkwise.progress import Progress
+
+FAR = 0.04
+"""Root mean square in m from which on distances of markers are told; 2 to 4 cm are the most that is usual."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +39,7 @@ class MarkerLog:
         """Errors of the markers in a line."""
         worst, when, largest = self._largest
         total = float(np.nansum(self.followed.apart**2, axis=1).mean())
-        own, rms = self.followed, 1000 * self._rms(self.followed.apart)
+        own, rms = self.followed, 1000 * self.rms(self.followed.apart)
         met = f"{len(own.names)} markers are met within {rms:.3g} mm (root mean square)"
         most = f"{1000 * largest:.3g} mm at most, {worst} at {when:.6g} s"
         return f"{met}, {most}; total squared error {total:.3g} m² a frame"
@@ -47,11 +50,11 @@ class MarkerLog:
         each = zip(own.names, own.apart.T, strict=True)
         return {
             "file": self.source,
-            "root_mean_square": self._rms(own.apart),
+            "root_mean_square": self.rms(own.apart),
             "total_squared": float(np.nansum(own.apart**2, axis=1).mean()),
             "largest": {"marker": worst, "time": when, "error": largest},
             "each": [
-                {"marker": name, "root_mean_square": self._rms(apart), "largest": float(np.nanmax(apart))}
+                {"marker": name, "root_mean_square": self.rms(apart), "largest": float(np.nanmax(apart))}
                 for name, apart in each
             ],
             "lacking": list(own.lacking),
@@ -65,7 +68,8 @@ class MarkerLog:
         return self.followed.names[m], float(self.followed.time[s]), float(apart[s, m])
 
     @staticmethod
-    def _rms(apart: Array) -> float:
+    def rms(apart: Array) -> float:
+        """Return the root mean square of distances, where markers were seen."""
         return float(np.sqrt(np.nanmean(apart**2)))
 
 
@@ -89,15 +93,16 @@ def followed(
     if asked is None or asked.model.suffix.lower() != ".osim":
         raise LinkwiseError(f"{log}: markers are those of a model of OpenSim; give its .osim file as --robot")
     require_file(log)
-    markers, told = log, []
+    told = []
     if log.suffix.lower() == ".c3d":
         recorded = read_c3d(log, asked.axes)
-        markers = folder / f"{log.stem}.trc"
-        write_trc(markers, recorded.time, recorded.names, recorded.markers)
+        markers = recorded.markers
         told.append(f"{recorded.axes} of the laboratory are x of the model, and up")
         given, notes = _plates(log, asked, recorded)
         loads, told = replace(loads, given=(*loads.given, *given)), [*told, *notes]
-    elif asked.is_of_plates:
+    elif not asked.is_of_plates:
+        markers = read_trc(log)
+    else:
         raise LinkwiseError(
             f"--plate, --plate-threshold and --c3d-axes go with a .c3d file; {log} has neither plates"
             " nor axes"
@@ -109,10 +114,14 @@ def followed(
     progress("inverse kinematics", 1, 1)
     for names, what in ((found.lacking, "not in the recording"), (found.unknown, "not in the model")):
         told += [f"markers {what}: {listed(names)}"] if names else []
-    told += found.told
+    told += [*markers.told, *found.told]
     motion = folder / MOTION
     motion.write_bytes(found.motion)
-    return MarkerLog(motion, loads, found, log.name, tuple(told))
+    made = MarkerLog(motion, loads, found, log.name, tuple(told))
+    if (apart := made.rms(found.apart)) > FAR:
+        far = f"markers are {1000 * apart:.3g} mm (root mean square) from those of the model"
+        told.append(f"{far}; look at the unit, the names and the model's scale")
+    return replace(made, told=tuple(told))
 
 
 def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tuple[Load, ...], list[str]]:
@@ -127,14 +136,22 @@ def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tup
     for number, plate in enumerate(recorded.plates, 1):
         size = np.linalg.norm(plate.force, axis=1)
         most = float(np.nan_to_num(size).max(initial=0.0))
+        is_bare = size < asked.least
         if number not in bodies:
             if most > asked.least:
                 told.append(f"plate {number} bears up to {most:.4g} N and is left out; --plate {number}=BODY")
             continue
-        if plate.is_turned:
-            told.append(f"plate {number}: its forces point down, as on the plate, and are turned round")
+        told += plate.told
         wrench = np.column_stack([plate.force, plate.moment])
-        wrench[size < asked.least] = 0.0  # where a file may have no centre of pressure
+        wrench[is_bare] = 0.0  # where a file may have no centre of pressure
+        # The ground presses and does not pull: a force that points down is that on the plate.
+        if float(np.nansum(wrench[:, 1])) < 0.0:
+            told.append(f"plate {number}: its forces point down, as on the plate, and are turned round")
+            wrench = -wrench
+        if is_bare.all():
+            told.append(
+                f"plate {number} never bears {asked.least:g} N: it loads {bodies[number]} with nothing"
+            )
         if gaps := np.flatnonzero(np.isnan(wrench).any(axis=1)).tolist():
             raise LinkwiseError(
                 f"{log}: plate {number}: {len(gaps)} of its {len(wrench)} samples have no numbers, first the"

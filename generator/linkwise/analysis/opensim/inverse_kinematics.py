@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.opensim.trc_file import read_trc
-from linkwise.analysis.opensim.untold_coordinates import untold_coordinates
+from linkwise.analysis.opensim.recorded_markers import RecordedMarkers
+from linkwise.analysis.opensim.trc_file import write_trc
+from linkwise.analysis.opensim.untold_coordinates import tasked, untold_coordinates
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 
-MOTION, LOCATIONS = "inverse_kinematics.mot", "_ik_model_marker_locations.sto"
+MARKERS, MOTION, LOCATIONS = "markers.trc", "inverse_kinematics.mot", "_ik_model_marker_locations.sto"
 FROM_FILE = 2
 """Kind of a coordinate's task whose values are in a file."""
 ACCURACY = 1e-8
@@ -36,40 +37,47 @@ class FollowedMarkers:
     unknown: tuple[str, ...]
     """Markers of the recording that the model lacks."""
     told: tuple[str, ...]
-    """Lines on what is odd in the recording, and on coordinates that markers do not tell at some times."""
+    """Lines on coordinates that markers do not tell at some times."""
 
 
 def inverse_kinematics(
-    osim: Any, model: Path, markers: Path, tasks: Path | None, folder: Path
+    osim: Any, model: Path, recorded: RecordedMarkers, tasks: Path | None, folder: Path
 ) -> FollowedMarkers:
     """Return what the tool finds; osim: the module of OpenSim; folder: where it may write.
 
-    Raises LinkwiseError where model and recording share fewer than three markers, and where none is seen.
+    Raises LinkwiseError where model and recording share fewer than three markers, where no task is of one
+    of these, and where none that has a task is seen.
     """
     opened = osim.Model(str(model))
     opened.initSystem()
     own = [opened.getMarkerSet().get(at).getName() for at in range(opened.getMarkerSet().getSize())]
-    recorded = read_trc(osim, markers, folder)
     time = recorded.time
     names = [name for name in own if name in recorded.seen]
     if len(names) < 3:
         raise LinkwiseError(
-            f"{markers.name}: {len(names)} of its markers are in {model}, which has {listed(own[:8])}; the"
-            f" recording has {listed(recorded.seen[:8])}; name them alike"
+            f"{len(names)} of its markers are in {model}, which has {listed(own[:8])}; the recording has"
+            f" {listed(recorded.seen[:8])}; name them alike"
         )
-    shown = recorded.of(names)
-    _require_some(markers.name, time, shown)
+    followed = _tasks(osim, tasks, names)
+    asked = [name for name in names if name in tasked(osim.IKMarkerTask, followed)]
+    if not asked:
+        raise LinkwiseError(
+            f"{tasks}: none of its tasks is of a marker that model and recording share, and weighs more"
+            f" than nothing; they share {listed(names[:8])}"
+        )
+    shown = recorded.of(asked)
+    _require_some(time, shown)
+    write_trc(folder / MARKERS, recorded)
     tool = osim.InverseKinematicsTool()
     tool.setModel(opened)
-    followed = _tasks(osim, tasks, names)
     tool.set_IKTaskSet(followed)
-    tool.setMarkerDataFileName(str(recorded.file))
+    tool.setMarkerDataFileName(str(folder / MARKERS))
     tool.setStartTime(float(time[0]))
     tool.setEndTime(float(time[-1]))
     _run(osim, tool, folder)
     files = sorted(folder.glob(f"*{LOCATIONS}"))
     if not files or not (folder / MOTION).is_file():
-        raise LinkwiseError(f"{markers.name}: OpenSim's inverse kinematics ends without a motion")
+        raise LinkwiseError("its inverse kinematics ends without a motion")
     found = osim.TimeSeriesTable(str(files[0]))
     labels, rows = list(found.getColumnLabels()), found.getMatrix().to_numpy().copy()
     used = [name for name in names if f"{name}_tx" in labels]
@@ -77,7 +85,7 @@ def inverse_kinematics(
     when = np.asarray(found.getIndependentColumn(), dtype=float)
     row = np.searchsorted((time[1:] + time[:-1]) / 2, when)  # the file's times are rounded
     given = recorded.of(used)[row]
-    untold = untold_coordinates(osim, osim.Model(str(model)), followed, folder / MOTION, time, names, shown)
+    untold = untold_coordinates(osim, osim.Model(str(model)), followed, folder / MOTION, time, asked, shown)
     return FollowedMarkers(
         (folder / MOTION).read_bytes(),
         when,
@@ -85,17 +93,17 @@ def inverse_kinematics(
         np.linalg.norm(rows[:, np.array(at)] - given, axis=2),
         tuple(name for name in own if name not in recorded.seen),
         tuple(name for name in recorded.names if name not in own),
-        (*recorded.told, *untold),
+        tuple(untold),
     )
 
 
-def _require_some(file: str, time: Array, shown: Array) -> None:
+def _require_some(time: Array, shown: Array) -> None:
     """Raise LinkwiseError where no marker is seen, at which OpenSim's search ends."""
     blind = time[~np.isfinite(shown).any(axis=(1, 2))]
     if len(blind):
         raise LinkwiseError(
-            f"{file}: none of the model's markers is seen in {len(blind)} frames between {blind[0]:.6g} and"
-            f" {blind[-1]:.6g} s; fill the gap, or cut the recording there"
+            f"none of the model's markers that have a task is seen in {len(blind)} frames between"
+            f" {blind[0]:.6g} and {blind[-1]:.6g} s; fill the gap, or cut the recording there"
         )
 
 
@@ -111,7 +119,7 @@ def _run(osim: Any, tool: Any, folder: Path) -> None:
 
 
 def _tasks(osim: Any, tasks: Path | None, names: list[str]) -> Any:
-    """Return the tasks of a file, or every marker with the weight 1."""
+    """Return the tasks of a file; of one without any, and of none, every marker with the weight 1."""
     if tasks is not None:
         kind = osim.OpenSimObject.makeObjectFromFile(str(tasks)).getConcreteClassName()
         if kind not in ("InverseKinematicsTool", "IKTaskSet"):
@@ -125,7 +133,8 @@ def _tasks(osim: Any, tasks: Path | None, names: list[str]) -> Any:
             raise LinkwiseError(
                 f"{tasks}: a coordinate follows a file, which is not read; leave that task out"
             )
-        return found.clone()
+        if found.getSize():
+            return found.clone()
     made = osim.IKTaskSet()
     for name in names:
         task = osim.IKMarkerTask()

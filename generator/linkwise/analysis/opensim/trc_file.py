@@ -1,82 +1,108 @@
-"""Markers in OpenSim's text format, `.trc`."""
+"""Markers in OpenSim's text format, `.trc`.
+
+Read strictly, as OpenSim takes the beginning of a cell for a number, and an empty line for the end.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from linkwise.analysis.opensim.recorded_markers import METRES, RecordedMarkers, recorded_markers
 from linkwise.arrays import Array
-from linkwise.errors import LinkwiseError
-from linkwise.escape import listed
+from linkwise.errors import LinkwiseError, within
+from linkwise.escape import listed, short
 
 HEAD = (
     *("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units"),
     *("OrigDataRate", "OrigDataStartFrame", "OrigNumFrames"),
 )
 """Names of the numbers in the third line."""
-IN_METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01}
+FIRST = 6
+"""Line of the first row, where none is empty above it."""
 OFF = 0.01
 """Part by which the rate of the times may be off what the head says."""
+FARTHEST = 1e4
+"""Largest coordinate of a marker, in m."""
 
 
-@dataclass(frozen=True, eq=False)
-class RecordedMarkers:
-    """A recording as OpenSim reads it."""
+def read_trc(path: Path) -> RecordedMarkers:
+    """Read a recording: cells apart by tabs, empty or NaN where a marker is not seen.
 
-    file: Path
-    """The file to follow: the recording, or a copy without places that are none."""
-    time: Array
-    names: tuple[str, ...]
-    places: Array
-    """Places (S, M, 3) in m; NaN is not seen."""
-    told: tuple[str, ...]
-
-    @property
-    def seen(self) -> list[str]:
-        """Names of the markers that are seen at some time."""
-        return [
-            name
-            for name, path in zip(self.names, self.places.swapaxes(0, 1), strict=True)
-            if np.isfinite(path).any()
-        ]
-
-    def of(self, names: Sequence[str]) -> Array:
-        """Return the places of some markers."""
-        found: Array = self.places[:, [self.names.index(name) for name in names]]
-        return found
-
-
-def read_trc(osim: Any, path: Path, folder: Path) -> RecordedMarkers:
-    """Read a recording with OpenSim; folder: where a copy may be written.
-
-    A marker at 0 0 0 is not seen, as programs write that, and no marker is at the origin to the last digit.
-
-    Raises LinkwiseError for another unit, and for two markers of one name.
+    Raises LinkwiseError, with the line, for what is not of the format, cells that are no numbers, times that
+    do not increase, another unit, and two markers of one name.
     """
-    table = osim.TimeSeriesTableVec3(str(path))
-    head = {key: table.getTableMetaDataString(key) for key in table.getTableMetaDataKeys()}
-    names = list(table.getColumnLabels())
+    with within(path.name):
+        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+        if len(lines) < FIRST or not lines[0].startswith("PathFileType"):
+            raise LinkwiseError("its first line is not that of a .trc file, PathFileType, or no row follows")
+        head = dict(zip(_words(lines[1]), _words(lines[2]), strict=False))
+        names = _names(lines, head)
+        unit = head.get("Units", "")
+        if unit not in METRES:
+            raise LinkwiseError(f"its unit is {short(unit)!r}; lengths are read in {listed(METRES)}")
+        rows = [
+            (number, _row(line, number, 2 + 3 * len(names)))
+            for number, line in enumerate(lines[FIRST - 1 :], FIRST)
+            if line.strip()
+        ]
+        if len(rows) < 2:
+            raise LinkwiseError(f"it has {len(rows)} rows; there is no motion in it")
+        table = np.array([row for _, row in rows]).reshape(len(rows), -1)
+        time, places = table[:, 0], METRES[unit] * table[:, 1:].reshape(len(rows), len(names), 3)
+        for bad, why in (
+            (~np.isfinite(time), "it has no time"),
+            (np.diff(time, prepend=-np.inf) <= 0.0, "its time is not after that of the row before it"),
+            ((np.abs(places) > FARTHEST).any(axis=(1, 2)), f"a marker is farther than {FARTHEST:g} m away"),
+        ):
+            if bad.any():
+                raise LinkwiseError(f"line {rows[int(bad.argmax())][0]}: {why}")
+        return recorded_markers(time, names, places, list(_odd(head, time)))
+
+
+def _words(line: str) -> list[str]:
+    return [word.strip() for word in line.split("\t") if word.strip()]
+
+
+def _names(lines: Sequence[str], head: Mapping[str, str]) -> list[str]:
+    """Return the names of the markers, which three columns each belong to."""
+    frame, *names = _words(lines[3]) or [""]
+    if frame != "Frame#" or names[:1] != ["Time"]:
+        raise LinkwiseError("line 4 does not begin with Frame# and Time")
+    names = names[1:]
+    count = head.get("NumMarkers", "")
+    if count != str(len(names)) or [word[:1] for word in _words(lines[4])] != list("XYZ") * len(names):
+        raise LinkwiseError(
+            f"its head says {short(count)!r} markers, line 4 has {len(names)} names, and line 5"
+            f" {len(_words(lines[4]))} of X, Y and Z; write three columns for each"
+        )
     twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
     if twice:
-        raise LinkwiseError(f"{path.name}: several markers are named {listed(twice)}; rename them")
-    unit = head.get("Units", "m")
-    if unit not in IN_METRES:
-        raise LinkwiseError(f"{path.name}: its unit is {unit!r}; lengths are read in {listed(IN_METRES)}")
-    flat = table.flatten()  # which its matrix does not keep
-    rows = flat.getMatrix().to_numpy().copy()
-    time = np.asarray(table.getIndependentColumn(), dtype=float)
-    places = IN_METRES[unit] * rows.reshape(len(time), len(names), 3)
-    nowhere = (places == 0.0).all(axis=2)
-    told = list(_odd(head, time))
-    if nowhere.any():
-        places[nowhere] = np.nan
-        some = [name for name, one in zip(names, nowhere.T, strict=True) if one.any()]
-        told.append(f"markers at 0 0 0, which count as not seen there: {listed(some)}")
-        path = folder / f"seen_{path.name}"
-        write_trc(path, time, names, places)
-    return RecordedMarkers(path, time, tuple(names), places, tuple(told))
+        raise LinkwiseError(f"several markers are named {listed(twice)}; rename them")
+    return names
+
+
+def _row(line: str, number: int, width: int) -> list[float]:
+    """Return the numbers of a row but that of its frame; NaN where a cell is empty."""
+    cells = line.split("\t")
+    while len(cells) > width and not cells[-1].strip():
+        cells.pop()
+    if len(cells) != width:
+        raise LinkwiseError(f"line {number} has {len(cells)} cells, and {width} are those of its markers")
+    return [_cell(cell.strip(), number) for cell in cells[1:]]
+
+
+def _cell(text: str, number: int) -> float:
+    if text in ("", "NaN", "nan"):
+        return np.nan
+    try:
+        value = float(text) if "_" not in text else np.inf
+    except ValueError:
+        value = np.inf
+    if not np.isfinite(value):
+        comma = "; write a point in its place" if "," in text else ""
+        raise LinkwiseError(f"line {number}: {short(text)!r} is no number{comma}")
+    return value
 
 
 def _odd(head: Mapping[str, str], time: Array) -> Iterator[str]:
@@ -96,10 +122,11 @@ def _number(text: str) -> float:
         return float("nan")
 
 
-def write_trc(path: Path, time: Array, names: Sequence[str], places: Array) -> None:
-    """Write places (S, M, 3) in m at times (S,) in s; NaN is not seen."""
-    count, rate = len(time), 1.0 / float(np.diff(time).mean())
-    labels = [name.replace("\t", " ") for name in names]
+def write_trc(path: Path, recorded: RecordedMarkers) -> None:
+    """Write markers with all their digits."""
+    time, count = recorded.time, len(recorded.time)
+    rate = 1.0 / float(np.diff(time).mean())
+    labels = [name.replace("\t", " ") for name in recorded.names]
 
     def lines() -> Iterator[str]:
         yield f"PathFileType\t4\t(X/Y/Z)\t{path.name}"
@@ -108,7 +135,7 @@ def write_trc(path: Path, time: Array, names: Sequence[str], places: Array) -> N
         yield "Frame#\tTime\t" + "\t\t\t".join(labels) + "\t\t"
         yield "\t\t" + "\t".join(f"{axis}{at}" for at in range(1, 1 + len(labels)) for axis in "XYZ")
         yield ""
-        for number, (instant, row) in enumerate(zip(time, places, strict=True), 1):
-            yield "\t".join([str(number), f"{instant:.9g}", *(f"{x:.9g}" for x in row.ravel())])
+        for number, (instant, row) in enumerate(zip(time, recorded.places, strict=True), 1):
+            yield "\t".join([str(number), f"{instant:.17g}", *(f"{x:.17g}" for x in row.ravel())])
 
     path.write_text("\n".join(lines()) + "\n", encoding="utf-8")

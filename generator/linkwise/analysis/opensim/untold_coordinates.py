@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from linkwise.arrays import Array
 from linkwise.escape import listed
 
+POSES = 20
+"""Number of poses that are looked at where the same markers are seen: what these tell hangs on the pose."""
 STEP = 1e-3
 """Change of a coordinate, in rad or m, by which markers are seen to move."""
 LEAST = 1e-4
@@ -25,24 +27,29 @@ def untold_coordinates(
 ) -> Iterator[str]:
     """Yield lines on coordinates that markers do not determine at some times.
 
-    motion: the file that inverse kinematics wrote, with all times; shown: places (S, M, 3), NaN if not seen
+    motion: the file that inverse kinematics wrote, with all times; names: of markers that have a task;
+    shown: their places (S, M, 3), NaN if not seen
 
     A motion of the coordinates that moves no marker is in the null space of the markers' Jacobian, whose rows
     are those of the markers that are seen, and of the coordinates that have a task of their own.
     """
     state = model.initSystem()
-    seen = np.asarray(np.isfinite(shown).all(axis=2))
     free = [one for one in _all(model.getCoordinateSet()) if not one.isConstrained(state)]
-    asked = [one for one in _all(tasks) if one.getApply() and one.getWeight() > 0.0]
-    coordinates = {one.getName() for one in asked if osim.IKCoordinateTask.safeDownCast(one) is not None}
-    markers = {one.getName() for one in asked if osim.IKMarkerTask.safeDownCast(one) is not None}
-    used = [at for at, name in enumerate(names) if name in markers]
-    _pose(osim, model, state, motion, int(seen[:, used].sum(axis=1).argmax()))
-    slopes = _jacobian(model, state, free, [names[at] for at in used])
-    own = np.array([one.getName() in coordinates for one in free], dtype=float)
-    patterns, which = np.unique(seen[:, used], axis=0, return_inverse=True)
-    untold = np.array([_untold(slopes[pattern].reshape(-1, len(free)), own) for pattern in patterns])
-    held = untold[which.ravel()]
+    asked = tasked(osim.IKCoordinateTask, tasks)
+    own = np.array([one.getName() in asked for one in free], dtype=float)
+    _, patterns = np.unique(np.isfinite(shown).all(axis=2), axis=0, return_inverse=True)
+    held = np.zeros((len(time), len(free)), dtype=bool)
+    table = osim.TimeSeriesTable(str(motion))
+    for pattern in np.unique(patterns):
+        (frames,) = np.nonzero(patterns.ravel() == pattern)
+        looked = frames[:: -(-len(frames) // POSES)]
+        for first, last in zip(looked, [*looked[1:], len(time)], strict=True):
+            _pose(model, state, table, first)
+            seen = np.isfinite(shown[first]).all(axis=1)
+            slopes = _jacobian(
+                model, state, free, [name for name, one in zip(names, seen, strict=True) if one]
+            )
+            held[frames[(frames >= first) & (frames < last)]] = _untold(slopes.reshape(-1, len(free)), own)
     for mask in np.unique(held.T[held.any(axis=0)], axis=0):
         some = listed([one.getName() for at, one in enumerate(free) if (held[:, at] == mask).all()])
         if mask.all():
@@ -56,15 +63,20 @@ def untold_coordinates(
             )
 
 
+def tasked(kind: Any, tasks: Any) -> set[str]:
+    """Return the names of what has a task of a kind, such as OpenSim's IKMarkerTask, with a weight."""
+    given = [one for one in _all(tasks) if one.getApply() and one.getWeight() > 0.0]
+    return {one.getName() for one in given if kind.safeDownCast(one) is not None}
+
+
 def _all(several: Any) -> list[Any]:
     return [several.get(at) for at in range(several.getSize())]
 
 
-def _pose(osim: Any, model: Any, state: Any, motion: Path, row: int) -> None:
-    """Bring the model to a row of a motion."""
-    table = osim.TimeSeriesTable(str(motion))
+def _pose(model: Any, state: Any, table: Any, row: int) -> None:
+    """Bring the model to a row of the table of a motion."""
     is_degrees = table.getTableMetaDataString("inDegrees") == "yes"
-    numbers = table.getRowAtIndex(min(row, table.getNumRows() - 1)).to_numpy()
+    numbers = table.getRowAtIndex(min(int(row), table.getNumRows() - 1)).to_numpy()
     values = dict(zip(table.getColumnLabels(), numbers, strict=True))
     for one in _all(model.getCoordinateSet()):
         value = float(values.get(one.getName(), one.getValue(state)))
