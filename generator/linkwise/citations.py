@@ -9,6 +9,7 @@ from typing import Any
 from linkwise_runtime.version import VERSION
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import one_line
 from linkwise.extras import extra
 from linkwise.input_file import is_file
 from linkwise.package.decode import parse_json, require
@@ -189,10 +190,12 @@ def record_of(result: Path) -> tuple[Path, dict[str, Any]]:
     try:
         record = parse_json(path.read_text(encoding="utf-8"))
         require(isinstance(record, dict), "", "an object", record)
-    except (OSError, ValueError) as error:
-        raise LinkwiseError(f"{path}: is damaged: {error}") from error
-    if path.name == "study.json":
-        record |= {"tests": _rows(path.with_name("tests.parquet")), "columns": _rows(path.with_name(SUMMARY))}
+        if path.name == "study.json":
+            tables = {"tests": path.with_name("tests.parquet"), "columns": path.with_name(SUMMARY)}
+            record |= {name: _rows(table) for name, table in tables.items()}
+        list(citations(record))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise LinkwiseError(f"{path}: is damaged: {one_line(repr(error), 200)}") from error
     return path, record
 
 

@@ -296,12 +296,19 @@ def test_what_a_recorder_left_beside_a_database_is_not_left_out(tmp_path: Path) 
         base.execute("update messages set timestamp = timestamp")
         base.commit()
         shutil.copytree(bag, tmp_path / "copy")
-    for copy in (tmp_path / "copy", tmp_path / "copy/bag.db3"):
-        with pytest.raises(LinkwiseError, match=r"bag\.db3-wal has what .* last, .*`sqlite3 bag\.db3 "):
+    (tmp_path / "latest.db3").symlink_to(tmp_path / "copy/bag.db3")
+    for copy in (tmp_path / "copy", tmp_path / "copy/bag.db3", tmp_path / "latest.db3"):
+        with pytest.raises(LinkwiseError, match=r"bag\.db3-wal has what .* last, .*`sqlite3 \w+\.db3 "):
             analyze(copy, PLANAR3)
     with contextlib.closing(sqlite3.connect(tmp_path / "copy/bag.db3")) as base:
         base.execute("pragma journal_mode = delete")
     np.testing.assert_allclose(analyze(tmp_path / "copy", PLANAR3).q, Q, rtol=1e-12)
+
+
+def test_a_bag_in_capitals_is_told_apart_from_a_damaged_one(tmp_path: Path) -> None:
+    (tmp_path / "BAG.DB3").write_bytes((sqlite(tmp_path) / "bag.db3").read_bytes())
+    with pytest.raises(LinkwiseError, match=r"bags are found by small letters; name it …\.db3"):
+        analyze(tmp_path / "BAG.DB3", PLANAR3)
 
 
 @pytest.mark.parametrize("write", [folder, sqlite])

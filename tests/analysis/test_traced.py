@@ -109,6 +109,14 @@ def test_payloads_are_carried_in_a_trace(tmp_path: Path) -> None:
     check_closes(found, 1e-8)
 
 
+def test_payloads_are_carried_in_a_trace_of_a_robot_that_was_made_for_native_alone(tmp_path: Path) -> None:
+    write_package(generate(read_system("planar3"), ["native"]), tmp_path / "robot")
+    robot = load_robot(tmp_path / "robot", "native")
+    heavy = Payload(robot.links[1], 5.0, (0.1, 0.0, 0.0))
+    found = analyze(log(tmp_path, list(robot.joints)), robot, payloads=[heavy], trace=["all"])
+    check_closes(found, 1e-8)
+
+
 def test_tied_joints_are_traced_in_independent_ones(tmp_path: Path) -> None:
     robot, _ = package(DATA / "crank_rocker.toml", tmp_path)
     own = import_package(robot).load().constraints.independent

@@ -7,6 +7,7 @@ import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
@@ -68,6 +69,22 @@ def changed(bundle: Path, change: Callable[[dict[str, bytes]], None]) -> Path:
     return path
 
 
+def changed_record(bundle: Path, change: Callable[[Any], None]) -> Path:
+    """The bundle with another record of its result, whose hash is made to fit."""
+
+    def change_all(content: dict[str, bytes]) -> None:
+        told, record = (json.loads(content[name]) for name in ("bundle.json", "result/analysis.json"))
+        change(record)
+        data = content["result/analysis.json"] = json.dumps(record).encode()
+        told["files"]["result/analysis.json"] = {
+            "bytes": len(data),
+            "sha256": hashlib.sha256(data).hexdigest(),
+        }
+        content["bundle.json"] = json.dumps(told).encode()
+
+    return changed(bundle, change_all)
+
+
 def asked_otherwise(bundle: Path, **choices: object) -> Path:
     def change(content: dict[str, bytes]) -> None:
         record = json.loads(content["bundle.json"])
@@ -123,6 +140,17 @@ def read_table(text: str) -> dict[str, NDArray[np.float64]]:
     return dict(zip(names, np.array(rows, dtype=float).T, strict=True))
 
 
+def test_columns_in_other_units_are_not_the_same(case: Path) -> None:
+    bundle = analysed(case, "log.csv", "--robot", "planar3")
+
+    def in_degrees(record: Any) -> None:
+        next(one for one in record["columns"] if one["name"] == "q/joint1")["unit"] = "deg"
+
+    done = run_linkwise("replay", changed_record(bundle, in_degrees), folder=case.parent)
+    assert done.returncode == 1
+    assert "1 columns in another unit: q/joint1" in done.stdout
+
+
 def test_columns_that_only_one_result_has_are_not_the_same(case: Path) -> None:
     bundle = analysed(case, "log.csv", "--robot", "planar3", "--columns", "sums")
     done = run_linkwise("replay", asked_otherwise(bundle, columns=["tau/*"]), folder=case.parent)
@@ -149,20 +177,13 @@ def test_numbers_of_the_record_are_compared_beside_a_table(
     bundle = analysed(case, *words)
     replayed(bundle)
 
-    def change(content: dict[str, bytes]) -> None:
-        told, record = (json.loads(content[name]) for name in ("bundle.json", "result/analysis.json"))
+    def change(record: Any) -> None:
         part = record
         for key in place[:-1]:
             part = part[key]
         part[place[-1]] = value
-        data = content["result/analysis.json"] = json.dumps(record).encode()
-        told["files"]["result/analysis.json"] = {
-            "bytes": len(data),
-            "sha256": hashlib.sha256(data).hexdigest(),
-        }
-        content["bundle.json"] = json.dumps(told).encode()
 
-    done = run_linkwise("replay", changed(bundle, change), folder=case.parent)
+    done = run_linkwise("replay", changed_record(bundle, change), folder=case.parent)
     assert done.returncode == 1, done.stderr
     assert "no number of them differs" in done.stdout
     worst = rf"numbers of the record; largest difference: \S+, {place[0]}/\S*{place[-1]}: \S+ before"

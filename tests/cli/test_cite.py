@@ -70,12 +70,27 @@ def test_an_entry_has_its_fields_and_why_it_is_there() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"), [(None, "holds none of"), ("[]", "is damaged"), ("{", "is damaged")]
+    ("text", "told"),
+    [
+        (None, "holds none of"),
+        ("[]", "is damaged"),
+        ("{", "is damaged"),
+        ('{"methods": 3}', "is damaged"),
+        ('{"tests": [{"threshold": 1}]}', "is damaged"),
+        ('{"uncertain": 3}', "is damaged"),
+    ],
 )
 def test_what_is_no_result_is_refused(tmp_path: Path, text: str | None, told: str) -> None:
     if text is not None:
-        (tmp_path / "study.json").write_text(text)
+        (tmp_path / "analysis.json").write_text(text)
     with pytest.raises(LinkwiseError, match=told):
+        record_of(tmp_path)
+
+
+def test_a_damaged_table_of_a_study_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "study.json").write_text("{}")
+    (tmp_path / "tests.parquet").write_bytes(b"PAR1")
+    with pytest.raises(LinkwiseError, match=r"study\.json: is damaged"):
         record_of(tmp_path)
 
 

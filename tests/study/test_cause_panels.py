@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from linkwise.analysis.motion_words import MotionWords
 from linkwise.errors import LinkwiseError
-from linkwise.study.band_figure import band_figures
+from linkwise.study.band_figure import figure_files
 from linkwise.study.comparisons import Cluster, Compared
 from linkwise.study.plan import Comparison, PaperFigure
 from linkwise.study.spread import Spread
@@ -42,7 +42,7 @@ def drawn_of(monkeypatch: pytest.MonkeyPatch) -> Any:
     def drawn(of: list[TrialSummary], tests: tuple[Compared, ...] = (), **keys: Any) -> Any:
         kept: list[Any] = []
         monkeypatch.setattr("linkwise.study.band_figure.saved", lambda one, kind: kept.append(one) or b"")
-        list(band_figures([PaperFigure(("causes:knee_r",), "condition", **keys)], of, tests))
+        list(figure_files(PaperFigure(("causes:knee_r",), "condition", **keys), of, tests))
         return kept[0]
 
     return drawn
@@ -128,7 +128,7 @@ def test_titles_fit_their_panels_and_tell_forces_and_causes(monkeypatch: pytest.
     ]
     kept: list[Any] = []
     monkeypatch.setattr("linkwise.study.band_figure.saved", lambda one, kind: kept.append(one) or b"")
-    list(band_figures([PaperFigure(("tau_by/knee_r/*", "tau/up"), formats=("png",))], several, ()))
+    list(figure_files(PaperFigure(("tau_by/knee_r/*", "tau/up"), formats=("png",)), several, ()))
     kept[0].draw_without_rendering()
     axes = [axis for axis in kept[0].axes if axis.lines]
     titles = [axis.get_title("left") for axis in axes]

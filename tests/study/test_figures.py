@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from linkwise.analysis.motion_words import MotionWords
 from linkwise.errors import LinkwiseError
-from linkwise.study.band_figure import band_figures
+from linkwise.study.band_figure import figure_files
 from linkwise.study.comparisons import Cluster, Compared
 from linkwise.study.plan import Comparison, PaperFigure
 from linkwise.study.spread import Spread
@@ -48,7 +48,7 @@ def drawn_of(monkeypatch: pytest.MonkeyPatch) -> Any:
     def drawn(figure: PaperFigure, of: Sequence[TrialSummary], tests: Sequence[Compared] = ()) -> Any:
         kept: list[Any] = []
         monkeypatch.setattr("linkwise.study.band_figure.saved", lambda one, kind: kept.append(one) or b"")
-        names = [name for name, _ in band_figures([figure], of, tests)]
+        names = [name for name, _ in figure_files(figure, of, tests)]
         return kept[0].axes[0], names
 
     return drawn
@@ -132,7 +132,7 @@ def test_what_muscles_leave_of_a_torque_is_called_so(drawn_of: Any) -> None:
 )
 def test_what_a_figure_cannot_have_is_refused(keys: dict[str, Any], told: str) -> None:
     with pytest.raises(LinkwiseError, match=re.escape(told)):
-        list(band_figures([PaperFigure(("tau/hip",), "condition", **keys)], trials(), ()))
+        list(figure_files(PaperFigure(("tau/hip",), "condition", **keys), trials(), ()))
 
 
 @pytest.mark.parametrize("size", ["wide", "30 mm", "nan", "-90 mm"])
@@ -143,7 +143,7 @@ def test_a_size_is_a_width(size: str) -> None:
 
 def test_eps_has_opaque_bands_and_no_date() -> None:
     asked = PaperFigure(("tau/hip",), "condition", formats=("eps", "svg"))
-    first, again = (dict(band_figures([asked], trials(), ())) for _ in range(2))
+    first, again = (dict(figure_files(asked, trials(), ())) for _ in range(2))
     assert list(first) == ["tau-hip.eps", "tau-hip.svg"]
     assert first == again
     assert b"CreationDate" not in first["tau-hip.eps"]

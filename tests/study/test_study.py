@@ -14,6 +14,7 @@ from linkwise import Options, analyze, kept_package
 from linkwise.analysis import Payload, Processing, Reading
 from linkwise.analysis.loads import Load
 from linkwise.analysis.settings import Lowpass
+from linkwise.errors import LinkwiseError
 from linkwise.study import run_study
 from linkwise.study.comparisons import compared
 from linkwise.study.file import read_study
@@ -277,15 +278,23 @@ def test_files_that_a_study_no_longer_asks_for_go(tmp_path: Path) -> None:
 
 def test_words_for_what_a_figure_does_not_show_are_told_with_the_nearest_that_it_does(tmp_path: Path) -> None:
     figure = '\n[[figure]]\nname = "torques"\ncolumns = ["tau/*"]\nby = "condition"\n'
+    other = '\n[[figure]]\nname = "others"\ncolumns = ["tau/*"]\n'
     words = '"tau/joint3" = "ankle", condition = "pace", slow = "at ease"'
-    file = write_study(tmp_path, HEAD, QUICK, CHOICES, figure, f"names = {{ {words} }}\n", TRIALS, subjects=1)
+    file = write_study(
+        tmp_path, HEAD, QUICK, CHOICES, figure, f"names = {{ {words} }}\n", other, TRIALS, subjects=1
+    )
     assert not run_study(file, tmp_path / "out", Here()).warnings
     file.write_text(file.read_text().replace('"tau/joint3"', '"tau/joint4"'))
     (told,) = run_study(file, tmp_path / "out", Here()).warnings
     assert told.startswith(
-        "[[figure]]: 'names' has 'tau/joint4', which nothing in it is called; nearest are 'tau/"
+        "figure 1, torques, is not drawn: [[figure]]: 'names' has 'tau/joint4', which nothing in it is"
+        " called; nearest are 'tau/"
     )
     assert not (tmp_path / "out/torques.svg").exists()
+    assert (tmp_path / "out/others.svg").exists()
+    file.write_text(file.read_text().replace('by = "condition"', 'by = "condition"\norder = ["quick"]'))
+    with pytest.raises(LinkwiseError, match="'order' has 'quick', which no trial is"):
+        run_study(file, tmp_path / "out", Here())
 
 
 def test_curves_that_do_not_vary_are_told_and_the_rest_is_made(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from helpers.studies import CHOICES, HEAD, QUICK, Here, write_study
 from linkwise.study import run_study
-from linkwise.study.band_figure import band_figures
+from linkwise.study.band_figure import figure_files
 from linkwise.study.comparisons import Compared, compared
 from linkwise.study.plan import Comparison, PaperFigure
 from linkwise.study.spread import spread, values_of
@@ -198,7 +198,7 @@ def drawn(figure: PaperFigure, trials: Sequence[TrialSummary], tests: Sequence[C
     with pytest.MonkeyPatch.context() as patch:
         found: list[Any] = []
         patch.setattr("linkwise.study.band_figure.saved", lambda drawing, kind: found.append(drawing) or b"")
-        assert [name for name, _ in band_figures([figure], trials, tests)] == ["tau.svg", "tau.pdf"]
+        assert [name for name, _ in figure_files(figure, trials, tests)] == ["tau.svg", "tau.pdf"]
     return found[0].axes[0]
 
 

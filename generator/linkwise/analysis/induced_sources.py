@@ -26,6 +26,7 @@ import numpy as np
 from linkwise_runtime.motion.induced_accelerations import Response, response_of
 
 from linkwise.analysis.opened_robot import OpenedRobot
+from linkwise.analysis.payload import PayloadModel
 from linkwise.analysis.result_quantities import LOSSES, PASSIVE
 from linkwise.analysis.result_rows import ResultRows
 from linkwise.analysis.term_rows import TermArrays, mirrored
@@ -165,8 +166,13 @@ def opened(robot: OpenedRobot) -> Any:
 
 def refuse_tensors(robot: OpenedRobot, what: str) -> None:
     """Raise LinkwiseError for a back end that computes in tensors, where arrays are needed."""
-    _, (q,) = opened(robot).backend.read({"q": np.zeros((1, len(robot.joints)))}, len(robot.joints))
-    if not isinstance(q, np.ndarray):
+    model: Any = robot.model
+    models = [
+        opened(robot),
+        *(part.model for part in (model.parts if isinstance(model, PayloadModel) else ())),
+    ]
+    read = [one.backend.read({"q": np.zeros((1, len(robot.joints)))}, len(robot.joints)) for one in models]
+    if not all(isinstance(q, np.ndarray) for _, (q,) in read):
         raise LinkwiseError(
             f"--backend {robot.backend} computes in tensors, and {what} in arrays; give numpy or native"
         )

@@ -45,18 +45,24 @@ class ResultComparison:
     worst: Difference | None
     missing: tuple[str, ...]
     added: tuple[str, ...]
+    other_units: tuple[str, ...]
+    """Columns that both have, in other units."""
     record: RecordComparison
 
     def is_same(self, tolerance: float) -> bool:
         """Return whether all numbers agree within a share of the largest with their unit."""
-        is_same = not (self.missing or self.added) and self.relative <= tolerance
+        is_same = not (self.missing or self.added or self.other_units) and self.relative <= tolerance
         return is_same and self.record.is_same(tolerance)
 
     @property
     def lines(self) -> list[str]:
         """Text of the comparison."""
         told = [f"compared: {self.samples:,} samples of {self.columns:,} columns"] if self.columns else []
-        for names, where in ((self.missing, "not here"), (self.added, "not in the bundle")):
+        for names, where in (
+            (self.missing, "not here"),
+            (self.added, "not in the bundle"),
+            (self.other_units, "in another unit"),
+        ):
             told += [f"{len(names)} columns {where}: {listed(names)}"] if names else []
         one = self.worst
         if one is None:
@@ -86,8 +92,8 @@ def compared(former: Path, now: Path) -> ResultComparison:
 
 def _compared(former: Path, now: Path) -> ResultComparison:
     records = [parse_json((folder / RECORD).read_text(encoding="utf-8")) for folder in (former, now)]
-    units = {column["name"]: column["unit"] for column in records[0]["columns"]}
-    names = [[column["name"] for column in record["columns"]] for record in records]
+    units, now_units = ({one["name"]: one["unit"] for one in record["columns"]} for record in records)
+    names = [list(units), list(now_units)]
     shared = [name for name in names[0] if name in set(names[1])]
     samples = [record["samples"] for record in records]
     if samples[0] != samples[1]:
@@ -105,6 +111,7 @@ def _compared(former: Path, now: Path) -> ResultComparison:
         worst[first] if first is not None and share else None,
         tuple(name for name in names[0] if name not in set(names[1])),
         tuple(name for name in names[1] if name not in set(names[0])),
+        tuple(name for name, unit in now_units.items() if units.get(name, unit) != unit),
         RecordComparison.of(*records),
     )
 

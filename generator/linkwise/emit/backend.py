@@ -187,7 +187,7 @@ BACKENDS: dict[str, BackendFiles] = {
                 uses_forms=True,
                 uses_rule=True,
             ),
-            needs=("c", "torch"),
+            needs=("c", "numpy", "torch"),
         ),
         BackendFiles(
             "c",

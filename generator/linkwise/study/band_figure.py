@@ -60,33 +60,33 @@ class BandPanel:
     """True for a joint torque that is what muscles leave."""
 
 
-def band_figures(
-    figures: Sequence[PaperFigure], trials: Sequence[TrialSummary], tests: Sequence[Compared]
+def figure_files(
+    figure: PaperFigure,
+    trials: Sequence[TrialSummary],
+    tests: Sequence[Compared],
+    number: int = 1,
+    used: Sequence[str] = (),
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield the name and content of all figures, in each of their formats.
+    """Yield the name and content of a figure in each of its formats.
+
+    number: of the figure, counted from 1; used: names of files of former ones, without their endings
 
     Raises LinkwiseError for unknown columns, levels and units, and for deviations that are asked for and are
     not there.
     """
+    panels = [] if figure.joints else panels_of(figure, trials, tests)
+    name = file_name((figure.name or _name(figure, panels) or f"figure{number}").replace("/", "-"))
+    *_, name = file_names([*used, name])
     words = words_of_trials(trials)
-    for figure in figures:
-        figure_columns(figure, columns_of_trials(trials))
-    drawn_of = [[] if figure.joints else panels_of(figure, trials, tests) for figure in figures]
-    names = [
-        figure.name or _name(figure, panels) or f"figure{number}"
-        for number, (figure, panels) in enumerate(zip(figures, drawn_of, strict=True), 1)
-    ]
-    files = file_names(file_name(name.replace("/", "-")) for name in names)
-    for figure, panels, name in zip(figures, drawn_of, files, strict=True):
-        with styled() as matplotlib:
-            matplotlib.rcParams["hatch.linewidth"] = EDGE
-            for kind in figure.formats:
-                drawing = (
-                    _drawn(figure, panels, words)
-                    if panels
-                    else drawn_causes(figure, converted(figure, trials), tests, words)
-                )
-                yield f"{name}.{kind}", saved(drawing, kind)
+    with styled() as matplotlib:
+        matplotlib.rcParams["hatch.linewidth"] = EDGE
+        for kind in figure.formats:
+            drawing = (
+                _drawn(figure, panels, words)
+                if panels
+                else drawn_causes(figure, converted(figure, trials), tests, words)
+            )
+            yield f"{name}.{kind}", saved(drawing, kind)
 
 
 def _name(figure: PaperFigure, panels: Sequence[BandPanel]) -> str:

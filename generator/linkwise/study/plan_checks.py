@@ -11,7 +11,7 @@ from linkwise.study.band_figure import figure_columns
 from linkwise.study.cycles import written_cycles
 from linkwise.study.normalised import check_bodies
 from linkwise.study.paths import require_there
-from linkwise.study.plan import SUBJECT, Comparison, StudyPlan
+from linkwise.study.plan import SUBJECT, Comparison, PaperFigure, StudyPlan
 
 NEAR = 4
 """Names that a message shows in place of one that nothing is called."""
@@ -44,19 +44,18 @@ def check_plan(plan: StudyPlan) -> None:
     check_bodies(plan)
     for figure in plan.figures:
         if figure.by:
-            _levels(plan, figure.by)
+            figure.in_order(sorted(_levels(plan, figure.by)))
 
 
-def check_names(plan: StudyPlan, columns: Collection[str]) -> None:
+def check_names(plan: StudyPlan, figure: PaperFigure, columns: Collection[str]) -> None:
     """Raise LinkwiseError for a key of a figure's `names` that is none of its columns, joints and levels."""
-    for figure in plan.figures:
-        factor = [figure.by, *sorted(_levels(plan, figure.by))] if figure.by else []
-        shown = [*figure_columns(figure, columns), *figure.wholes, *figure.joints, *factor]
-        if odd := [key for key in figure.names if key not in shown]:
-            near = listed(map(repr, nearest_first(odd[0], shown)[:NEAR]))
-            raise LinkwiseError(
-                f"[[figure]]: 'names' has {odd[0]!r}, which nothing in it is called; nearest are {near}"
-            )
+    factor = [figure.by, *sorted(_levels(plan, figure.by))] if figure.by else []
+    shown = [*figure_columns(figure, columns), *figure.wholes, *figure.joints, *factor]
+    if odd := [key for key in figure.names if key not in shown]:
+        near = listed(map(repr, nearest_first(odd[0], shown)[:NEAR]))
+        raise LinkwiseError(
+            f"[[figure]]: 'names' has {odd[0]!r}, which nothing in it is called; nearest are {near}"
+        )
 
 
 def _check_apart(plan: StudyPlan, comparison: Comparison) -> None:

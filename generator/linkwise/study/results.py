@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from linkwise.errors import LinkwiseError
 from linkwise.progress import Progress
-from linkwise.study.band_figure import band_figures
+from linkwise.study.band_figure import figure_files
 from linkwise.study.comparisons import compared, left_out_lines
 from linkwise.study.folder import GROUPS, MEAN_CURVES, STUDY_PAGE, SUMMARIES, TESTS
 from linkwise.study.normalised import normalised, of_several_masses, of_their_robots, told_of_bodies
@@ -54,11 +54,16 @@ def together(
     if tests:
         files[TESTS] = parquet(rows_of_tests(tests))
     progress("together", 2, 3)
-    try:
-        check_names(plan, columns_of_trials(trials))
-        files |= dict(band_figures(plan.figures, trials, tests))
-    except LinkwiseError as error:
-        told.append(str(error))
+    used: list[str] = []
+    for number, figure in enumerate(plan.figures, 1):
+        try:
+            check_names(plan, figure, columns_of_trials(trials))
+            made = dict(figure_files(figure, trials, tests, number, used))
+        except LinkwiseError as error:
+            told.append(f"figure {number}{f', {figure.name},' if figure.name else ''} is not drawn: {error}")
+            continue
+        files |= made
+        used.append(Path(next(iter(made))).stem)
     notes = (*of_several_masses(plan, own), *of_their_robots(plan, own), *left_out_lines(tests))
     files[STUDY_PAGE] = study_page(plan, trials, folders, tests, broken, notes).encode()
     progress("together", 3, 3)

@@ -33,6 +33,9 @@ def opened_bag(path: Path) -> Iterator[Any]:
         if not file.is_dir():
             with within(str(file)):
                 require_file(file)
+    ending = path.suffix
+    if ending != ending.lower() and ending.lower() in (".db3", ".mcap"):
+        raise LinkwiseError(f"{path}: bags are found by small letters; name it …{ending.lower()}")
     if (profile := _profile(path)) != MCAP_OF_ROS:
         raise LinkwiseError(
             f"{path}: MCAP with the profile {short(profile)!r}, and not {MCAP_OF_ROS!r}; record it with ros2"
@@ -72,7 +75,7 @@ def _require_whole_pages(path: Path) -> None:
 def _require_merged(path: Path) -> None:
     """Raise LinkwiseError for a database of SQLite with changes beside it, which the library leaves out."""
     for ending in ("-wal", "-journal"):
-        beside = path.with_name(path.name + ending)
+        beside = path.resolve().with_name(path.resolve().name + ending)  # SQLite's own way with links
         if beside.is_file() and beside.stat().st_size:
             raise LinkwiseError(
                 f"{beside.name} has what was recorded last, and would be left out; bring it in with"
