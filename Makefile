@@ -92,16 +92,16 @@ corpus: $(READY)
 	$(BIN)/python tests/tools/corpus.py --check --out out/corpus
 	$(BIN)/python tests/tools/corpus.py --kernel loops --out out/corpus-loops
 
-# Every call of docs/exports.md compiled, exported and under onnxruntime: some ten minutes.
+# Every call of docs/exports.md compiled, exported and under onnxruntime: half an hour.
 exports: $(READY)
 	$(BIN)/python tests/tools/exports.py --out out/exports
 
-# `generate` and `analyze` killed at each system call that touches files, which needs strace, and `study` interrupted: hours.
+# `generate` and `analyze` killed at each system call that touches files, which needs strace, and `study` interrupted: half an hour.
 crash: $(READY)
 	$(BIN)/python tests/tools/crash.py
 	$(BIN)/python tests/tools/interrupts.py
 
-# 200 random robots of up to 15 joints, each link beside Pinocchio: ten minutes.
+# 200 random robots of up to 15 joints, each link beside Pinocchio: twenty minutes.
 random: $(READY)
 	$(BIN)/python tests/numeric/random_robots.py --count 200
 

@@ -122,6 +122,17 @@ PRODUCTS = _article(
     pages="708--713",
     doi="10.1080/01621459.1960.10483369",
 )
+DIFFERENCES = _article(
+    "norgaard2000",
+    "N{\\o}rgaard, Magnus and Poulsen, Niels K. and Ravn, Ole",
+    "New Developments in State Estimation for Nonlinear Systems",
+    "Automatica",
+    "2000",
+    volume="36",
+    number="11",
+    pages="1627--1638",
+    doi="10.1016/S0005-1098(00)00089-3",
+)
 CURVES = _article(
     "pataky2012",
     "Pataky, Todd C.",
@@ -240,6 +251,8 @@ def citations(record: Mapping[str, Any]) -> Iterator[Citation]:
     for uncertain in _uncertain(record):
         if uncertain.get("presets"):
             yield _because(SEGMENTS, "how uncertain segments of a person are")
+        if uncertain.get("motion"):
+            yield _because(DIFFERENCES, "deviations by noise of the motion")
         if uncertain.get("motion") and any(map(OF_PRODUCT.match, _columns(record))):
             yield _because(PRODUCTS, "deviations of shares and powers by noise of the motion")
     tests = record.get("tests") or []

@@ -28,6 +28,8 @@ BROUGHT_BY = {
 }
 """The extra of pyproject.toml that installs each library."""
 
+ONLY = {"opensim": ", which there is for Linux on x86-64 and Python up to 3.13"}
+"""Where a library is to be had, if not everywhere."""
 LEAST_ADDRESSES = {"numpy": 4 * 10**8, "pyarrow": 10**9, "torch": 10**9}
 """Least bytes of address space: with fewer, these may end the process in the midst of their work, and say
 nothing of memory."""
@@ -42,6 +44,7 @@ def extra(module: str) -> Any:
     except ImportError as error:
         raise LinkwiseError(
             f"{library} is needed for this and is missing: pip install 'linkwise[{BROUGHT_BY[library]}]'"
+            f"{ONLY.get(library, '')}"
         ) from error
 
 

@@ -32,14 +32,17 @@ def keys(record: dict[str, Any]) -> list[str]:
         ({"residuals": {"of": [{}], "largest_net_external_force_N": None}}, []),
         ({"residuals": {"of": [{}], "largest_net_external_force_N": 800.0}}, ["hicks2015"]),
         ({"uncertain": {"presets": {"zatsiorsky-men": {}}, "motion": None}}, ["zatsiorsky2002"]),
-        ({"uncertain": {"motion": {"angle": 1}}, "columns": [{"name": "sd/tau/hip"}]}, []),
-        ({"uncertain": {"motion": {"angle": 1}}, "columns": [{"name": "sd/power/hip"}]}, ["goodman1960"]),
+        ({"uncertain": {"motion": {"angle": 1}}, "columns": [{"name": "sd/tau/hip"}]}, ["norgaard2000"]),
+        (
+            {"uncertain": {"motion": {"angle": 1}}, "columns": [{"name": "sd/power/hip"}]},
+            ["norgaard2000", "goodman1960"],
+        ),
         (
             {
                 "uncertain": {"assumed": [{"motion": {"angle": 1}}, {"motion": {}}]},
                 "columns": [{"column": "sd-motion/tau_qd/hip/foot/knee"}],
             },
-            ["goodman1960"],
+            ["norgaard2000", "goodman1960"],
         ),
         ({"tests": [{"threshold": float("nan"), "correction": "none"}]}, ["hedges1981"]),
         (

@@ -50,7 +50,7 @@ class Record:
         for path, changes in of_paths.items():
             self.verdicts |= {f"{path}: {change}": _read(told) for change, told in changes.items()}
         self.passed: dict[str, list[list[str]]] = kept.get("passed", {})
-        """By mutant: a test that passes with it, the digests of the changed file's code and of the test."""
+        """Tests that pass with a mutant, each with the digests of the changed file's code and of its own."""
         self.sound: dict[str, str] = {}
         self._saving = Lock()
         now = {name: digest(ROOT / name) for name in test_files()}

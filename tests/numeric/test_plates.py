@@ -69,7 +69,7 @@ def wrench() -> tuple[np.ndarray, np.ndarray]:
 
 
 def plate_of(path: Path, kind: int, values: np.ndarray, units: list[str], origin: list[float]) -> PlateWrench:
-    """What is read of a file with one plate, whose channels (C, S) are in these units."""
+    """Read a file with one plate, whose channels (C, S) are in these units."""
     file, (count, samples) = ezc3d.c3d(), values.shape
     file["parameters"]["POINT"]["RATE"]["value"] = [100.0]
     file["parameters"]["POINT"]["LABELS"]["value"] = ["heel"]

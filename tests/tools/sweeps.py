@@ -99,6 +99,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wanted = parser.parse_args(arguments)
     if unknown := [name for name in wanted.names if name not in SWEEPS]:
         parser.error(f"no such sweep: {', '.join(unknown)}")
+    changed = subprocess.run(
+        ["git", "status", "--porcelain", "--", ".", f":!{PAGE.relative_to(ROOT)}"],
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout
+    if changed:
+        parser.error(f"the row names a commit, and the tree has changes beside it:\n{changed}")
     commit = subprocess.run(
         ["git", "rev-parse", "--short=8", "HEAD"], cwd=ROOT, check=True, capture_output=True, text=True
     ).stdout.strip()

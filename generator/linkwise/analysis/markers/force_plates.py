@@ -15,7 +15,7 @@ OF_PRESSURE, OF_MOMENTS, OF_SENSORS, OF_MATRIX = 1, 2, 3, 4
 """Types of plates: a force, its centre of pressure and a free moment; a force and a moment; eight parts of
 the force; channels that CAL_MATRIX makes a force in N and a moment in N times POINT:UNITS."""
 CHANNELS = {OF_PRESSURE: "FFFPPM", OF_MOMENTS: "FFFMMM", OF_SENSORS: "FFFFFFFF", OF_MATRIX: ""}
-"""Whether each of a plate's channels is a force, a place or a moment, where the file says its unit."""
+"""Letter for each of a plate's channels whose unit the file says: a force, a place or a moment."""
 IN_SI = {
     "F": {"N": 1.0},
     "P": METRES,
