@@ -99,6 +99,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wanted = parser.parse_args(arguments)
     if unknown := [name for name in wanted.names if name not in SWEEPS]:
         parser.error(f"no such sweep: {', '.join(unknown)}")
+    # What all targets need is there first, as its commands are none of a sweep.
+    subprocess.run(["make", "--silent", ".venv/.ready"], cwd=ROOT, check=True, stdout=sys.stderr)
     changed = subprocess.run(
         ["git", "status", "--porcelain", "--", ".", f":!{PAGE.relative_to(ROOT)}"],
         cwd=ROOT,
