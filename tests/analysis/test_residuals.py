@@ -44,6 +44,7 @@ def test_peaks_and_root_mean_squares_are_numpys_and_held_to_external_forces(push
     assert [one.joint for one in report.residuals] == LEGS[:3]
     for i, one in enumerate(report.residuals):
         assert one.peak == pytest.approx(np.abs(pushed.torque[:, i]).max(), rel=1e-12)
+        assert one.time == pushed.time[np.abs(pushed.torque[:, i]).argmax()]
         assert one.rms == pytest.approx(np.sqrt((pushed.torque[:, i] ** 2).mean()), rel=1e-12)
     force = np.linalg.norm(FORCE) * (0.5 + 0.5 * np.sin(3 * pushed.time)).max()
     assert report.force == pytest.approx(force, rel=1e-9)

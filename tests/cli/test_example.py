@@ -41,7 +41,7 @@ def test_without_a_name_all_are_listed_with_what_they_are(tmp_path: Path) -> Non
     ended = run_linkwise("example", folder=tmp_path)
     assert ended.returncode == 0
     assert [line.split()[0] for line in ended.stdout.splitlines()[:4]] == NAMES == list(example_cases())
-    assert "walk     A person walks over force plates" in ended.stdout
+    assert "walk     A person walks on a treadmill with force plates" in ended.stdout
     assert not list(tmp_path.iterdir())
 
 

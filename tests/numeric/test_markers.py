@@ -138,6 +138,17 @@ def test_markers_and_a_plate_give_the_torques_of_the_known_motion(walk: Walk) ->
     assert np.abs(wanted.torque).max() > 100.0
 
 
+def test_a_plate_may_have_a_name_and_its_filter_is_recorded(walk: Walk) -> None:
+    found = walk.followed(walk.folder / "walk.c3d", "right:1=foot", cutoff=12.0)
+    record = found.record()
+    assert record["loads"] == [{"name": "right", "body": "foot", "file": "walk.c3d", "cutoff": 12.0}]
+    plate = {"name": "right", "number": 1, "body": "foot", "bare_below": 20.0}
+    assert record["markers"]["plates"] == [plate]
+    for text in ("1:=foot", ":1=foot", "right:=foot", "right=foot"):
+        with pytest.raises(LinkwiseError, match="or NAME:NUMBER=BODY"):
+            walk.followed(walk.folder / "walk.c3d", text)
+
+
 def test_forces_on_the_plate_are_turned_round(walk: Walk, tmp_path: Path) -> None:
     walk.c3d(tmp_path / "down.c3d", sign=-1.0)
     found, wanted = walk.followed(tmp_path / "down.c3d", "1=foot"), walk.known(loads=[walk.load()])

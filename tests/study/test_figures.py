@@ -205,7 +205,17 @@ def test_what_is_uncertain_is_hatched_beside_the_spread(
 def test_nothing_is_hatched_where_it_is_left_out(drawn_of: Any) -> None:
     axis, _ = drawn_of(PaperFigure(("tau/hip",), "condition", hatched="none"), with_deviations(0.5))
     assert [band.get_hatch() for band in axis.collections] == [None, None]
-    assert not axis.figure.legends
+    (legend,) = axis.figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["filled: ± sd between subjects"]
+
+
+def test_a_bar_of_a_test_is_told(drawn_of: Any) -> None:
+    axis, _ = drawn_of(PaperFigure(("tau/hip",), "condition"), trials(), [about("condition", "tau/hip", 10)])
+    texts = [text.get_text() for text in axis.figure.legends[0].get_texts()]
+    assert texts == [
+        "filled: ± sd between subjects",
+        "bar at the bottom: there the levels differ,\nby the test",
+    ]
 
 
 def of_one_subject(points: int = 3) -> list[TrialSummary]:

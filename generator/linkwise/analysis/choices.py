@@ -77,7 +77,8 @@ class AnalysisChoices:
     )
     plate: tuple[str, ...] = option(
         (),
-        "Of a .c3d file: the body that stands on a force plate, plates counted from 1; may be repeated",
+        "Of a .c3d file: the body that stands on a force plate, plates counted from 1; NAME:NUMBER=… names"
+        " its load; may be repeated",
         metavar="NUMBER=BODY",
     )
     plate_threshold: float | None = option(

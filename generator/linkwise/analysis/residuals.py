@@ -35,11 +35,13 @@ class Residual:
     rms: float
     limit: float | None
     """Peak that is taken; None without external forces."""
+    time: float
+    """Time of the peak in s: at the ends of a log filters and differences are worst."""
 
     @property
     def line(self) -> str:
         """Text of it for a terminal."""
-        told = f"{self.joint} {self.peak:.3g} {self.unit} (rms {self.rms:.3g}"
+        told = f"{self.joint} {self.peak:.3g} {self.unit} at {self.time:.6g} s (rms {self.rms:.3g}"
         if self.limit is None:
             return f"{told})"
         word = "within" if self.peak <= self.limit else "ABOVE"
@@ -93,13 +95,15 @@ class ResidualSums:
         self._joints = [i for i in robot.residuals if i in told and robot.contacts is None]
         self._numbers = [told[i] for i in self._joints]
         self._count, self._height, self._force = 0, 0.0, 0.0
-        self._peaks, self._squares = np.zeros((2, len(self._joints)))
+        self._peaks, self._times, self._squares = np.zeros((3, len(self._joints)))
 
     def __call__(self, block: Array) -> None:
         """Add a block of the result (rows, samples)."""
         values = block[self._numbers]
         self._count += block.shape[1]
-        np.maximum(self._peaks, np.abs(values).max(axis=1, initial=0.0), out=self._peaks)
+        for number, sizes in enumerate(np.abs(values)):
+            if len(sizes) and (peak := float(sizes.max())) > self._peaks[number]:
+                self._peaks[number], self._times[number] = peak, block[0, int(sizes.argmax())]
         self._squares += np.einsum("rs,rs->r", values, values)
         if self._loads and self._joints:
             q, pose = self._rows.dense("q", block), model_pose(self._robot.model)
@@ -119,8 +123,10 @@ class ResidualSums:
         robot = self._robot
         return ResidualReport(
             tuple(
-                Residual(robot.joints[i], robot.torque_units[i], peak, root, limits[robot.units[i]])
-                for i, peak, root in zip(self._joints, self._peaks.tolist(), rms, strict=True)
+                Residual(robot.joints[i], robot.torque_units[i], peak, root, limits[robot.units[i]], time)
+                for i, peak, root, time in zip(
+                    self._joints, self._peaks.tolist(), rms, self._times.tolist(), strict=True
+                )
             ),
             force,
             height,

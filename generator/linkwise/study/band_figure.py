@@ -31,13 +31,17 @@ MOST = 12
 WIDE, HIGH = 3.4, 2.3
 """Width and height of a panel in inches; two stand side by side."""
 MM = 1 / 25.4
-DOTS_OF_ONE = "dots: trials of one subject; bars: ± sd over them"
+DOTS, DOTS_OF_ONE = (
+    "dots: subjects; bars: ± sd over them",
+    "dots: trials of one subject; bars: ± sd over them",
+)
 HATCHED = {
     "within": "hatched: ± sd within a trial,\nby what is uncertain",
     "mean": "hatched: ± sd of the mean,\nspread and uncertainty together",
     "new": "hatched: ± sd of a new subject's truth,\nspread and uncertainty together",
 }
 """Kinds of bands, as a legend calls them."""
+BAR = "bar at the bottom: there the levels differ,\nby the test"
 LETTERS, MARGIN, LONGEST = 13, 0.8, 110
 """Letters of a title on an inch, inches beside a panel, and most letters of a title."""
 EDGE = 0.5
@@ -191,17 +195,18 @@ def _kinds_of_bands(figure: PaperFigure, panels: Sequence[BandPanel]) -> list[tu
     of_one = [spread for spread in some if spread.is_of_trials]
     is_hatched = figure.hatched != "none" and any(panel.uncertain for panel in panels)
     kinds = []
-    if figure.band in FILLED and (is_hatched or of_one):
+    if some and some[0].each.shape[1] == 1:
+        dot = extra("matplotlib.lines").Line2D([], [], color=INK, marker="o", linewidth=0)
+        kinds.append((dot, DOTS_OF_ONE if of_one else DOTS))
+    elif some and figure.band in FILLED:
         text = (FILLED_OF_ONE if of_one else FILLED)[figure.band]
-        if of_one and of_one[0].each.shape[1] == 1:
-            kinds.append(
-                (extra("matplotlib.lines").Line2D([], [], color=INK, marker="o", linewidth=0), DOTS_OF_ONE)
-            )
-        else:
-            kinds.append((patch(facecolor=INK, alpha=0.2, linewidth=0), text))
+        kinds.append((patch(facecolor=INK, alpha=0.2, linewidth=0), text))
     if is_hatched:
         hatched = patch(fill=False, edgecolor=INK, hatch=HATCHES[0], linewidth=EDGE)
         kinds.append((hatched, HATCHED[figure.hatched]))
+    if any(test.clusters for panel in panels for test in panel.tests if len(test.statistic) > 1):
+        bar = extra("matplotlib.lines").Line2D([], [], color=INK, linewidth=3)
+        kinds.append((bar, BAR))
     return kinds
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from linkwise.arrays import Array
-from linkwise.errors import LinkwiseError, within
+from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.study.corrections import corrected
 from linkwise.study.deviation_columns import fitting_values
@@ -84,6 +84,7 @@ def compared(
     """
     known = columns_of_trials(trials)
     tested, told = list[tuple[int, _Tested]](), list[str]()
+    lacking: dict[tuple[str, str], list[str]] = {}
     for number, comparison in enumerate(comparisons):
         try:
             names = compared_columns(comparison, known)
@@ -92,10 +93,10 @@ def compared(
             continue
         for name in names:
             try:
-                with within(f"[[compare]] {comparison.factor}, {name}"):
-                    tested.append((number, _of_column(comparison, trials, name, known[name])))
+                tested.append((number, _of_column(comparison, trials, name, known[name])))
             except LinkwiseError as error:
-                told.append(str(error))
+                lacking.setdefault((comparison.factor, str(error)), []).append(name)
+    told += [f"[[compare]] {factor}, {listed(names)}: {why}" for (factor, why), names in lacking.items()]
     families: dict[str | int, list[_Tested]] = {}
     for number, one in tested:
         families.setdefault(one.comparison.family or number, []).append(one)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed
 from linkwise.progress import Progress
 from linkwise.study.band_figure import figure_files
 from linkwise.study.comparisons import compared, left_out_lines
@@ -18,6 +19,9 @@ from linkwise.study.summary import summaries
 from linkwise.study.tables import curve_rows, group_rows, parquet, summary_rows
 from linkwise.study.tested_rows import rows_of_tests
 from linkwise.study.trial import TrialOutcome
+
+SHOWN = 6
+"""Names of broken trials that are listed."""
 
 
 class Together(NamedTuple):
@@ -64,7 +68,20 @@ def together(
             continue
         files |= made
         used.append(Path(next(iter(made))).stem)
-    notes = (*of_several_masses(plan, own), *of_their_robots(plan, own), *left_out_lines(tests))
+    notes = (
+        *_of_broken(plan, broken),
+        *of_several_masses(plan, own),
+        *of_their_robots(plan, own),
+        *left_out_lines(tests),
+    )
     files[STUDY_PAGE] = study_page(plan, trials, folders, tests, broken, notes).encode()
     progress("together", 3, 3)
     return Together(files, tuple(told), notes, told_of_bodies(plan, own))
+
+
+def _of_broken(plan: StudyPlan, broken: Sequence[TrialOutcome]) -> tuple[str, ...]:
+    """Return a line on trials without results, as means, tests and figures are of the others alone."""
+    if not broken:
+        return ()
+    names = listed([one.name for one in broken], SHOWN)
+    return (f"{len(broken)} of {len(plan.trials)} trials are broken, and part of nothing here: {names}",)

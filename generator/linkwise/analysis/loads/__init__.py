@@ -35,6 +35,10 @@ class Load:
     time: ArrayLike | None = None
     axes: str = WORLD
     point_in: str | None = None
+    source: str = ""
+    """Name of the file that the values are from, which records tell."""
+    filtered: float | None = None
+    """Cutoff in Hz of a low-pass filter that the values have gone through, which records tell."""
 
     def table(self) -> Array:
         """Return rows (S, 10) of time, force, moment, point; a single row, at time 0, if all is constant.

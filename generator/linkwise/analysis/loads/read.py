@@ -128,7 +128,7 @@ def _given(load: Load, robot: OpenedRobot, motion: Array) -> PlacedLoad:
     if load.time is not None:
         with within(f"load {load.name!r}"):
             check_time(table[:, 0], motion, 1)
-    return PlacedLoad(load.name, (PlacedWrench(load_frame, table),), "")
+    return PlacedLoad(load.name, (PlacedWrench(load_frame, table),), load.source, load.filtered)
 
 
 def _read(

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from linkwise.errors import LinkwiseError
 
@@ -9,13 +10,21 @@ SUFFIXES = (".trc", ".c3d")
 PLATE_THRESHOLD = 20.0
 
 
+class PlateUnder(NamedTuple):
+    """A plate under a body: name of its load, number in the file, from 1, and name of the body."""
+
+    name: str
+    number: int
+    body: str
+
+
 @dataclass(frozen=True)
 class MarkerChoices:
     """Model of OpenSim whose markers are followed, and how markers and plates are read.
 
     `tasks` is a file of OpenSim's inverse kinematics, a setup or its tasks, with weights. `plates` are
-    written NUMBER=BODY, `axes` X,UP: axes of the laboratory that are the model's x, and up. Wrenches of
-    plates whose force is below `threshold` in N, 20 if not given, count as nothing.
+    written NUMBER=BODY or NAME:NUMBER=BODY, `axes` X,UP: axes of the laboratory that are the model's x, and
+    up. Wrenches of plates whose force is below `threshold` in N, 20 if not given, count as nothing.
 
     Raises LinkwiseError for what is not written so.
     """
@@ -31,7 +40,7 @@ class MarkerChoices:
     def __post_init__(self) -> None:
         if not 0 <= self.least < float("inf"):
             raise LinkwiseError(f"--plate-threshold {self.least:g}: give a force in N, 0 or more")
-        numbers = [number for number, _ in self.bodies]
+        numbers = [one.number for one in self.under]
         if len(set(numbers)) < len(numbers):
             raise LinkwiseError("--plate: a plate is given twice; it is under one body")
 
@@ -46,12 +55,15 @@ class MarkerChoices:
         return bool(self.plates or self.axes or self.threshold is not None)
 
     @property
-    def bodies(self) -> tuple[tuple[int, str], ...]:
-        """Number of each plate that is given, from 1, and the body on it."""
+    def under(self) -> tuple[PlateUnder, ...]:
+        """Plates that are given, and the body on each."""
         found = []
         for text in self.plates:
-            number, sign, body = text.partition("=")
-            if not (sign and body and number.isdecimal() and int(number)):
-                raise LinkwiseError(f"--plate {text}: write it as NUMBER=BODY, plates counted from 1")
-            found.append((int(number), body))
+            given, sign, body = text.partition("=")
+            name, colon, number = given.rpartition(":")
+            if not (sign and body and number.isdecimal() and int(number) and bool(name) == bool(colon)):
+                raise LinkwiseError(
+                    f"--plate {text}: write it as NUMBER=BODY, plates counted from 1, or NAME:NUMBER=BODY"
+                )
+            found.append(PlateUnder(name or f"plate {number}", int(number), body))
         return tuple(found)

@@ -32,6 +32,7 @@ class MarkerLog:
     loads: Loads
     followed: FollowedMarkers
     source: str
+    asked: MarkerChoices
     told: tuple[str, ...]
 
     @property
@@ -57,6 +58,7 @@ class MarkerLog:
                 {"marker": name, "root_mean_square": self.rms(apart), "largest": float(np.nanmax(apart))}
                 for name, apart in each
             ],
+            "plates": [one._asdict() | {"bare_below": self.asked.least} for one in self.asked.under],
             "lacking": list(own.lacking),
             "unknown": list(own.unknown),
         }
@@ -117,7 +119,7 @@ def followed(
     told += [*markers.told, *found.told]
     motion = folder / MOTION
     motion.write_bytes(found.motion)
-    made = MarkerLog(motion, loads, found, log.name, tuple(told))
+    made = MarkerLog(motion, loads, found, log.name, asked, tuple(told))
     if (apart := made.rms(found.apart)) > FAR:
         far = f"markers are {1000 * apart:.3g} mm (root mean square) from those of the model"
         told.append(f"{far}; look at the unit, the names and the model's scale")
@@ -126,8 +128,8 @@ def followed(
 
 def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tuple[Load, ...], list[str]]:
     """Return the loads of the plates that are given, and what is told of them and the others."""
-    bodies = dict(asked.bodies)
-    missing = [number for number in bodies if number > len(recorded.plates)]
+    under = {one.number: one for one in asked.under}
+    missing = [number for number in under if number > len(recorded.plates)]
     if missing:
         raise LinkwiseError(
             f"{log}: --plate {missing[0]}: it has {len(recorded.plates)} plates, counted from 1"
@@ -137,7 +139,7 @@ def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tup
         size = np.linalg.norm(plate.force, axis=1)
         most = float(np.nan_to_num(size).max(initial=0.0))
         is_bare = size < asked.least
-        if number not in bodies:
+        if (given := under.get(number)) is None:
             if most > asked.least:
                 told.append(f"plate {number} bears up to {most:.4g} N and is left out; --plate {number}=BODY")
             continue
@@ -149,9 +151,7 @@ def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tup
             told.append(f"plate {number}: its forces point down, as on the plate, and are turned round")
             wrench = -wrench
         if is_bare.all():
-            told.append(
-                f"plate {number} never bears {asked.least:g} N: it loads {bodies[number]} with nothing"
-            )
+            told.append(f"plate {number} never bears {asked.least:g} N: it loads {given.body} with nothing")
         if gaps := np.flatnonzero(np.isnan(wrench).any(axis=1)).tolist():
             raise LinkwiseError(
                 f"{log}: plate {number}: {len(gaps)} of its {len(wrench)} samples have no numbers, first the"
@@ -162,13 +162,15 @@ def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tup
             lowpass(wrench, rate, Lowpass(asked.cutoff), flag="--loads-cutoff")
         found.append(
             Load(
-                f"plate {number}",
-                bodies[number],
+                given.name,
+                given.body,
                 wrench[:, :3],
                 wrench[:, 3:],
                 plate.place,
                 recorded.plate_time,
                 point_in="world",
+                source=log.name,
+                filtered=asked.cutoff,
             )
         )
     return tuple(found), told
