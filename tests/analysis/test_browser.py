@@ -447,6 +447,32 @@ def test_loads_are_causes_and_arrows(driver, tmp_path):
     assert driver.get_log("browser") == []
 
 
+def test_a_bone_leads_past_joints_that_carry_no_link_to_the_next_link(driver, tmp_path):
+    """A knee that slides on the thigh as it bends, whose slide weighs nothing, parts no leg."""
+    slide = urdf_text.joint("slide", "thigh", "between", type="prismatic", xyz="0 0 0")
+    knee = urdf_text.joint("knee", "between", "shank", xyz="0 0 -0.4")
+    hip = urdf_text.joint("hip", "pelvis", "thigh")
+    links = [*map(urdf_text.link, ("pelvis", "thigh", "shank")), '<link name="between"/>']
+    (tmp_path / "leg.urdf").write_text(urdf_text.robot(*links, hip, slide, knee))
+    write_package(generate(read_system(tmp_path / "leg.urdf"), ["numpy"]), tmp_path / "leg")
+    names = load_robot(tmp_path / "leg").joints
+    analysis = analyze(write_csv(tmp_path / "a.csv", smooth(60, 3), names), tmp_path / "leg")
+    (tmp_path / "report.html").write_text(report(analysis), encoding="utf-8")
+    opened(driver, (tmp_path / "report.html").as_uri())
+    choose(driver, "slider", 30)
+    dots, bones, dotted = driver.execute_script(
+        "const numbers = (names) => (one) => names.map((name) => Number(one.getAttribute(name)));"
+        "const all = (what) => [...document.querySelectorAll(`#stick ${what}`)];"
+        "return [all('circle').map(numbers(['cx', 'cy'])),"
+        " all('line[stroke-width=\"10\"]').map(numbers(['x1', 'y1', 'x2', 'y2'])),"
+        " all('line[stroke-dasharray=\"2 5\"]').length]"
+    )
+    thigh, shank = bones
+    assert thigh[2:] == shank[:2]
+    assert {tuple(thigh[:2]), tuple(shank[:2])} <= set(map(tuple, dots))
+    assert dotted == 1  # from the ground to the hip
+
+
 def test_a_robot_that_moves_in_a_plane_is_seen_from_its_side(driver, tmp_path):
     """A leg beside another, as walking is looked at; it may be turned all the same."""
     aside = {"rpy": "0 0 0", "axis": "0 1 0"}
