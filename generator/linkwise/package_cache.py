@@ -55,7 +55,10 @@ def kept_package(
     if Path(robot).is_dir() or not (is_description(robot) or Path(robot).is_file()):
         if options.given:
             flags = listed(f"--{name.replace('_', '-')}" for name in options.given)
-            raise LinkwiseError(f"{robot} is read already: leave {flags} out, or name the robot's own file")
+            raise LinkwiseError(
+                f"{robot} is read already: leave {flags} out, or generate it anew with"
+                " them, or name the robot's own file"
+            )
         return KeptPackage(Path(robot))
     backends = USUAL if backend is None else (backend,)
     try:

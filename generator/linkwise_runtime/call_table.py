@@ -27,6 +27,7 @@ from .share_uncertainty import Uncertainty
 TORQUE = "torque:joint"
 PASSIVE_KINDS = ("spring", "damping", "friction", "armature")
 IJK = ("joint", "link", "cause")
+SD = "standard deviation of the"
 TAU_IJK = "on the joint, through the link, by the motion of the cause"
 
 
@@ -41,7 +42,7 @@ def _by_order(
 
     unit: those by acceleration and by velocity; gravity: (name, unit); more: names of further axes
     """
-    extra = tuple(more.split())
+    extra, whose = tuple(more.split()), SD if meaning.startswith(SD) else "the"
     return (
         Quantity(name, (*IJK, *extra), unit[0], meaning, (ORDER, "acceleration")),
         Quantity(name, (*IJK, *extra), unit[1], meaning, (ORDER, "velocity")),
@@ -49,7 +50,7 @@ def _by_order(
             gravity[0],
             (*IJK[:2], *extra),
             gravity[1],
-            "the share of gravity, or of all that has a name of its own",
+            f"{whose} share of gravity, or of all that has a name of its own",
         ),
     )
 
@@ -63,7 +64,6 @@ PASSIVE = tuple(
     Quantity("passive_torque", ("joint",), TORQUE, "what the joint takes of its own", ("source", kind))
     for kind in PASSIVE_KINDS
 )
-SD = "standard deviation of the"
 """Beginning of what deviations mean."""
 DEVIATIONS = (
     *_one("partial_torque_sd", "joint link", TORQUE, f"{SD} torque on the joint, through the link"),

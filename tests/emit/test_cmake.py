@@ -161,6 +161,16 @@ def test_robots_are_compiled_as_their_headers_say(tool: str, built: dict[str, Pr
     assert [told.count(flag) for flag in flags] == [3] * 3  # one robot, as three libraries
 
 
+@needs_ninja
+def test_a_level_of_the_projects_own_flags_stays_and_else_it_is_a_quick_one(tmp_path: Path) -> None:
+    project = Project("ninja", tmp_path / "level")
+    write_project(project.source)
+    for flags, count in (("-DCMAKE_C_FLAGS=-Os", 0), ("-DCMAKE_C_FLAGS=-g", 3)):
+        done = project.configure(flags)
+        assert done.returncode == 0, done.stderr
+        assert (project.build / "build.ninja").read_text().count(" -O2") == count
+
+
 @each_generator
 def test_touching_nothing_builds_nothing_within_a_second(tool: str, built: dict[str, Project]) -> None:
     project = built[tool]

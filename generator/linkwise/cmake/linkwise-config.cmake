@@ -82,8 +82,12 @@ endfunction()
 # Flags under which gcc and clang make the most of the emitted C; what the header prints, less what is of one machine.
 function(_linkwise_compile_options target language)
     if(CMAKE_${language}_COMPILER_ID MATCHES "^(GNU|Clang|AppleClang)$" AND NOT MSVC)
+        # A toolchain's own level, such as a firmware's -Os, stays.
+        if(NOT CMAKE_${language}_FLAGS MATCHES "(^| )-O")
+            target_compile_options(${target} PRIVATE $<$<CONFIG:>:-O2>)
+        endif()
         target_compile_options(
-            ${target} PRIVATE $<$<CONFIG:>:-O2> -ftree-vectorize -fno-tree-slp-vectorize -ffp-contract=fast
+            ${target} PRIVATE -ftree-vectorize -fno-tree-slp-vectorize -ffp-contract=fast
         )
     endif()
 endfunction()

@@ -184,7 +184,7 @@ def _links(found: Identification) -> Iterator[str]:
 
 def _certain(found: Identification) -> Iterator[str]:
     yield from ("", "## How certain torques by link are", "")
-    told = without(found) or f"{FILE}: {note(found)}"
+    told = without(found) or f"In {FILE} {note(found)}"
     yield f"{markdown(told[0].upper() + told[1:])}."
     if told := doubt(found):
         yield ""

@@ -75,7 +75,8 @@ def _curves(panel: Any, result: AnalysisResult, joints: list[str]) -> Bands:
         label = f"{len(rest)} others" if at == 0 else None
         panel.plot(found.time[i], found.values[i], label=label, color=REST, linewidth=0.7, zorder=1.5)
     zero_line(panel)
-    panel.set_title("Power of each joint")
+    own = result.robot.structure.passive
+    panel.set_title("Power of each joint, its springs and friction too" if own else "Power of each joint")
     panel.set_ylabel("W")
     time_axis(panel, result)
     _legend(panel, "joint")

@@ -159,7 +159,13 @@ def shares(result: AnalysisResult, _: int) -> "Figure":
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 3))
     bars = _bars(left, every)
     _bars(right, movement)
-    out = f"{robot.potential} and loads" if result.loads else robot.potential
+    of_own = any(part.hatch == HATCHES["own"] for part in fixed)
+    kinds = [
+        robot.potential,
+        *(["loads"] if result.loads else []),
+        *(["springs and friction"] if of_own else []),
+    ]
+    out = " and ".join([*([", ".join(kinds[:-1])] if kinds[1:] else []), kinds[-1]])
     told = len(robot.share_names) == 1  # several are in the legend
     left.set_title(f"everything,\n{out} too" if told else "everything")
     right.set_title(f"the movement alone,\nwithout {out}" if told else "the movement alone")
