@@ -86,14 +86,14 @@ def test_the_wheel_has_the_generator_its_templates_examples_and_licence_and_noth
         assert wheel.read(f"{record}/licenses/LICENSE") == (ROOT / "LICENSE").read_bytes()
         metadata = wheel.read(f"{record}/METADATA").decode()
     assert "License-Expression: Apache-2.0 AND CC-BY-3.0\n" in metadata
-    of_the_runtime = ("LICENSE", "README.md", "pyproject.toml")  # its own wheel's
+    of_the_runtime = ("README.md", "pyproject.toml")  # its own wheel's
     kept = {f"linkwise_runtime/{name}" for name in of_the_runtime}
     generator = {name for name in files_below(ROOT / "generator") if "__pycache__" not in name} - kept
     templates = {f"linkwise/templates/{name}" for name in files_below(ROOT / "templates")}
     cases = {f"linkwise/examples/{name}" for name in files_below(ROOT / "examples/cases")}
     assert parts == generator | templates | cases
     assert {PurePosixPath(name).suffix for name in parts - cases} == {
-        *(".py", ".typed", ".cmake", ".toml", ".h", ".c", ".j2")
+        *(".py", ".typed", ".cmake", ".toml", ".h", ".c", ".j2", "")
     }
 
 

@@ -200,7 +200,7 @@ def test_options_of_reading_make_another_package_and_are_refused_for_one_that_is
     asked = ("analyze", walk(tmp_path), "--out", "out", "--lock", "ankle_angle=0")
     done = run_linkwise(*asked, "--robot", held, folder=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
-    assert "is read already: leave --lock out, or name the robot's own file" in done.stderr
+    assert "leave --lock out, or generate it anew with them, or name the robot's own file" in done.stderr
     done = run_linkwise(*asked, "--robot", KNEE, folder=tmp_path)
     assert (done.returncode, done.stderr.splitlines()[-1]) == (0, "left out: ankle_angle")
 

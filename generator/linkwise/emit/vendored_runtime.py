@@ -5,13 +5,14 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import resources
 
+from linkwise.package.own_files import LICENSE
 from linkwise.package.runtime_imports import RUNTIME, of_copy
 
 
 def with_runtime(files: Mapping[str, str]) -> dict[str, str]:
     """Return the files of a package, importing the copies that they get of the runtime's files."""
     asked = {module for path, text in files.items() if path.endswith(".py") for module in _asked(text)}
-    copies = {f"{RUNTIME}/{path}": _text(path) for path in sorted(_closure(asked))}
+    copies = {f"{RUNTIME}/{path}": _text(path) for path in sorted({LICENSE, *_closure(asked)})}
     return {path: of_copy(path, text) for path, text in files.items()} | copies
 
 
