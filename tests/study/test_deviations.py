@@ -247,8 +247,8 @@ def test_a_study_without_deviations_has_no_columns_of_them_and_draws_none(tmp_pa
     found = run_study(file, tmp_path / "out", Here())
     (told,) = found.warnings
     assert told == (
-        "[[figure]]: 'hatched' is 'mean', and no curve has deviations; give all trials the key 'uncertain',"
-        " or leave it out"
+        "figure 2, torques, is not drawn: [[figure]]: 'hatched' is 'mean', and no curve has deviations; give"
+        " all trials the key 'uncertain', or leave it out"
     )
     assert not [name for name in curve_table(tmp_path / "out").columns if "sd_" in name]
     assert json.loads((tmp_path / "out/study.json").read_text())["uncertain"] == {}
