@@ -149,7 +149,7 @@ bench: $(READY)
 	$(BIN)/python tests/benchmarks/growth.py --out out/bench
 	$(BIN)/python tests/benchmarks/bench_report.py
 	$(BIN)/python tests/benchmarks/bench_analysis.py
-	$(BIN)/python tests/benchmarks/bench_motion.py million out/planar3
+	$(BIN)/python tests/benchmarks/bench_motion.py million generated/planar3
 	$(BIN)/python tests/benchmarks/bench_motion.py ten-hours generated/torso
 	$(BIN)/python tests/benchmarks/bench_study.py
 	$(BIN)/python tests/benchmarks/bench_energies.py
