@@ -9,6 +9,9 @@ from speed.emitted import TYPES, Figure
 from speed.limits import Mix
 from speed.pinocchio_peer import Peer
 
+LARGEST_WRITTEN = 2**30
+"""Bytes up to which writing is timed: that of more is as quick, and would need twice the memory."""
+
 
 @dataclass
 class Results:
@@ -51,7 +54,7 @@ class Results:
         """Sizes whose writing speed is wanted."""
         for figure in self.figures:
             if figure.batch > 1 and figure.through in ("C", "native"):
-                yield self.output_bytes(figure)
+                yield min(self.output_bytes(figure), LARGEST_WRITTEN)
 
     def arithmetic(self, figure: Figure) -> float | None:
         """Nanoseconds a sample that additions and multiplications take at least, sines apart."""
@@ -62,7 +65,7 @@ class Results:
     def writing(self, figure: Figure, way: str) -> float:
         """Nanoseconds a sample that writing the results takes at least, one of stream, warm and fresh."""
         total = self.output_bytes(figure)
-        return total / figure.batch / self.limits[f"{way}_{total}"]
+        return total / figure.batch / self.limits[f"{way}_{min(total, LARGEST_WRITTEN)}"]
 
     def limit(self, figure: Figure) -> float | None:
         """Nanoseconds a sample at the lower of the two limits, arithmetic and memory."""
