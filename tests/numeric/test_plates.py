@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers.answers import relative_error
 from linkwise.analysis.markers.c3d import read_c3d
-from linkwise.analysis.markers.force_plates import PlateWrench
+from linkwise.analysis.markers.force_plates import PlateWrench, plate_wrenches
 from linkwise.errors import LinkwiseError
 
 ezc3d: Any = pytest.importorskip("ezc3d")
@@ -135,3 +135,12 @@ def test_units_of_a_plate_are_refused_where_they_are_unknown_and_told_where_they
     plate = plate_of(tmp_path, 2, values, [""] * 6, origin)
     assert relative_error(plate.moment, moment) < 1e-6
     assert plate.told == ("plate 1: the unit of a force is not said; N and N times POINT:UNITS are taken",)
+
+
+def test_a_file_that_says_no_units_at_all_is_read_and_another_type_of_plate_is_refused() -> None:
+    turned = np.eye(3)
+    assert list(plate_wrenches({"parameters": {}, "data": {}}, 1.0, turned)) == []
+    plate = {"TYPE": {"value": [5]}, "CHANNEL": {"value": np.ones((6, 1))}}
+    file = {"parameters": {"FORCE_PLATFORM": plate}, "data": {"platform": [{}]}}
+    with pytest.raises(LinkwiseError, match="plate 1 is of type 5; types 1, 2, 3, 4 are read"):
+        list(plate_wrenches(file, 1.0, turned))

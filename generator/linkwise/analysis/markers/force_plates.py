@@ -42,15 +42,19 @@ def plate_wrenches(file: Any, metres: float, turn: Array) -> Iterator[PlateWrenc
 
     file: as ezc3d reads it; metres: its unit of places; turn (3, 3): from its axes to the model's
 
-    Raises LinkwiseError for channels in other units than N, N·m and those of lengths, or parts of these.
+    Raises LinkwiseError for other types of plates, and for channels in other units than N, N·m and those of
+    lengths, or parts of these.
     """
     group = file["parameters"].get("FORCE_PLATFORM", {})
     kinds = group.get("TYPE", {}).get("value", ())
-    units = [str(unit).strip() for unit in file["parameters"]["ANALOG"]["UNITS"]["value"]]
+    said = file["parameters"].get("ANALOG", {}).get("UNITS", {}).get("value", ())
+    units = [str(unit).strip() for unit in said]
     for number, given in enumerate(file["data"].get("platform", ()), 1):
+        if (kind := int(kinds[number - 1])) not in CHANNELS:
+            raise LinkwiseError(f"plate {number} is of type {kind}; types {listed(CHANNELS)} are read")
         at = np.asarray(group["CHANNEL"]["value"])[:, number - 1].astype(int) - 1
         own = [units[channel] if channel < len(units) else "" for channel in at]
-        yield _wrench(number, given, int(kinds[number - 1]), own, metres, turn)
+        yield _wrench(number, given, kind, own, metres, turn)
 
 
 def _wrench(
