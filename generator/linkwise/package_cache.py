@@ -8,12 +8,15 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from linkwise_runtime.dynamics import Dynamics
 from linkwise_runtime.native.cache import ELSEWHERE, cache_directory, locked
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import listed
 from linkwise.generator_fingerprint import generator_files
+from linkwise.package.load import import_package
 from linkwise.package.manifest import FILE, is_too_large
 from linkwise.package.write import write_package
 from linkwise.pipeline import plan, read_system
@@ -38,6 +41,14 @@ class KeptPackage:
 
     def __fspath__(self) -> str:
         return str(self.directory)
+
+    def load(self, *args: Any, **options: Any) -> Dynamics:
+        """Return the robot on a back end, as the package's own `load` does with these arguments.
+
+        Raises LinkwiseError for a damaged manifest, ImportError for files that differ from those it lists.
+        """
+        robot: Dynamics = import_package(self.directory).load(*args, **options)
+        return robot
 
 
 def kept_package(

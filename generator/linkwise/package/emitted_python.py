@@ -74,7 +74,8 @@ LOADING = Grammar(
     imports=_table(
         "typing: TYPE_CHECKING Any Literal overload;collections.abc: Callable Iterable Mapping"
         ";pathlib: Path;names: ROBOT;tree: RULE;forms: LINKS;energies: LAGRANGIANS"
-        ";RUN.version: require;RUN.targets: FrameImpedance Grip Natural Target;RUN.dynamics: Dynamics"
+        ";RUN.version: require require_as_imported;RUN.targets: FrameImpedance Grip Natural Target"
+        ";RUN.dynamics: Dynamics"
         ";RUN.arrays.backend: ArrayBackend refuse_choice refuse_learning"
         ";RUN.structure: Layout;RUN.rule.joint_tree: Bodies"
         ";RUN.quantities: AppliedLoad Coefficients Contact GradientPropagation InducedAccelerations Packed"
@@ -94,8 +95,8 @@ LOADING = Grammar(
     ),
 )
 """Grammar of the package's __init__.py."""
-OWN_C = "Path(__file__).parent / 'c'"
-"""Expression for the folder of the C that it compiles."""
+OWN_PLACES = ("Path(__file__).parent / 'c'", "require_as_imported(ROBOT, __file__)")
+"""Expressions with its own place: for the folder of the C that it compiles, and to be found as imported."""
 MAKING = ("_MAKERS[backend]", "(made.face or Dynamics)", "made.face or Dynamics")
 """Further expressions that it calls: each of them is named in it."""
 OF_LIBRARY = FUNCTIONS | {"where", "full_like"}
@@ -113,14 +114,14 @@ def foreign_python(path: str, text: bytes) -> Iterator[str]:
     grammar = LOADING if path == "__init__.py" else ARITHMETIC
     nodes = list(ast.walk(ast.parse(text)))
     known = ModuleNames.of(nodes, grammar)
-    own_c = {id(part) for node in nodes if _is_own_c(node) for part in ast.walk(node)}
+    own = {id(part) for node in nodes if _is_own_place(node) for part in ast.walk(node)}
     for node in nodes:
-        if (grammar is not LOADING or id(node) not in own_c) and (told := _beside(node, grammar, known)):
+        if (grammar is not LOADING or id(node) not in own) and (told := _beside(node, grammar, known)):
             yield f"line {getattr(node, 'lineno', 1)} {told}, where linkwise writes {ORDINARY} alone"
 
 
-def _is_own_c(node: ast.AST) -> bool:
-    return isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div) and ast.unparse(node) == OWN_C
+def _is_own_place(node: ast.AST) -> bool:
+    return isinstance(node, ast.BinOp | ast.Call) and ast.unparse(node) in OWN_PLACES
 
 
 @dataclass(frozen=True)
@@ -218,7 +219,7 @@ def _attribute(node: ast.Attribute, grammar: Grammar, known: ModuleNames) -> str
 
 def _arithmetic(node: ast.BinOp, grammar: Grammar, known: ModuleNames) -> str:
     operands, operator = (node.left, node.right), node.op
-    # A division of a path leads to other files; OWN_C alone is passed over.
+    # A division of a path leads to other files; those of OWN_PLACES are passed over.
     if isinstance(operator, ast.Div) and grammar is LOADING:
         return "does what is no arithmetic"
     several = not isinstance(operator, ast.Div) and any(map(_is_several, operands))
