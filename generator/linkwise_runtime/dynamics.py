@@ -310,7 +310,7 @@ class Dynamics(CertaintyCalls):
         """Return index j of a link by number from 0 or by name; raise ValueError for any other."""
         return self.structure.link_index(link)
 
-    def mass_matrix(self, q: Array, by_link: bool = False, out: Array | None = None) -> Array:
+    def mass_matrix(self, q: Array, *, by_link: bool = False, out: Array | None = None) -> Array:
         """Return the mass matrix M_ik = sum_j c2_ijk, shape (..., n, n); by link c2_ijk, (..., n, N, n).
 
         In kg m^2, kg m or kg, where none, one or both of i and k are prismatic. Raises ValueError for links
@@ -324,7 +324,9 @@ class Dynamics(CertaintyCalls):
         mass: Array = self._call("mass_matrix_by_link" if by_link else "mass_matrix", (q,), out)
         return mass
 
-    def coriolis_matrix(self, q: Array, qd: Array, by_link: bool = False, out: Array | None = None) -> Array:
+    def coriolis_matrix(
+        self, q: Array, qd: Array, *, by_link: bool = False, out: Array | None = None
+    ) -> Array:
         """Return the Coriolis matrix C_ik = sum_j c1_ijk, shape (..., n, n); by link c1_ijk, (..., n, N, n).
 
         C qd is the velocity force; c1 is that of the closing convention. For rigid links C is the matrix of
@@ -335,7 +337,7 @@ class Dynamics(CertaintyCalls):
         )
         return coriolis
 
-    def gravity_torque(self, q: Array, by_link: bool = False, out: Array | None = None) -> Array:
+    def gravity_torque(self, q: Array, *, by_link: bool = False, out: Array | None = None) -> Array:
         """Return g_i = sum_j g_ij at rest, (..., n); by link (..., n, N).
 
         It is the torque of gravity, or of all shares with names of links that were written by hand.
@@ -386,7 +388,7 @@ class Dynamics(CertaintyCalls):
         answer: Power[Array] = self._call("power", (q, qd, qdd), out)
         return answer
 
-    def christoffel(self, q: Array, by_link: bool = False, out: Array | None = None) -> Array:
+    def christoffel(self, q: Array, *, by_link: bool = False, out: Array | None = None) -> Array:
         """Return Gamma_ikl, the velocity share of every pair of motions, shape (..., n, n, n).
 
         By link, the shape is (..., n, N, n, n). sum_kl Gamma_ikl qd_k qd_l is the velocity force: Gamma_ikk

@@ -158,7 +158,8 @@ def test_symbolic_parameters_default_to_the_robots_numbers(
 def test_unknown_parameter_and_backend_are_named(package_of: Callable[[str], ModuleType]) -> None:
     package = package_of("planar3 symbolic")
     with pytest.raises(
-        ValueError, match=r"no parameter 'm_9'; near it are m_1, m_2, m_3, l_1, r_1, I_1, and `param"
+        ValueError,
+        match=r"no parameter 'm_9' in any number; near it are m_1, m_2, m_3, l_1, r_1, I_1, and `",
     ):
         package.load("numpy", parameters={"m_9": 1.0})
     with pytest.raises(ValueError, match=r"no back end 'jax'.*choose one of numpy, torch, autograd"):
@@ -280,3 +281,12 @@ def test_answers_are_the_same_in_every_grad_mode(
     recorded = function(*leaves)
     assert recorded.requires_grad
     assert relative_error(recorded.detach(), expected) <= 1e-14
+
+
+@pytest.mark.parametrize("call", ["mass_matrix", "gravity_torque", "christoffel", "coriolis_matrix"])
+def test_a_velocity_too_many_is_not_taken_for_an_option(
+    call: str, package_of: Callable[[str], ModuleType]
+) -> None:
+    robot, motion = package_of("planar3").load("numpy"), [[0.1, 0.2, 0.3]] * 3
+    with pytest.raises(TypeError, match="positional arguments but"):
+        getattr(robot, call)(*motion)
