@@ -124,7 +124,8 @@ def precision(given: Mapping[str, object], read: Mapping[str, Numbers]) -> str:
     """
     for name, a in read.items():
         if _dtype(a) not in (*FLOATS, *INTEGERS):
-            raise TypeError(f"{name} has dtype {_dtype(a)}; give float32, float64 or integers")
+            symbols = ", such as float(x) of a number x of SymPy" if _dtype(a) == "object" else ""
+            raise TypeError(f"{name} has dtype {_dtype(a)}; give float32, float64 or integers{symbols}")
     own = {_dtype(a) for name, a in read.items() if hasattr(given[name], "dtype")}
     return "float32" if own.intersection(FLOATS) == {"float32"} else "float64"
 

@@ -155,7 +155,8 @@ def _unknown(name: str, own: Mapping[str, float]) -> str:
             "--parameters symbolic"
         )
     known = choice(name, own, "parameters")
-    return f"no parameter {short(name)}; {'' if len(own) > MOST_NAMES else 'the parameters are '}{known}"
+    listed = "" if len(own) > MOST_NAMES else "the parameters are "
+    return f"no parameter {short(name)} in any number; {listed}{known}"
 
 
 def _is_tensor(value: object) -> "TypeGuard[Tensor]":

@@ -54,6 +54,13 @@ def test_nothing_propagates_from_a_joint_at_rest(simulated):
     assert np.abs(simulated.partial_torque[rests, 0, 1]).min() > 1.0
 
 
+def test_a_result_is_told_in_a_line(simulated):
+    assert repr(simulated) == (
+        f"<analysis of simulated.csv: {len(simulated.time)} samples, 3 joints, 3 links, "
+        f"{len(simulated.columns)} columns>"
+    )
+
+
 def test_columns_by_name_and_totals(simulated):
     np.testing.assert_array_equal(simulated["tau/joint1/link2"], simulated.partial_torque[:, 0, 1])
     np.testing.assert_array_equal(

@@ -67,6 +67,11 @@ def test_the_command_prints_bibtex(tmp_path: Path) -> None:
     assert done.stdout.count("{") == done.stdout.count("}")
 
 
+def test_without_a_result_it_says_how_linkwise_is_cited(tmp_path: Path) -> None:
+    done = run_linkwise("cite", folder=tmp_path)
+    assert re.findall(r"^@\w+\{(\w+),$", done.stdout, re.MULTILINE) == ALWAYS
+
+
 def test_an_entry_has_its_fields_and_why_it_is_there() -> None:
     made = Citation("k", "book", {"title": "T"}, "because").bibtex
     assert made == "% because\n@book{k,\n  title = {T},\n}"

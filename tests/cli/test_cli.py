@@ -166,6 +166,7 @@ def test_inspect_names_what_was_merged_locked_and_ignored(linkwise: Run) -> None
 def test_inspect_prints_a_page_first_and_all_on_request(linkwise: Run) -> None:
     page = linkwise("inspect", "planar40").stdout.splitlines()
     assert page[:2] == ["planar40: 40 joints, 40 links, 24 kg that move", "base: fixed; on the ground: base"]
+    assert page[2] == "gravity: (0, -9.80665, 0) m/s²"
     assert len(page) <= 40
     assert max(map(len, page)) <= 110
     assert "  3  link3  (0.6 kg; joint1, joint2, joint3)" in page
@@ -174,6 +175,20 @@ def test_inspect_prints_a_page_first_and_all_on_request(linkwise: Run) -> None:
     whole = linkwise("inspect", "planar40", "--details").stdout.splitlines()
     assert "  40  joint40 [rad]" in whole
     assert any(line.startswith("  m_40 = 0.6") for line in whole)
+
+
+def test_inspect_tells_gravity_that_loads_no_joint_and_angles_that_look_like_degrees(
+    linkwise: Run, tmp_path: Path
+) -> None:
+    gravity = "gravity: (0, 0, -9.81) m/s²"
+    for kind, told in (("revolute", f"{gravity}, which loads no joint"), ("prismatic", gravity)):
+        (tmp_path / f"{kind}.toml").write_text(arm(type=f'"{kind}"'))
+        assert told in linkwise("inspect", tmp_path / f"{kind}.toml").stdout.splitlines()
+    (tmp_path / "turned.toml").write_text(arm() + "rpy = [0, 0, 90]\nlower = -180\nupper = 3.1\n")
+    assert (
+        "doubtful: joint 'hinge', range of 'hinge'; angles that look like degrees, taken as radians"
+        in linkwise("inspect", tmp_path / "turned.toml").stdout.splitlines()
+    )
 
 
 def arm(**changes: str) -> str:
@@ -491,7 +506,7 @@ def test_inspect_shows_a_robot_that_generate_refuses_for_a_body_that_cannot_be(
     assert "\nunphysical\n  rod negative mass -2 kg" in shown.stdout
     page = linkwise("inspect", "negative.toml").stdout
     assert f"\nrefused by generate: negative.toml: {reason}\n" in page
-    assert "\nunphysical: rod negative mass -2 kg; accepted though physically" in page
+    assert "\nunphysical: rod negative mass -2 kg; refused without --allow-unphysical" in page
     assert json.loads(linkwise("inspect", "negative.toml", "--json").stdout)["refused"].endswith(reason)
     accepted = linkwise("inspect", "negative.toml", "--allow-unphysical", "--json")
     assert json.loads(accepted.stdout)["refused"] == ""

@@ -366,6 +366,11 @@ FILES = {
         GOOD + "k = sp.Symbol('k')\nparameters = {}\nparameters[k] = x.q",
         "line 8: parameter k is a constant, and its value x depends on x; write that in",
     ),
+    "a time that is another symbol to SymPy": (
+        HEAD + "del x\nt, time = sp.symbols('t', real=True), sp.Symbol('t')\nu = sp.Function('x')(time)\n"
+        "coordinates = {\n    u: 'm',\n}\nlinks = [LinkEnergy('a', u.diff(t) ** 2, u**2)]",
+        "line 5: `t` is another symbol than the t of which x(t) is a function, as their assumptions differ",
+    ),
     "two links of one name": (
         GOOD + "links += [LinkEnergy('a', x.qd**2)]",
         "line 6: the link name 'a' is used twice",
@@ -406,6 +411,31 @@ def test_defect_of_a_python_file_is_named(case: str, tmp_path: Path) -> None:
     with pytest.raises(LinkwiseError) as caught:
         read_system(tmp_path / "bad.py")
     assert str(caught.value).startswith(f"{tmp_path / 'bad.py'}: {message}")
+
+
+@pytest.mark.parametrize(
+    ("kinetic", "told"),
+    [
+        (sp.Symbol("m") * X.qd**2 * (1 + X.q**2), []),
+        (sp.Symbol("m") * X.q**2, [("odd", "kinetic energies without any velocity")]),
+        (-sp.Symbol("m") * X.qd**2, [("odd", "kinetic energies that are negative")]),
+        (sp.S.Zero, []),
+    ],
+)
+@pytest.mark.parametrize("symbolic", [False, True])
+def test_a_kinetic_energy_that_is_probably_a_mistake_is_told(
+    kinetic: sp.Expr, told: list[tuple[str, str]], symbolic: bool
+) -> None:
+    links = [LinkEnergy("disc", X.qd**2), LinkEnergy("odd", kinetic, X.q**2)]
+    notes = energy_system("puck", [X], links, {sp.Symbol("m"): 2.0}, symbolic).notes
+    assert [(note.subject, note.effect.partition(",")[0]) for note in notes] == told
+
+
+def test_a_system_is_told_in_a_line_and_its_statics_by_a_note() -> None:
+    system = energy_system("puck", [X], [LinkEnergy("spring", 0, X.q**2)])
+    assert repr(system) == "<energies of puck: coordinates x; links spring>"
+    (note,) = system.notes
+    assert (note.subject, note.effect.partition(",")[0]) == ("puck", "no kinetic energy")
 
 
 @pytest.mark.parametrize(

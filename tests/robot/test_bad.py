@@ -45,7 +45,7 @@ BAD = {
     ),
     "one moment": (
         robot(link("a"), moments(0, 0, 0.6), AB),
-        "breaks the triangle inequality (0.6 > 0 + 0 kg·m²); correct it",
+        "(0.6 > 0 + 0 kg·m²), as it has one moment alone: a thin rod along x has yy = zz; correct it",
     ),
     "long digits": (robot(link("a"), link("b", HUGE), AB), "link 'b' has NaN or infinity in its mass"),
     "longer digits": (

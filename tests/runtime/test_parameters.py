@@ -181,10 +181,13 @@ REFUSED = {
     "tensor of samples": ({"m_upper": torch.tensor([1.0, -1.0])}, "link 'upper' would have a negative mass"),
     "nan": ({"c_fore_x": float("nan")}, "parameter 'c_fore_x' is NaN or infinite; give a finite number"),
     "nan tensor": ({"c_fore_x": torch.tensor(torch.inf)}, "parameter 'c_fore_x' is NaN or infinite"),
-    "near": ({"m_uper": 1.0}, "no parameter 'm_uper'; near it are m_upper, .*and `parameters` has all 24"),
+    "near": (
+        {"m_uper": 1.0},
+        "no parameter 'm_uper' in any number; near it are m_upper, .*and `parameters` has all 24",
+    ),
     "far": (
         {"zzz": 1.0},
-        "no parameter 'zzz'; near it are I_fore_zz, I_upper_zz, .*and `parameters` has all 24",
+        "no parameter 'zzz' in any number; near it are I_fore_zz, I_upper_zz, .*and `parameters` has all 24",
     ),
     "shapes": (
         {"m_upper": np.ones(3), "I_upper_xx": np.full(2, 0.01)},

@@ -53,7 +53,7 @@ def test_packed_values_are_listed_link_by_link_along_their_paths() -> None:
 def test_given_parameters_replace_built_in_ones_by_name() -> None:
     assert FORK.values(None) == {"m": 0.5}
     assert FORK.values({"m": 2.0}) == {"m": 2.0}
-    with pytest.raises(ValueError, match="no parameter 'k'; the parameters are m"):
+    with pytest.raises(ValueError, match="no parameter 'k' in any number; the parameters are m"):
         FORK.values({"k": 1.0})
     with pytest.raises(ValueError, match="no parameter 'k': this package has no parameters; generate it"):
         replace(FORK, parameters={}).values({"k": 1.0})

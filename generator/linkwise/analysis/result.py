@@ -22,7 +22,7 @@ from linkwise.analysis.settings import Processing, Reading
 from linkwise.analysis.whole_movement import WholeMovement, not_asked_for
 from linkwise.arrays import Array, Index
 from linkwise.errors import LinkwiseError
-from linkwise.escape import listed, printable
+from linkwise.escape import listed, printable, short
 
 PART_BYTES, LEAST = 4 << 20, 256
 """Approximate size in bytes of a part of a result, and its fewest samples."""
@@ -69,6 +69,10 @@ class AnalysisResult(WholeMovement):
     """Joints, sources and windows of a trace, as the record has them; None without."""
     markers: MarkerLog | None = None
     """Recording of markers that the log was made of, with its errors; None for other logs."""
+
+    def __repr__(self) -> str:
+        size = f"{len(self.robot.joints)} joints, {len(self.robot.links)} links, {len(self.rows)} columns"
+        return f"<analysis of {printable(short(self.source))}: {self.total} samples, {size}>"
 
     def __getitem__(self, name: str) -> Array:
         """Return a column (S,) by its name, as in the Parquet file: "tau/joint1/link2".

@@ -14,11 +14,12 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def cite(
     result: Annotated[
-        Path, typer.Argument(help="Folder that analyze, study or generate wrote, or its record")
-    ],
+        Path | None,
+        typer.Argument(help="Folder that analyze, study or generate wrote, or its record"),
+    ] = None,
 ) -> None:
-    """Print the references of what a result used, as BibTeX."""
-    path, record = record_of(result)
-    print(f"% {printable(str(path))}")
+    """Print the references of what a result used, as BibTeX; without one those of linkwise itself."""
+    path, record = (None, {}) if result is None else record_of(result)
+    print("% of every result" if path is None else f"% {printable(str(path))}")
     for citation in {one.key: one for one in citations(record)}.values():
         print(f"\n{citation.bibtex}")

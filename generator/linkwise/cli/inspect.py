@@ -11,6 +11,7 @@ from linkwise_runtime.structure import IMPOSED_MOTION
 from linkwise import pipeline
 from linkwise.cli import Json, counted
 from linkwise.cli.flags import RobotName, is_given, takes, tell_run
+from linkwise.cli.inspect_gravity import gravity_line, is_loaded
 from linkwise.cli.inspect_identifiable import Identifying, identified, identified_text
 from linkwise.cli.inspect_page import SHARES, SUBJECTS, page, varying
 from linkwise.errors import LinkwiseError
@@ -25,6 +26,9 @@ LESS = "…"
 """Text in place of an end that a joint does not have."""
 ALLOWING = "--allow-unphysical"
 """Flag that is named wherever a body that cannot exist is refused."""
+
+REFUSED = f"refused without {ALLOWING}"
+"""Effect of such a body, where it was refused."""
 
 app = typer.Typer(add_completion=False)
 
@@ -84,12 +88,15 @@ def inspection(system: System, details: bool = False, refused: str = "") -> dict
     """
     tree = joint_tree(system)
     notes = system.notes
+    if refused:  # so that nothing was accepted
+        notes = tuple(replace(note, effect=REFUSED) if note.kind == "unphysical" else note for note in notes)
     if not details:
         others = (note for note in notes if note.kind not in ("left out", "passive"))
         notes = (*others, *kept_apart(notes), *left_out(notes))
     mass = {tree.link_name(j): link.mass for j, link in enumerate(tree.links)} if tree else {}
     return {
         "name": system.name,
+        **({"gravity": list(tree.gravity), "gravity_loads": is_loaded(tree)} if tree else {}),
         "joints": [asdict(joint) for joint in joint_entries(system)],
         "links": [
             {
@@ -207,6 +214,8 @@ def table(data: dict[str, Any]) -> str:
     lines = [
         f"{data['name']}: {counted(len(data['joints']), 'joint')}, {counted(len(data['links']), 'link')}"
     ]
+    if "gravity" in data:
+        lines.append(gravity_line(data))
     if data["refused"]:
         lines += ["", f"refused by generate: {data['refused']}"]
     lines += ["", "joints"]

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from linkwise.cli import counted
+from linkwise.cli.inspect_gravity import gravity_line
 from linkwise.escape import listed, printable, short
 
 ROWS = 8
@@ -34,6 +35,8 @@ def page(
         lines.append(
             f"base: fixed; on the ground: {listed(ground, SUBJECTS)}" if ground else "base: floating"
         )
+    if "gravity" in data:
+        lines.append(gravity_line(data))
     if data["refused"]:
         lines.append(f"refused by generate: {data['refused']}")
     lines += _remarks(note for note in data["notes"] if note["effect"])

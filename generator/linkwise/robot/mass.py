@@ -109,5 +109,6 @@ def _fault(body: Body) -> str:
     if high > low + middle + TRIANGLE * high:
         numbers = f"{high:.4g} > {low:.4g} + {middle:.4g} kg·m²"
         excess = f" by {100 * (high / (low + middle) - 1):.2g} %" if low + middle else ""
-        return f"{BREAKS_TRIANGLE} ({numbers}){excess}"
+        single = "" if low + middle else ", as it has one moment alone: a thin rod along x has yy = zz"
+        return f"{BREAKS_TRIANGLE} ({numbers}){excess}{single}"
     return ""

@@ -1,7 +1,7 @@
 """Notes on what was done with the content of a robot's file, and what of it affects the torques."""
 
 from collections import Counter
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,9 +15,13 @@ LEAST = "constraints that hold something twice, so that their forces are shared 
 IMPOSSIBLE = "accepted though physically impossible"
 WARNED = "MuJoCo warns"
 TURNS = "singular at a pitch of ±90°"
+WINDING = "angles that look like degrees, taken as radians"
 FREE = "free to fall, as no joint of the file holds it to the world (--base fixed holds it)"
 FLOATS = f"six coordinates without any contact forces, {TURNS}"
 
+TURN = 6.3
+"""A full turn in rad, and some rounding."""
+MOST_DEGREES = 720.0
 SHOWN = 5
 """Most subjects that one line of effects names."""
 LONGEST_ITEM = 150
@@ -50,6 +54,7 @@ class Note:
         "promoted",
         "constraint",
         "redundant",
+        "doubtful",
     ]
     subject: str
     detail: str = ""
@@ -96,6 +101,21 @@ def effects(notes: Iterable[Note], every: bool = False) -> tuple[str, ...]:
     if every:
         return tuple(f"{effect}: {item}" for effect, found in subjects.items() for item in found)
     return tuple(f"{effect}: {listed(found, SHOWN, LONGEST_ITEM)}" for effect, found in subjects.items())
+
+
+def winding(turns: Mapping[str, Sequence[float]], ends: Mapping[str, Sequence[float]]) -> tuple[Note, ...]:
+    """Return a note for each place in a file whose angles, which are radians there, look like degrees.
+
+    turns: angles of poses, none of which needs more than a full turn; ends: ranges of hinges, of which whole
+    fives from two turns to a robot's 720 degrees are told
+    """
+    places = [place for place, angles in turns.items() if max(map(abs, angles)) > TURN]
+    places += [
+        place
+        for place, angles in ends.items()
+        if any(2 * TURN < abs(angle) <= MOST_DEGREES and angle % 5 == 0 for angle in angles)
+    ]
+    return tuple(Note("doubtful", place, effect=WINDING) for place in places)
 
 
 def left_out(notes: Iterable[Note]) -> tuple[Note, ...]:

@@ -2,11 +2,14 @@
 
 import ast
 import runpy
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from traceback import walk_tb
 from types import FrameType, ModuleType
 from typing import Any
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
 
 from linkwise.errors import LinkwiseError
 from linkwise.escape import short
@@ -61,11 +64,13 @@ def _system(path: Path, scope: Mapping[str, Any], symbolic: bool, as_made: bool)
     ):
         kinds = ", ".join(f"linkwise.{kind.__name__}" for kind in BODIES)
         raise LinkwiseError(f"the file must define 'links', a list of linkwise.LinkEnergy, or of {kinds}")
-    if not isinstance(scope.get("coordinates"), (list, tuple, Mapping)):
+    coordinates = scope.get("coordinates")
+    if not isinstance(coordinates, (list, tuple, Mapping)):
         raise LinkwiseError("the file must define 'coordinates', a list of linkwise.Coordinate")
+    _refuse_other_times(coordinates, scope)
     return energy_system(
         scope.get("name", path.stem),
-        scope["coordinates"],
+        coordinates,
         links,
         scope.get("parameters"),
         symbolic,
@@ -74,6 +79,22 @@ def _system(path: Path, scope: Mapping[str, Any], symbolic: bool, as_made: bool)
         scope.get("constraints"),
         scope.get("independent", ()),
     )
+
+
+def _refuse_other_times(coordinates: Iterable[object], scope: Mapping[str, Any]) -> None:
+    """Raise LinkwiseError for a symbol called like the coordinates' time that is another to SymPy.
+
+    Derivatives by it are zero, and with them whole kinetic energies.
+    """
+    for function in coordinates:
+        for time in function.args if isinstance(function, AppliedUndef) else ():
+            for name, other in scope.items():
+                if isinstance(other, sp.Symbol) and other.name == str(time) and other != time:
+                    raise LinkwiseError(
+                        f"`{name}` is another symbol than the {time} of which {function} is a function, as "
+                        f"their assumptions differ: {function}.diff({name}) is 0; give that of {function}, "
+                        "sympy.physics.mechanics.dynamicsymbols._t where dynamicsymbols made it"
+                    )
 
 
 def _refuse_doubles(source: bytes) -> None:

@@ -13,6 +13,7 @@ from linkwise_runtime.html_tables import joint_table, page_part, table
 from linkwise_runtime.structure import GRAVITY
 
 from linkwise.errors import LinkwiseError
+from linkwise.escape import listed, short
 from linkwise.robot.notes import Note
 from linkwise.robot.robot import Coordinate, Joint, Mat3, Robot, Scalar, Vec3
 
@@ -214,6 +215,10 @@ class EnergySystem:
     def share_names(self) -> tuple[str, ...]:
         """Names of the shares of torques, in the order of their first link."""
         return tuple(dict.fromkeys(share.name for link in self.links for share in link.shares))
+
+    def __repr__(self) -> str:
+        names = listed([c.name for c in self.coordinates]), listed(self.link_names)
+        return f"<energies of {short(self.name)}: coordinates {names[0]}; links {names[1]}>"
 
     def _repr_html_(self) -> str:
         """Return the HTML that a notebook shows: coordinates, and links with the coordinates moving them."""

@@ -12,6 +12,7 @@ from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed, short
 from linkwise.robot.coordinates import check_joints
 from linkwise.robot.robot import Coordinate, unusable
+from linkwise.symbolic.doubtful_energies import doubts
 from linkwise.symbolic.energy_terms import GivenTerms, sorted_terms, symbols_of, written_terms
 from linkwise.symbolic.moving_bodies import BODIES, Particle, RigidBody
 from linkwise.symbolic.system import EnergySystem, LinkEnergy, LinkTerms, WrittenConstraint
@@ -85,6 +86,7 @@ def energy_system(
         request=request,
         time=motion.time if motion.time in varying else None,
         inputs=tuple(symbol for symbol in motion.inputs if symbol in varying),
+        notes=tuple(doubts(name, checked, motion, numbers)),
         constraints=held,
         requested_independent=_requested(independent, motion, bool(held)),
     )

@@ -9,6 +9,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
 from linkwise.robot.joint_types import SINGLE
+from linkwise.robot.notes import Note, winding
 from linkwise.robot.readers.toml.constraints import with_constraints
 from linkwise.robot.readers.toml.table import TomlTable, named_parameters, tables
 from linkwise.robot.robot import LIMITS, Limits, Mat3, Passive
@@ -29,12 +30,14 @@ def read_toml(path: Path) -> Description:
     bodies = tuple(_body(item, parameters) for item in tables(data, "link"))
     if base not in {body.name for body in bodies}:
         bodies = (Body(base), *bodies)
+    joints = tables(data, "joint")
     described = Description(
         top.text("name", path.stem),
         bodies,
-        tuple(_connection(item, parameters) for item in tables(data, "joint")),
+        tuple(_connection(item, parameters) for item in joints),
         top.vector("gravity", [0.0, 0.0, -9.81]),
         tuple(parameters.items()),
+        _winding(joints, parameters),
     )
     return with_constraints(described, data)
 
@@ -74,6 +77,18 @@ def _connection(data: dict[str, Any], parameters: Mapping[str, float]) -> Connec
         passive=Passive(**_of_one_axis(table, PASSIVE)),
         limits=Limits(**_of_one_axis(table, LIMITS)),
     )
+
+
+def _winding(joints: Iterable[dict[str, Any]], parameters: Mapping[str, float]) -> tuple[Note, ...]:
+    """Return notes on angles of joints and of ranges that look like degrees."""
+    turns, ends = {}, {}
+    for data in joints:
+        table = TomlTable(f"joint {data['name']!r}", data, JOINT, parameters)
+        turns[table.place] = table.numbers("rpy", [0.0, 0.0, 0.0])
+        if data.get("type", "revolute") == "revolute":
+            limits = _of_one_axis(table, LIMITS)
+            ends[f"range of {data['name']!r}"] = [limits.get(end, 0.0) for end in ("lower", "upper")]
+    return winding(turns, ends)
 
 
 def _of_one_axis(table: TomlTable, keys: Iterable[str]) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """Reader of URDF files; content beyond the dynamics is noted as ignored. Meshes are never opened."""
 
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, astuple
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -9,6 +9,7 @@ from linkwise.errors import LinkwiseError
 from linkwise.robot import transforms
 from linkwise.robot.description import Body, Connection, Description, Mimic
 from linkwise.robot.joint_types import SINGLE
+from linkwise.robot.notes import Note, winding
 from linkwise.robot.readers.urdf.passive import passives
 from linkwise.robot.readers.urdf.unmodelled import known, omissions
 from linkwise.robot.readers.xml_file import numbers, parse
@@ -24,7 +25,7 @@ def read_urdf(path: Path) -> Description:
     links, joints = robot.findall("link"), robot.findall("joint")
     if not links:
         raise LinkwiseError("<robot> is empty: the file has no <link>; give one that describes a robot")
-    notes, passive = ignored([robot], known, "URDF"), passives(robot)
+    notes, passive = (*ignored([robot], known, "URDF"), *_winding(links, joints)), passives(robot)
     return Description(
         robot.get("name") or path.stem,
         tuple(_body(element) for element in links),
@@ -57,6 +58,22 @@ def _origin(parent: Element, place: str) -> tuple[list[list[float]], tuple[float
     roll, pitch, yaw = numbers(origin, "rpy", "0 0 0", 3, place)
     x, y, z = numbers(origin, "xyz", "0 0 0", 3, place)
     return transforms.from_rpy(roll, pitch, yaw), (x, y, z)
+
+
+def _winding(links: Sequence[Element], joints: Sequence[Element]) -> tuple[Note, ...]:
+    """Return notes on angles of inertias, joints and ranges that look like degrees."""
+    posed = {f"joint {joint.get('name')!r}": joint for joint in joints}
+    posed |= {
+        f"inertia of {link.get('name')!r}": inner for link in links for inner in link.findall("inertial")
+    }
+    turns = {
+        place: numbers(origin, "rpy", "0 0 0", 3, place)
+        for place, parent in posed.items()
+        for origin in parent.findall("origin")
+    }
+    ranges = {f"range of {joint.get('name')!r}": joint for joint in joints if joint.get("type") == "revolute"}
+    ends = {place: astuple(_limits(joint, place))[:2] for place, joint in ranges.items()}
+    return winding(turns, ends)
 
 
 def _body(element: Element) -> Body:
