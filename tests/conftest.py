@@ -43,6 +43,8 @@ SEARCHED = os.environ.get("LD_LIBRARY_PATH")
 """Folders in which programs that tests start look for libraries, before any file of tests is imported."""
 BEGAN: list[int] = []
 """MB that it held then: imports of all files of tests, which libraries and Python's own cache decide on."""
+M_ARENA_MAX = -8
+"""Parameter of mallopt, by malloc.h."""
 COMPILES = "torch.compile("
 """Text of files of tests after which torch's compilers leave fragments of memory."""
 needs_compiler = needs("gcc")
@@ -103,8 +105,15 @@ def driver() -> Iterator[Any]:
 
 
 def pytest_configure() -> None:
-    """Search for garbage seldom: most of what tests make is freed at once, and _forget searches as well."""
+    """Search for garbage seldom: most of what tests make is freed at once, and _forget searches as well.
+
+    All threads take memory from one place: in places of their own, GNU's C library keeps fragments of what
+    they have freed, a hundred MB in the end.
+    """
     gc.set_threshold(50_000, 20, 100)
+    if sys.platform == "linux":
+        with suppress(OSError, AttributeError):  # another C library than GNU's
+            ctypes.CDLL("libc.so.6").mallopt(M_ARENA_MAX, 1)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -19,7 +19,7 @@ BESIDE = 40.0
 """Seconds of the other tests of the same files."""
 UNKNOWN = 300.0
 """Seconds for a file that a room names, which no map has measured: new ones, and those of `make ship`."""
-UNMEASURED = 60.0
+UNMEASURED = 15.0
 """Seconds for a test that caught a change before, where no map has measured it yet."""
 
 

@@ -121,7 +121,7 @@ class Tree:
     def forked(self, work: Callable[[Callable[..., int]], int], cpu: float) -> int:
         """Exit status, or minus the signal, of work in a process forked from this one.
 
-        It ends after `cpu` seconds of processor time, or ten times as many on the clock.
+        It ends after `cpu` seconds of processor time, or four times as many on the clock.
         """
         if self.stopped:
             raise SystemExit("stopped")
@@ -199,7 +199,7 @@ def _child(folder: Path, work: Callable[[Callable[..., int]], int], cpu: float) 
     os.dup2(out, 1)
     os.dup2(out, 2)
     resource.setrlimit(resource.RLIMIT_CPU, (int(cpu) + 1, int(cpu) + 6))
-    signal.alarm(int(10 * cpu) + 1)
+    signal.alarm(int(4 * cpu) + 1)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)  # ignored in the background: programs under test inherit that
     os.chdir(folder)
