@@ -162,6 +162,20 @@ def test_measured_loads_say_when_a_foot_stands_and_load_nothing(folder: Path) ->
     assert np.abs(result.torque[~on] - free.torque[~on]).max() == 0.0
 
 
+def test_a_filtered_load_says_by_its_force_as_measured_when_a_foot_stands(
+    folder: Path, tmp_path: Path
+) -> None:
+    time = np.arange(81) / 100
+    force = np.stack([0.0 * time, 1000.0 * (time > 0.405), 0.0 * time], 1)
+    file = write_csv(
+        tmp_path / "plate.csv", np.column_stack([time, force]), [f"foot/force_{a}" for a in "xyz"]
+    )
+    contacts = Contacts((FOOT,), loads=(file,), cutoff=6.0)
+    result = analyze(folder / "moving.csv", folder / "leg", contacts=contacts)
+    assert (result["contact/sole"] > 0).tolist() == (result.time > 0.40).tolist()
+    assert 100.0 < result["force_measured/sole force_y"][41] < 900.0, "what it bears is filtered"
+
+
 def test_a_tie_bears_what_the_ground_gives_to_a_joint_that_follows(folder: Path) -> None:
     log = write_csv(folder / "coupled.csv", smooth(80, 5) * [1, 0.3, 0.3, 0.3, 0.3, 0.3], JOINTS[:-1])
     result = analyze(log, folder / "coupled", contacts=[FOOT])

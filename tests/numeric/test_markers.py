@@ -149,6 +149,17 @@ def test_a_plate_may_have_a_name_and_its_filter_is_recorded(walk: Walk) -> None:
             walk.followed(walk.folder / "walk.c3d", text)
 
 
+def test_a_filtered_plate_keeps_the_force_as_measured(walk: Walk) -> None:
+    filtered, plain = (
+        walk.followed(walk.folder / "walk.c3d", "1=foot", **how) for how in ({"cutoff": 1.0}, {})
+    )
+    smooth, before, alone = (
+        one.wrenches[0].table for one in (filtered.loads[0], filtered.loads[0].as_measured, plain.loads[0])
+    )
+    assert np.array_equal(before, alone)
+    assert np.abs(smooth - alone).max() > 1.0
+
+
 def test_forces_on_the_plate_are_turned_round(walk: Walk, tmp_path: Path) -> None:
     walk.c3d(tmp_path / "down.c3d", sign=-1.0)
     found, wanted = walk.followed(tmp_path / "down.c3d", "1=foot"), walk.known(loads=[walk.load()])

@@ -114,6 +114,24 @@ def test_cycles_by_a_plate_begin_where_its_own_samples_cross_the_threshold(way: 
         run_study(file, out, Here())
 
 
+def test_cycles_by_a_filtered_load_begin_where_its_force_as_measured_crosses_the_threshold(
+    tmp_path: Path,
+) -> None:
+    """A filter spreads the steep edges, and swings below zero beside them by more than the threshold."""
+    time, own = np.arange(0, 1.5, 0.01), np.round(np.arange(0, 1.5, 0.001), 3)
+    write_csv(tmp_path / "a.csv", np.column_stack([time, np.sin(time)[:, None] * [1, 0.5, 0.2]]))
+    stands = ((own > 0.2) & (own < 0.5)) | ((own > 0.8) & (own < 1.1))
+    forces = np.column_stack([own, 800.0 * stands, 0 * own, 0 * own])
+    write_csv(tmp_path / "forces.csv", forces, [f"push:link3/force_{axis}" for axis in "xyz"])
+    choices = "[analysis]\nloads_cutoff = 20\n"
+    trial = '[[trial]]\nlog = "a.csv"\nrobot = "planar3"\nloads = ["forces.csv"]\n'
+    file = tmp_path / "study.toml"
+    file.write_text(f'schema = 1\npages = false\n{choices}[cycles]\nduring = "push>20"\n{trial}')
+    assert run_study(file, tmp_path / "out", Here()).broken == ()
+    found = pd.read_parquet(tmp_path / "out/trials/a/_cycles.parquet")[["start", "end"]]
+    np.testing.assert_allclose(found, [(0.2, 0.5), (0.8, 1.1)], rtol=0, atol=0.001)
+
+
 @pytest.mark.parametrize(
     ("asked", "start", "message"),
     [

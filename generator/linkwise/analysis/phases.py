@@ -8,7 +8,7 @@ import numpy as np
 
 from linkwise.analysis.contacts import THRESHOLD, WhileColumn
 from linkwise.analysis.contacts.times import Switch, read_switch
-from linkwise.analysis.loads.placed import PlacedLoad, model_pose
+from linkwise.analysis.loads.placed import PlacedLoad, PlacedWrench, model_pose
 from linkwise.analysis.logs import Log
 from linkwise.analysis.opened_robot import OpenedRobot
 from linkwise.analysis.settings import Reading
@@ -81,6 +81,12 @@ class PlacedPhase:
     """Force of a load in N above which the phase is on."""
 
     @property
+    def pressing(self) -> PlacedWrench | None:
+        """Wrench whose force switches the phase, before any low-pass; None where no load does."""
+        # A phase is by no muscle, and other loads are one wrench.
+        return None if self.load is None else self.load.as_measured.wrenches[0]
+
+    @property
     def told(self) -> str:
         """Conditions of the phase, in words."""
         said = [f"from {start:g} to {end:g} s" for start, end in self.spans]
@@ -104,8 +110,8 @@ class PlacedPhase:
             found |= self.switch.on(time)
         if self.contact is not None:
             found |= contacts[self.contact] > 0.0
-        if self.load is not None:
-            force = self.load.wrenches[0].wrench(time, q, model_pose(robot.model)).force
+        if self.pressing is not None:
+            force = self.pressing.wrench(time, q, model_pose(robot.model)).force
             found |= np.linalg.norm(force, axis=1) > self.above
         return found
 

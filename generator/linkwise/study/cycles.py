@@ -64,9 +64,9 @@ def _edges(job: Job) -> tuple[Array, Array]:
     By a load these are crossings of its own samples. By all else, of the motion's samples the first that is
     on, and the last.
     """
-    time, load = job.analysed.time, job.phases[-1].load
-    if load is not None:
-        table = load.wrenches[0].table  # a phase is by no muscle, and other loads are one wrench
+    time, pressing = job.analysed.time, job.phases[-1].pressing
+    if pressing is not None:
+        table = pressing.table
         edges = crossings(table[:, 0], np.linalg.norm(table[:, FORCE], axis=1), job.phases[-1].above)
         first, last = time[0], time[-1]
         up, down = (edge[(edge >= first) & (edge <= last)] for edge in edges)
@@ -91,9 +91,9 @@ def told_of_ends(cycles: Cycles, job: Job) -> str:
         return "at the times of the table"
     phase = job.phases[-1]
     told = phase.told.removeprefix("cycle: ")
-    if phase.load is None:
+    if phase.pressing is None:
         return f"{told}; at samples of the motion"
-    own = phase.load.wrenches[0].table[:, 0]
+    own = phase.pressing.table[:, 0]
     rate = (len(own) - 1) / np.ptp(own) if len(own) > 1 else 0.0
     return f"{told}; between the load's own samples, of {rate:.6g} Hz, by straight lines"
 

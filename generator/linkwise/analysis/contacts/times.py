@@ -74,7 +74,8 @@ class ContactTimes:
         if switch is not None:
             return f"{switch.given.column!r} is {switch.rows[:, 1].max():.4g} at most"
         force = [
-            np.linalg.norm(load.wrenches[0].table[:, FORCE], axis=1).max() for load in self.measured[number]
+            np.linalg.norm(load.as_measured.wrenches[0].table[:, FORCE], axis=1).max()
+            for load in self.measured[number]
         ]
         return f"the loads on its body are {sum(force):.4g} N at most"
 
@@ -84,8 +85,8 @@ class ContactTimes:
         The share of a contact that is off is 0. The instants are (S,), with the robot at q (S, n). Shares are
         in proportion to the measured forces if all contacts have them, else equal.
         """
-        force = np.stack([self._force(number, model, time, q) for number in range(len(self.switches))], 1)
-        on = np.stack([self._on(number, time, force[:, number]) for number in range(len(self.switches))], 1)
+        force = np.stack([_force(loads, model, time, q) for loads in self.measured], 1)
+        on = np.stack([self._on(number, model, time, q) for number in range(len(self.switches))], 1)
         out = np.ones_like(force)
         if all(self.measured):
             out = np.maximum(force, FLOOR * force.max(axis=1, keepdims=True, initial=0.0))
@@ -95,20 +96,14 @@ class ContactTimes:
         shares: Array = out / np.where(whole > 0.0, whole, 1.0)
         return shares
 
-    def _on(self, number: int, time: Array, force: Array) -> Mask:
-        switch = self.switches[number]
+    def _on(self, number: int, model: Dynamics, time: Array, q: Array) -> Mask:
+        switch, loads = self.switches[number], self.measured[number]
         if switch is not None:
             return switch.on(time)
-        if not self.measured[number]:
+        if not loads:
             return np.ones(len(time), dtype=np.bool_)
-        is_on: Mask = force > self.least_force
+        is_on: Mask = _force([load.as_measured for load in loads], model, time, q) > self.least_force
         return is_on
-
-    def _force(self, number: int, model: Dynamics, time: Array, q: Array) -> Array:
-        """Return the magnitude (S,) of the force measured on a contact, in N."""
-        pushes = [wrench.force for wrench in _wrenches(self.measured[number], model, time, q)]
-        size: Array = np.linalg.norm(sum(pushes, np.zeros((len(time), 3))), axis=1)
-        return size
 
     def press(self, model: Dynamics, time: Array, q: Array) -> Array:
         """Return where a load that is measured on each contact's body acts in the world, (S, contacts, 3).
@@ -132,6 +127,13 @@ class ContactTimes:
             out[:, :3] += load.moment + np.cross(load.place - place, load.force)
             out[:, 3:] += load.force
         return out
+
+
+def _force(loads: Sequence[PlacedLoad], model: Dynamics, time: Array, q: Array) -> Array:
+    """Return the magnitude (S,) of the force of loads together, in N."""
+    pushes = [wrench.force for wrench in _wrenches(loads, model, time, q)]
+    size: Array = np.linalg.norm(sum(pushes, np.zeros((len(time), 3))), axis=1)
+    return size
 
 
 def _wrenches(loads: Sequence[PlacedLoad], model: Dynamics, time: Array, q: Array) -> list[Wrench]:

@@ -39,6 +39,8 @@ class Load:
     """Name of the file that the values are from, which records tell."""
     filtered: float | None = None
     """Cutoff in Hz of a low-pass filter that the values have gone through, which records tell."""
+    unfiltered: "Load | None" = None
+    """The load before that filter, by whose force phases, cycles and contacts begin; None if it is this."""
 
     def table(self) -> Array:
         """Return rows (S, 10) of time, force, moment, point; a single row, at time 0, if all is constant.

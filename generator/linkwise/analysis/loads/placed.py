@@ -111,6 +111,13 @@ class PlacedLoad:
     None for none."""
     is_inside: bool = False
     """True if the wrenches are in balance, so that coordinates that move all bodies alike bear nothing."""
+    unfiltered: "PlacedLoad | None" = None
+    """The load before its low-pass filter; None where none was applied."""
+
+    @property
+    def as_measured(self) -> "PlacedLoad":
+        """Load by which a threshold tells when it acts: a filter spreads steep edges, and rings there."""
+        return self if self.unfiltered is None else self.unfiltered
 
     @cached_property
     def joints(self) -> tuple[int, ...]:

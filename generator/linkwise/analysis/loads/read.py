@@ -9,7 +9,7 @@ import numpy as np
 from linkwise_runtime.chosen_names import end_of_path
 
 from linkwise.analysis.column_matching import FAR, time_column, with_nearest
-from linkwise.analysis.disk_rows import collected
+from linkwise.analysis.disk_rows import collected, copied
 from linkwise.analysis.even_time import even_rate, usual_step
 from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loads import FORCE, MOMENT, PARTS, POINT, WIDTH, WORLD, Load, LoadColumns, Loads
@@ -128,7 +128,9 @@ def _given(load: Load, robot: OpenedRobot, motion: Array) -> PlacedLoad:
     if load.time is not None:
         with within(f"load {load.name!r}"):
             check_time(table[:, 0], motion, 1)
-    return PlacedLoad(load.name, (PlacedWrench(load_frame, table),), load.source, load.filtered)
+    before = None if load.unfiltered is None else _given(load.unfiltered, robot, motion)
+    wrenches = (PlacedWrench(load_frame, table),)
+    return PlacedLoad(load.name, wrenches, load.source, load.filtered, unfiltered=before)
 
 
 def _read(
@@ -154,17 +156,21 @@ def _read(
             _about_origin(load_frame, rows)
             yield rows
 
-    table = collected(blocks(), WIDTH, buffer)
+    table, unfiltered = collected(blocks(), WIDTH, buffer), None
     with within(str(load.log)):
         check_time(table[:, 0], motion, log.first_row)
         if cutoff is not None:
             mend = "for --loads-cutoff bring it to an even rate, in Hz such as"
             rate = even_rate(table[:, 0], log.first_row, strict=True, mend=mend)
+            unfiltered = PlacedLoad(
+                load.name, (PlacedWrench(load_frame, copied(table, buffer)),), load.log.name
+            )
             lowpass(table[:, 1:7], rate, Lowpass(cutoff), flag="--loads-cutoff")
     noticed = (*log.warnings, *slowness(1 / usual_step(table[:, 0], log.first_row)))
     noticed += _far(load, table)
     warnings = (*load.warnings, *(f"{load.log.name}: {warning}" for warning in noticed))
-    return PlacedLoad(load.name, (PlacedWrench(load_frame, table),), load.log.name, cutoff, warnings)
+    wrenches = (PlacedWrench(load_frame, table),)
+    return PlacedLoad(load.name, wrenches, load.log.name, cutoff, warnings, unfiltered=unfiltered)
 
 
 def _far(load: LoadColumns, table: Array) -> tuple[str, ...]:

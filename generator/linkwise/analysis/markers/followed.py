@@ -157,20 +157,22 @@ def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tup
                 f"{log}: plate {number}: {len(gaps)} of its {len(wrench)} samples have no numbers, first the"
                 f" {gaps[0] + 1}th; fill the gap"
             )
-        if asked.cutoff is not None:
-            rate = 1.0 / float(np.diff(recorded.plate_time[:2])[0])
-            lowpass(wrench, rate, Lowpass(asked.cutoff), flag="--loads-cutoff")
-        found.append(
-            Load(
-                given.name,
-                given.body,
-                wrench[:, :3],
-                wrench[:, 3:],
-                plate.place,
-                recorded.plate_time,
-                point_in="world",
-                source=log.name,
-                filtered=asked.cutoff,
-            )
+        load = Load(
+            given.name,
+            given.body,
+            wrench[:, :3],
+            wrench[:, 3:],
+            plate.place,
+            recorded.plate_time,
+            point_in="world",
+            source=log.name,
         )
+        found.append(load if asked.cutoff is None else _filtered(load, wrench, asked.cutoff))
     return tuple(found), told
+
+
+def _filtered(load: Load, wrench: Array, cutoff: float) -> Load:
+    """Return a plate's load with its wrench (S, 6) after a low-pass of a cutoff in Hz."""
+    time, smooth = np.asarray(load.time), wrench.copy()
+    lowpass(smooth, 1.0 / float(time[1] - time[0]), Lowpass(cutoff), flag="--loads-cutoff")
+    return replace(load, force=smooth[:, :3], moment=smooth[:, 3:], filtered=cutoff, unfiltered=load)
