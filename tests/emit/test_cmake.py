@@ -1,6 +1,7 @@
 """Robots in the CMake builds of others: C and C++ programs, and what is built again when."""
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -165,10 +166,38 @@ def test_robots_are_compiled_as_their_headers_say(tool: str, built: dict[str, Pr
 def test_a_level_of_the_projects_own_flags_stays_and_else_it_is_a_quick_one(tmp_path: Path) -> None:
     project = Project("ninja", tmp_path / "level")
     write_project(project.source)
-    for flags, count in (("-DCMAKE_C_FLAGS=-Os", 0), ("-DCMAKE_C_FLAGS=-g", 3)):
+    for flags, count in (
+        ("-DCMAKE_C_FLAGS=-Os", 0),
+        ("-DCMAKE_C_FLAGS=-g\t-Os", 0),
+        ("-DCMAKE_C_FLAGS=-g", 3),
+    ):
         done = project.configure(flags)
         assert done.returncode == 0, done.stderr
         assert (project.build / "build.ninja").read_text().count(" -O2") == count
+
+
+@needs_ninja
+def test_the_level_that_holds_is_that_of_compile_options_or_of_the_build_type(tmp_path: Path) -> None:
+    find = "find_package(linkwise"
+    for number, (options, flags, level) in enumerate(
+        (
+            ("-Os", "", "-Os"),
+            ("-Os -O2", "", "-O2"),
+            ("$<$<COMPILE_LANGUAGE:C>:-O1>", "", "-O1"),
+            ("-g", "", "-O2"),
+            ("-g", "-DCMAKE_BUILD_TYPE=Firmware", "-O2"),
+            ("-Os", "-DCMAKE_BUILD_TYPE=Firmware", "-Os"),
+            ("-g", "-DCMAKE_BUILD_TYPE=Release", "-O3"),
+            ("-g", "-DCMAKE_BUILD_TYPE=Debug", None),
+        )
+    ):
+        project = Project("ninja", tmp_path / f"level {number}")
+        write_project(project.source, LISTS.replace(find, f"add_compile_options({options})\n{find}"))
+        done = project.configure(*flags.split())
+        assert done.returncode == 0, done.stderr
+        lines = (project.build / "build.ninja").read_text().splitlines()
+        found = [re.findall(r" (-O\w)", line) for line in lines if "-ftree-vectorize" in line]
+        assert [one[-1] if one else None for one in found] == [level] * 3, (options, flags)
 
 
 @each_generator

@@ -82,10 +82,21 @@ endfunction()
 # Flags under which gcc and clang make the most of the emitted C; what the header prints, less what is of one machine.
 function(_linkwise_compile_options target language)
     if(CMAKE_${language}_COMPILER_ID MATCHES "^(GNU|Clang|AppleClang)$" AND NOT MSVC)
-        # A toolchain's own level, such as a firmware's -Os, stays.
-        if(NOT CMAKE_${language}_FLAGS MATCHES "(^| )-O")
-            target_compile_options(${target} PRIVATE $<$<CONFIG:>:-O2>)
+        # A project's own level, such as a firmware's -Os, stays: the last one holds, and those of add_compile_options
+        # come behind this. SHELL: keeps it apart from a -O2 there, of which CMake would take the first alone.
+        set(types "${CMAKE_BUILD_TYPE}")
+        if(CMAKE_CONFIGURATION_TYPES)
+            set(types ${CMAKE_CONFIGURATION_TYPES})
         endif()
+        foreach(type IN ITEMS "" ${types})
+            string(TOUPPER "${type}" upper)
+            if(
+                NOT upper STREQUAL "DEBUG"
+                AND NOT "${CMAKE_${language}_FLAGS} ${CMAKE_${language}_FLAGS_${upper}}" MATCHES "(^|[ \t])-O"
+            )
+                target_compile_options(${target} BEFORE PRIVATE "$<$<CONFIG:${type}>:SHELL:-O2>")
+            endif()
+        endforeach()
         target_compile_options(
             ${target} PRIVATE -ftree-vectorize -fno-tree-slp-vectorize -ffp-contract=fast
         )
