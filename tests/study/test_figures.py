@@ -218,6 +218,21 @@ def test_a_bar_of_a_test_is_told(drawn_of: Any) -> None:
     ]
 
 
+@pytest.mark.parametrize("columns", [("tau/hip", "peak/hip"), ("peak/hip", "tau/hip")])
+def test_the_key_tells_of_dots_and_of_bands_whichever_comes_first(
+    columns: tuple[str, ...], drawn_of: Any
+) -> None:
+    mixed = trials()
+    for trial in mixed:
+        trial.units["peak/hip"] = "N·m"
+        trial.statistics["peak/hip"] = trial.statistics["tau/hip"]
+    axis, _ = drawn_of(PaperFigure(columns, "condition"), mixed)
+    assert [text.get_text() for text in axis.figure.legends[0].get_texts()] == [
+        "dots: subjects; bars: ± sd over them",
+        "filled: ± sd between subjects",
+    ]
+
+
 def of_one_subject(points: int = 3) -> list[TrialSummary]:
     """The trials, all of one subject."""
     return [replace(trial, labels=trial.labels | {"subject": "ann"}) for trial in trials(points)]

@@ -1,5 +1,7 @@
 """Studies: every trial once, whatever happens, and what they say together."""
 
+import base64
+import gzip
 import json
 import os
 import re
@@ -298,6 +300,34 @@ def test_words_for_what_a_figure_does_not_show_are_told_with_the_nearest_that_it
     file.write_text(file.read_text().replace('by = "condition"', 'by = "condition"\norder = ["quick"]'))
     with pytest.raises(LinkwiseError, match="'order' has 'quick', which no trial is"):
         run_study(file, tmp_path / "out", Here())
+
+
+def test_a_figure_that_is_not_drawn_is_told_by_the_record_and_the_page(tmp_path: Path) -> None:
+    figure = '\n[[figure]]\ncolumns = ["tau/*"]\nhatched = "mean"\n'
+    file = write_study(tmp_path, HEAD, QUICK, CHOICES, CYCLES, figure, TRIALS, subjects=1, trials=1)
+    (told,) = run_study(file, tmp_path / "out", Here()).warnings
+    assert told.startswith("figure 1 is not drawn: [[figure]]: 'hatched' is 'mean', and no curve has")
+    assert json.loads((tmp_path / "out/study.json").read_text())["notes"] == [told]
+    data = re.findall(r"H4sI[\w+/=]+", (tmp_path / "out/study.html").read_text())
+    pages = [gzip.decompress(base64.b64decode(one)).decode() for one in data]
+    assert any("figure 1 is not drawn" in page for page in pages)
+
+
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [
+        ('columns = ["tau/*"]\nname = "../up"', "'name' is '../up'; give a name of a file, without / "),
+        ('columns = ["tau/*"]\nname = ".up"', "'name' is '.up'; give a name of a file, without / "),
+        ('columns = ["tau/*"]\nname = "a\\\\b"', r"'name' is 'a\\b'; give a name of a file, without / "),
+        ('columns = ["time"]', "'time'"),
+    ],
+)
+def test_a_figure_that_cannot_be_is_refused_before_any_trial(key: str, told: str, tmp_path: Path) -> None:
+    file = write_study(tmp_path, HEAD, QUICK, CHOICES, f"\n[[figure]]\n{key}\n", TRIALS, subjects=1, trials=1)
+    engine = Here()
+    with pytest.raises(LinkwiseError, match=re.escape(told)):
+        run_study(file, tmp_path / "out", engine)
+    assert engine.given == []
 
 
 def test_curves_that_do_not_vary_are_told_and_the_rest_is_made(tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ def figure_files(
     not there.
     """
     panels = [] if figure.joints else panels_of(figure, trials, tests)
-    name = file_name((figure.name or _name(figure, panels) or f"figure{number}").replace("/", "-"))
+    name = file_name(figure.name or _name(figure, panels).replace("/", "-") or f"figure{number}")
     *_, name = file_names([*used, name])
     words = words_of_trials(trials)
     with styled() as matplotlib:
@@ -192,14 +192,14 @@ def _kinds_of_bands(figure: PaperFigure, panels: Sequence[BandPanel]) -> list[tu
     """Return a sample of each kind of band and what it is, where a reader must be told."""
     patch = extra("matplotlib.patches").Patch
     some = [spread for panel in panels for spread in panel.levels.values() if len(spread.each) > 1]
-    of_one = [spread for spread in some if spread.is_of_trials]
+    dots, curves = ([one for one in some if (one.each.shape[1] == 1) is is_dot] for is_dot in (True, False))
     is_hatched = figure.hatched != "none" and any(panel.uncertain for panel in panels)
     kinds = []
-    if some and some[0].each.shape[1] == 1:
+    for text in dict.fromkeys(DOTS_OF_ONE if one.is_of_trials else DOTS for one in dots):
         dot = extra("matplotlib.lines").Line2D([], [], color=INK, marker="o", linewidth=0)
-        kinds.append((dot, DOTS_OF_ONE if of_one else DOTS))
-    elif some and figure.band in FILLED:
-        text = (FILLED_OF_ONE if of_one else FILLED)[figure.band]
+        kinds.append((dot, text))
+    filled = [FILLED_OF_ONE if one.is_of_trials else FILLED for one in curves]
+    for text in dict.fromkeys(texts[figure.band] for texts in filled if figure.band in texts):
         kinds.append((patch(facecolor=INK, alpha=0.2, linewidth=0), text))
     if is_hatched:
         hatched = patch(fill=False, edgecolor=INK, hatch=HATCHES[0], linewidth=EDGE)

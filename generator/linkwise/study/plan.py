@@ -135,6 +135,11 @@ class PaperFigure:
     def __post_init__(self) -> None:
         if not self.columns:
             raise LinkwiseError("[[figure]]: 'columns' is empty; name one or more")
+        if self.name.startswith(".") or {"/", "\\"} & set(self.name):
+            raise LinkwiseError(
+                f"[[figure]]: 'name' is {self.name!r}; give a name of a file, without / and \\, and no"
+                " dot in front"
+            )
         if not self.formats:
             raise LinkwiseError("[[figure]]: 'formats' is empty; name one or more")
         if self.order and not self.by:

@@ -29,12 +29,12 @@ class Together(NamedTuple):
 
     files: dict[str, bytes]
     """Contents by name."""
-    lacking: tuple[str, ...]
-    """Reasons of what could not be made."""
     notes: tuple[str, ...]
-    """Lines that a reader of the files must know: who is left out of a test, what is averaged as it is."""
+    """Lines that a reader of the files must know: what could not be made, who is left out of a test."""
     normalised: dict[str, object]
     """Way in which results are normalised, empty where they are not."""
+    is_whole: bool = True
+    """False where a test or a figure could not be made."""
 
 
 def together(
@@ -43,7 +43,7 @@ def together(
     """Return tables, tests and figures of the trials that exist, and what is to be told of them."""
     own = summaries(plan, folders)
     if not own:
-        return Together({}, (), (), {})
+        return Together({}, (), {})
     trials = normalised(plan, own)
     progress("together", 0, 3)
     files = {
@@ -53,8 +53,8 @@ def together(
     if plan.cycles is not None:
         files[MEAN_CURVES] = parquet(curve_rows(trials, plan.cycles.points))
     progress("together", 1, 3)
-    tests, lacking = compared(plan.comparisons, trials)
-    told = [*lacking]
+    tests, untested = compared(plan.comparisons, trials)
+    lacking = [*untested]
     if tests:
         files[TESTS] = parquet(rows_of_tests(tests))
     progress("together", 2, 3)
@@ -64,11 +64,14 @@ def together(
             check_names(plan, figure, columns_of_trials(trials))
             made = dict(figure_files(figure, trials, tests, number, used))
         except LinkwiseError as error:
-            told.append(f"figure {number}{f', {figure.name},' if figure.name else ''} is not drawn: {error}")
+            lacking.append(
+                f"figure {number}{f', {figure.name},' if figure.name else ''} is not drawn: {error}"
+            )
             continue
         files |= made
         used.append(Path(next(iter(made))).stem)
     notes = (
+        *lacking,
         *_of_broken(plan, broken),
         *of_several_masses(plan, own),
         *of_their_robots(plan, own),
@@ -76,7 +79,7 @@ def together(
     )
     files[STUDY_PAGE] = study_page(plan, trials, folders, tests, broken, notes).encode()
     progress("together", 3, 3)
-    return Together(files, tuple(told), notes, told_of_bodies(plan, own))
+    return Together(files, notes, told_of_bodies(plan, own), not lacking)
 
 
 def _of_broken(plan: StudyPlan, broken: Sequence[TrialOutcome]) -> tuple[str, ...]:

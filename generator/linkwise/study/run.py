@@ -126,7 +126,7 @@ def _done(
             write_files(out, {MARK: former.text()})
         return StudyOutcome(plan, done, 0, 0, broken, (*warnings, *former.notes), there)
     made = together(plan, {name: folders[name] for name in done}, broken, progress)
-    # What is missing, such as a library, may be there next time; until then it is reported each time.
+    # What is missing, such as a library, may be there next time: it is tried again each time.
     entries = {
         "uncertain": assumptions(records),
         "notes": made.notes,
@@ -134,11 +134,11 @@ def _done(
         "cycles": cut_by(plan, records),
         "methods": methods_of(plan),
     }
-    mark = StudyMark.done(plan, broken, "" if made.lacking else key, list(made.files), entries)
+    mark = StudyMark.done(plan, broken, key if made.is_whole else "", list(made.files), entries)
     files = write_files(out, {**made.files, MARK: mark.text()})
     for file in set(there) - set(files):
         file.unlink(missing_ok=True)
-    samples, told = sum(one.samples for one in outcomes), (*warnings, *made.lacking, *made.notes)
+    samples, told = sum(one.samples for one in outcomes), (*warnings, *made.notes)
     return StudyOutcome(plan, done, len(outcomes) - len(broken), samples, broken, told, files)
 
 
@@ -168,7 +168,8 @@ def check_columns(plan: StudyPlan, before: Collection[str]) -> None:
         columns = _columns(plan, before)
         if columns:
             kept_columns(columns, plan.columns)
-            names = [column.name for column in (*columns, *integral_columns(plan, columns))]
+            every = (*columns, *integral_columns(plan, columns))
+            names = [column.name for column in every if column.name != "time"]
             for comparison in plan.comparisons:
                 compared_columns(comparison, names)
             for figure in plan.figures:
