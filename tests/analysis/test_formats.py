@@ -305,6 +305,10 @@ def test_what_a_recorder_left_beside_a_database_is_not_left_out(tmp_path: Path) 
     np.testing.assert_allclose(analyze(tmp_path / "copy", PLANAR3).q, Q, rtol=1e-12)
 
 
+def test_a_folder_of_a_bag_may_be_called_like_a_file_in_capitals(tmp_path: Path) -> None:
+    np.testing.assert_allclose(analyze(sqlite(tmp_path).rename(tmp_path / "D.DB3"), PLANAR3).q, Q, rtol=1e-12)
+
+
 def test_a_bag_in_capitals_is_told_apart_from_a_damaged_one(tmp_path: Path) -> None:
     (tmp_path / "BAG.DB3").write_bytes((sqlite(tmp_path) / "bag.db3").read_bytes())
     with pytest.raises(LinkwiseError, match=r"bags are found by small letters; name it …\.db3"):

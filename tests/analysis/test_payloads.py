@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from conftest import DATA
+from helpers.command_line import run_linkwise
 from helpers.motion_logs import smooth, write_csv
 from helpers.urdf_text import joint, link, robot
 from linkwise import Payload, generate, read_system, write_package
@@ -102,6 +103,14 @@ def test_files_and_page_list_them(arm, tmp_path):
     assert data["links"][3:] == ["payload tool", "bag"]
     assert data["bodies"]["links"][-2:] == [3, 4]
     assert data["bodies"]["coordinates"][-2:] == [-1, -1]
+
+
+def test_a_kept_package_without_numpy_is_told_by_the_robot_that_was_named(tmp_path):
+    log = write_csv(tmp_path / "log.csv", smooth(20, 3))
+    asked = "--backend", "autograd", "--payload", "link3=1", "--trace", "all"
+    done = run_linkwise("analyze", log, "--robot", "planar3", *asked, "--out", "out", folder=tmp_path)
+    told = "planar3: no back end takes a payload's mass; leave --backend out, or give numpy"
+    assert (done.returncode, done.stderr) == (2, f"linkwise: error: {told}\n")
 
 
 def test_robots_that_take_no_payload_say_why(arm, tmp_path):

@@ -3,6 +3,7 @@
 import hashlib
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -19,13 +20,15 @@ IN_POSITIONS, IN_VELOCITIES = re.compile(r"\bq_(\d+)\b"), re.compile(r"\bqd_(\d+
 """Coordinates, from 1, in a written constraint of positions, and those that move in one of velocities."""
 
 
-def load_robot(directory: Path, backend: str | None = None) -> OpenedRobot:
+def load_robot(directory: Path, backend: str | None = None, source: str = "") -> OpenedRobot:
     """Import the package in `directory`, with `backend` or the fastest that works here.
+
+    source: the robot that a user named, where the package is kept of it, for messages
 
     Raises LinkwiseError for a directory without a package, a damaged one, or no back end that loads or, where
     torques depend on time or inputs, answers for samples that have their own.
     """
-    package = open_package(directory)
+    package = replace(open_package(directory), source=source)
     manifest = package.manifest
     _refuse_one_value(package, backend)
     chosen, model = _load(package, _backends(package) if backend is None else (backend,))
@@ -73,7 +76,7 @@ def _refuse_one_value(package: Package, backend: str | None) -> None:
     """Raise LinkwiseError for a back end whose parameters have one value for all samples, where they vary."""
     if _is_varying(package) and (backend == "native" or not _backends(package)):
         raise LinkwiseError(
-            f"{package.directory}: its torques depend on time or inputs, which native has one value of for "
+            f"{package.called}: its torques depend on time or inputs, which native has one value of for "
             "all samples; generate it with numpy, and leave --backend native out"
         )
 
@@ -92,7 +95,5 @@ def _load(package: Package, backends: Sequence[str]) -> tuple[str, Dynamics]:
             return backend, package.load(backend)
         except Exception as error:  # A back end may lack its compiler, its library or its files.
             reasons.append(f"{backend}: {error}")
-    raise LinkwiseError(
-        f"{package.directory}: no back end for the analysis ({'; '.join(reasons) or 'the package has none'});"
-        " generate the robot again, with a back end that can be loaded here"
-    )
+    why = "; ".join(reasons) or "the package has none"
+    raise LinkwiseError(f"{package.called}: no back end for the analysis ({why}); {package.remedy}")

@@ -82,10 +82,7 @@ def _models(package: Package, tree: JointTree, placed: Sequence[_Placed]) -> lis
     """Return for each payload its link, and the package with nothing but that payload on that link."""
     backend = next((name for name in ("numpy", "torch") if name in package.backends), None)
     if backend is None:
-        raise LinkwiseError(
-            f"{package.directory}: no back end takes a payload's mass; generate the robot again, with"
-            " --backend numpy beside the others"
-        )
+        raise LinkwiseError(f"{package.called}: no back end takes a payload's mass; {package.remedy}")
     models = []
     own = package.module.bodies()
     for at in placed:

@@ -43,10 +43,7 @@ def perturbed_robots(robot: OpenedRobot, given: Any) -> list[PerturbedRobots]:
     """
     backend = next((name for name in ("numpy", "torch") if name in robot.package.backends), None)
     if backend is None:
-        raise LinkwiseError(
-            f"{robot.package.directory}: no back end takes other bodies; generate the robot again, with"
-            " --backend numpy beside the others"
-        )
+        raise LinkwiseError(f"{robot.package.called}: no back end takes other bodies; {robot.package.remedy}")
     tree, own = robot.package.manifest.tree, robot.package.load(backend).backend
     assert tree is not None  # as `refuse_unmodelled` has seen
     carried = tree_bodies(tree, own.parameters, cast(Any, own.bodies))

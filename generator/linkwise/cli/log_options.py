@@ -51,6 +51,6 @@ def opened_robot(robot: Path, backend: str | None, options: Options, progress: P
     for warning in kept.warnings:
         tell(f"warning: {warning}", err=True)
     try:
-        return load_robot(kept.directory, backend)
+        return load_robot(kept.directory, backend, "" if kept.directory == robot else str(robot))
     except LinkwiseError as error:  # names the file of the user's, not the package that is kept of it
         raise LinkwiseError(str(error).replace(str(kept.directory), str(robot))) from error

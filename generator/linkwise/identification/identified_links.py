@@ -120,9 +120,7 @@ def _own_parameters(robot: OpenedRobot) -> Array:
         )
     model = robot.model if robot.constrained is None else robot.constrained.open
     if not hasattr(model, "regressor") or model.backend.rule is None:
-        raise LinkwiseError(
-            f"{robot.name} has no back end with regressors; generate the robot again, with --backend numpy"
-        )
+        raise LinkwiseError(f"{robot.name} has no back end with regressors; {robot.package.remedy}")
     return link_parameters(tree)
 
 

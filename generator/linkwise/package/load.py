@@ -29,6 +29,20 @@ class Package:
     directory: Path
     manifest: Manifest
     module: ModuleType
+    source: str = ""
+    """Robot's file or name, as it was given, of which this package is kept; empty for one of the user's."""
+
+    @property
+    def called(self) -> str:
+        """Robot or folder that messages name."""
+        return self.source or str(self.directory)
+
+    @property
+    def remedy(self) -> str:
+        """Words on how to come by numpy, which does all, where the package has another back end alone."""
+        if self.source:
+            return "leave --backend out, or give numpy"
+        return "generate the robot again, with --backend numpy beside the others"
 
     @property
     def backends(self) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ def opened_bag(path: Path) -> Iterator[Any]:
             with within(str(file)):
                 require_file(file)
     ending = path.suffix
-    if ending != ending.lower() and ending.lower() in (".db3", ".mcap"):
+    if path.is_file() and ending != ending.lower() and ending.lower() in (".db3", ".mcap"):
         raise LinkwiseError(f"{path}: bags are found by small letters; name it …{ending.lower()}")
     if (profile := _profile(path)) != MCAP_OF_ROS:
         raise LinkwiseError(
