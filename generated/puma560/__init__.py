@@ -10,7 +10,7 @@ See `load` for the back ends, `Dynamics` for all calls and `names.py` for the ro
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from linkwise_runtime.version import require
+from linkwise_runtime.version import require, require_as_imported
 
 require("0.1.0")
 
@@ -37,6 +37,7 @@ from .names import ROBOT
 if TYPE_CHECKING:
     from linkwise_runtime.lagrangians.dynamics_module import DynamicsModule
 
+require_as_imported(ROBOT, __file__)
 joint_names = ROBOT.joint_names
 link_names = ROBOT.link_names
 parameters = ROBOT.parameters
@@ -108,8 +109,10 @@ def load(
     lists go along with the others, and alone are computed in float64. Refused are booleans, complex numbers, other
     floats, and, for numpy, tensors that require a gradient or lie on another device.
 
-    Raises ValueError for a back end or a parameter that this package doesn't have.
+    Raises ValueError for a back end or a parameter that this package doesn't have; RuntimeError where the package was
+    generated anew since it was imported.
     """
+    require_as_imported(ROBOT, __file__)
     if backend not in BACKENDS:
         raise ValueError(f"no back end {backend!r} in this package; choose one of {', '.join(BACKENDS)}")
     made = _MAKERS[backend](ROBOT.values(parameters, allow_unphysical), kernel, bodies, requires_grad)
