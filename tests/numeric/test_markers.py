@@ -401,6 +401,20 @@ def test_gaps_of_a_plate_that_bears_something_are_refused(walk: Walk, tmp_path: 
     assert any("plate 1 bears up to" in line for line in walk.followed(tmp_path / "gaps.c3d").warnings)
 
 
+def test_a_plate_that_nobody_asks_for_does_not_stop_the_others(walk: Walk, tmp_path: Path) -> None:
+    for name, value, warned, refused in (
+        ("TYPE", np.array([5]), "plate 1 is of type 5; types", "plate 1 is of type 5; types"),
+        ("CORNERS", np.zeros((3, 4, 1)), "plate 1 bears up to", "CORNERS does not say where it is"),
+    ):
+        file = ezc3d.c3d(str(walk.folder / "walk.c3d"))
+        file["parameters"]["FORCE_PLATFORM"][name]["value"] = value
+        file.write(str(tmp_path / "odd.c3d"))
+        found = walk.followed(tmp_path / "odd.c3d")
+        assert len([line for line in found.warnings if warned in line]) == 1
+        with pytest.raises(LinkwiseError, match=rf"odd\.c3d: plate 1.*{refused.removeprefix('plate 1')}"):
+            walk.followed(tmp_path / "odd.c3d", "1=foot")
+
+
 def test_weights_are_those_of_a_file(walk: Walk, tmp_path: Path) -> None:
     tasks = osim.IKTaskSet()
     for name in walk.names:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers.answers import relative_error
 from linkwise.analysis.markers.c3d import read_c3d
-from linkwise.analysis.markers.force_plates import PlateWrench, plate_wrenches
+from linkwise.analysis.markers.force_plates import ForcePlates, PlateWrench
 from linkwise.errors import LinkwiseError
 
 ezc3d: Any = pytest.importorskip("ezc3d")
@@ -68,16 +68,21 @@ def wrench() -> tuple[np.ndarray, np.ndarray]:
     return force, np.column_stack([10 * np.sin(4 * time), 3 + time, 20 * np.cos(2 * time)])
 
 
-def plate_of(path: Path, kind: int, values: np.ndarray, units: list[str], origin: list[float]) -> PlateWrench:
-    """Read a file with one plate, whose channels (C, S) are in these units."""
+def made(kind: int, values: np.ndarray, units: list[str], origin: list[float], **more: Any) -> Any:
+    """Return a file with one plate, whose channels (C, S) are in these units.
+
+    more: other numbers of its parameters in FORCE_PLATFORM
+    """
     file, (count, samples) = ezc3d.c3d(), values.shape
     file["parameters"]["POINT"]["RATE"]["value"] = [100.0]
     file["parameters"]["POINT"]["LABELS"]["value"] = ["heel"]
     file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
     file["data"]["points"] = np.ones((4, 1, samples))
-    named = {"LABELS": [f"c{at}" for at in range(count)], "UNITS": units, "RATE": [100.0]}
+    named = {"LABELS": [f"c{at}" for at in range(count)], "UNITS": units[:255], "RATE": [100.0]}
     for name, value in {**named, "SCALE": [1.0] * count, "OFFSET": [0] * count}.items():
         file["parameters"]["ANALOG"][name]["value"] = value
+    if units[255:]:
+        file.add_parameter("ANALOG", "UNITS2", units[255:])
     file["data"]["analogs"] = values[None]
     edges = np.array([[200.0, -200.0, -200.0, 200.0], [-100.0, -100.0, 100.0, 100.0], [0.0] * 4])
     for name, value in {
@@ -87,13 +92,22 @@ def plate_of(path: Path, kind: int, values: np.ndarray, units: list[str], origin
         "CORNERS": (1000 * MIDDLE[:, None] + edges)[:, :, None],
         "ORIGIN": np.array(origin)[:, None],
         "CHANNEL": np.arange(1, 1 + count)[:, None],
+        **more,
     }.items():
         file["parameters"]["FORCE_PLATFORM"][name]["value"] = value
     if kind == 4:
         file.add_parameter("FORCE_PLATFORM", "CAL_MATRIX", MIXED[:, :, None])
-    file.write(str(path / "plate.c3d"))
-    (plate,) = read_c3d(path / "plate.c3d", "+X,+Z").plates
-    return plate
+    return file
+
+
+def file_of(path: Path, *given: Any, **more: Any) -> ForcePlates:
+    """Write what `made` makes, and read it."""
+    made(*given, **more).write(str(path / "plate.c3d"))
+    return read_c3d(path / "plate.c3d", "+X,+Z").plates
+
+
+def plate_of(path: Path, *given: Any, **more: Any) -> PlateWrench:
+    return file_of(path, *given, **more).wrench(1)
 
 
 @pytest.mark.parametrize("metres", [False, True], ids=["as said", "in m and Nm, where they are"])
@@ -137,10 +151,103 @@ def test_units_of_a_plate_are_refused_where_they_are_unknown_and_told_where_they
     assert plate.told == ("plate 1: the unit of a force is not said; N and N times POINT:UNITS are taken",)
 
 
-def test_a_file_that_says_no_units_at_all_is_read_and_another_type_of_plate_is_refused() -> None:
-    turned = np.eye(3)
-    assert list(plate_wrenches({"parameters": {}, "data": {}}, 1.0, turned)) == []
-    plate = {"TYPE": {"value": [5]}, "CHANNEL": {"value": np.ones((6, 1))}}
-    file = {"parameters": {"FORCE_PLATFORM": plate}, "data": {"platform": [{}]}}
+def moments(wrench: tuple[np.ndarray, np.ndarray]) -> Channels:
+    """Return channels of type 2 that have the wrench."""
+    force, moment = wrench
+    return of_moments((force @ LAB.T @ PLATE).T, (moment @ LAB.T @ PLATE).T)
+
+
+@pytest.mark.parametrize(("kind", "channels"), [(2, of_moments), (3, of_sensors), (4, of_voltages)])
+def test_an_origin_above_the_surface_is_turned_round_and_told(
+    kind: int,
+    channels: Callable[[np.ndarray, np.ndarray], Channels],
+    wrench: tuple[np.ndarray, np.ndarray],
+    tmp_path: Path,
+) -> None:
+    """ezc3d turns all of it round, which for type 3 has two distances of sensors."""
+    force, moment = wrench
+    values, units, origin = channels((force @ LAB.T @ PLATE).T, (moment @ LAB.T @ PLATE).T)
+    plate = plate_of(tmp_path, kind, values, units, [*origin[:2], -origin[2]])
+    assert relative_error(plate.moment, moment) < 1e-6
+    (told,) = plate.told
+    assert "ORIGIN is above its surface, and is taken with the other sign" in told
+
+
+def test_units_of_channels_beyond_255_are_read(wrench: tuple[np.ndarray, np.ndarray]) -> None:
+    """UNITS2 goes on after UNITS; ezc3d reads such files, and does not write them."""
+    values, _, origin = moments(wrench)
+    metres = values / np.array([[1.0]] * 3 + [[1000.0]] * 3)
+    channels = np.concatenate([np.zeros((254, values.shape[1])), metres])
+    units = ["V"] * 254 + ["N"] * 3 + ["Nm"] * 3
+    file = made(2, channels, units, origin, CHANNEL=np.arange(255, 261)[:, None])
+    plate = ForcePlates(file, 0.001, LAB.T).wrench(1)
+    assert relative_error(plate.moment, wrench[1]) < 1e-6
+    assert not plate.told
+
+
+def test_a_matrix_gives_newtons_unless_the_channels_of_its_plate_are_forces(
+    wrench: tuple[np.ndarray, np.ndarray], tmp_path: Path
+) -> None:
+    force, moment = wrench
+    values, _, origin = moments(wrench)
+    in_metres = values / np.array([[1.0]] * 3 + [[1000.0]] * 3)
+    for wanted, units in ((values, ["V"] * 6), (in_metres, ["N"] * 3 + ["Nm"] * 3)):
+        plate = plate_of(tmp_path, 4, np.linalg.solve(MIXED, wanted), units, origin)
+        assert relative_error(plate.force, force) < 1e-6
+        assert relative_error(plate.moment, moment) < 1e-6
+    with pytest.raises(LinkwiseError, match="ANALOG:UNITS of a force is 'kN'"):
+        plate_of(tmp_path, 4, values, ["kN"] * 3 + ["Nm"] * 3, origin)
+
+
+def test_frames_in_which_nothing_presses_are_told_with_the_force_there(
+    wrench: tuple[np.ndarray, np.ndarray], tmp_path: Path
+) -> None:
+    values, units, origin = moments(wrench)
+    values[:, :10] = 0.0
+    for zero in ([0, 0], [1, 10], [9, 4]):
+        assert not plate_of(tmp_path, 2, values, units, origin, ZERO=np.array(zero)).told
+    values[:3] += np.array([[3.0], [0.0], [4.0]])
+    for zero in ([1, 10], [0, 10]):
+        (told,) = plate_of(tmp_path, 2, values, units, origin, ZERO=np.array(zero)).told
+        assert "nothing presses in frames 1 to 10; its mean force of 5 N there is not taken off" in told
+
+
+def test_units_may_have_signs_beyond_ascii_in_latin_1(
+    wrench: tuple[np.ndarray, np.ndarray], tmp_path: Path
+) -> None:
+    values, _, origin = moments(wrench)
+    for unit in ("Nqmm", "N mm"):
+        file_of(tmp_path, 2, values, ["N"] * 3 + [unit] * 3, origin)
+        file = tmp_path / "plate.c3d"
+        file.write_bytes(file.read_bytes().replace(b"Nqmm", b"N\xb7mm"))
+        plate = read_c3d(file, "+X,+Z").plates.wrench(1)
+        assert relative_error(plate.moment, wrench[1]) < 1e-6
+    with pytest.raises(LinkwiseError, match=r"'nmm'; Nm, .*, Nmm, .*, N mm are read, written so"):
+        plate_of(tmp_path, 2, values, ["N"] * 3 + ["nmm"] * 3, origin)
+
+
+def test_a_plate_that_is_not_read_is_refused_only_when_it_is_asked_for(
+    wrench: tuple[np.ndarray, np.ndarray], tmp_path: Path
+) -> None:
+    values, units, origin = moments(wrench)
+    plates = file_of(tmp_path, 5, values, units, origin)
+    assert plates.count == 1
     with pytest.raises(LinkwiseError, match="plate 1 is of type 5; types 1, 2, 3, 4 are read"):
-        list(plate_wrenches(file, 1.0, turned))
+        plates.wrench(1)
+    plates = file_of(tmp_path, 2, values, units, origin, CHANNEL=np.arange(4, 10)[:, None])
+    with pytest.raises(LinkwiseError, match="plate 1: FORCE_PLATFORM:CHANNEL names no 6 of the file's 6"):
+        plates.wrench(1)
+    assert file_of(tmp_path, 2, values, units, origin, USED=np.array([0])).count == 0
+
+
+def test_corners_that_are_missing_or_do_not_go_round_are_refused(
+    wrench: tuple[np.ndarray, np.ndarray], tmp_path: Path
+) -> None:
+    values, units, origin = moments(wrench)
+    edges = np.array([[200.0, -200.0, -200.0, 200.0], [-100.0, -100.0, 100.0, 100.0], [0.0] * 4])
+    crossed = edges[:, [0, 1, 3, 2], None]
+    for corners, told in ((0.0 * crossed, "does not say where it is"), (crossed, "go round a rectangle")):
+        plates = file_of(tmp_path, 2, values, units, origin, CORNERS=corners)
+        assert plates.size(1) == pytest.approx(np.linalg.norm(wrench[0], axis=1))
+        with pytest.raises(LinkwiseError, match=f"plate 1: FORCE_PLATFORM:CORNERS .*{told}"):
+            plates.wrench(1)

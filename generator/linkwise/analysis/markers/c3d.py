@@ -1,13 +1,14 @@
 """Markers and wrenches of plates in a C3D file, by ezc3d: in m, N and N·m, in axes of OpenSim's models."""
 
-import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from linkwise.analysis.markers.force_plates import PlateWrench, plate_wrenches
+from linkwise.analysis.markers.c3d_head import read_head
+from linkwise.analysis.markers.c3d_parameters import C3DParameters
+from linkwise.analysis.markers.force_plates import ForcePlates
 from linkwise.analysis.opensim.recorded_markers import METRES, RecordedMarkers, recorded_markers
 from linkwise.arrays import Array
 from linkwise.errors import LinkwiseError, within
@@ -16,12 +17,6 @@ from linkwise.extras import extra
 from linkwise.input_file import require_file
 
 AXES = {"X": 0, "Y": 1, "Z": 2}
-HEAD, COUNTS, BLOCK = 10, "HH", 512
-"""Bytes of the header up to its numbers of the first and the last frame, these two, and bytes of a block."""
-BIG_ENDIAN = b"\x56"
-"""Byte in the parameters of a file whose numbers begin with the large end; MIPS processors wrote it so."""
-MOST = 65535
-"""Number of the last frame in a file of more frames than the header can count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +25,7 @@ class RecordedC3D:
 
     markers: RecordedMarkers
     plate_time: Array
-    plates: tuple[PlateWrench, ...]
+    plates: ForcePlates
     axes: str
     """Axes of the laboratory that are x of the model, and up."""
 
@@ -41,37 +36,29 @@ def read_c3d(path: Path, axes: str) -> RecordedC3D:
     axes: the axes of the laboratory that are the model's x, and up, such as +X,+Z; empty for those that the
     file says
 
-    Raises LinkwiseError for a file that is no C3D, has no markers, or does not say which axis is up.
+    Raises LinkwiseError for a file that is no C3D, was cut short, has no markers, has one farther than
+    FARTHEST, has no rate, or does not say which axis is up.
     """
     require_file(path)
     library = extra("ezc3d")
     with within(str(path)):
+        if head := read_head(path):
+            head.require_rate()
         try:
-            file = library.c3d(str(path), extract_forceplat_data=True)
+            file = library.c3d(str(path))
         except (OSError, ValueError, RuntimeError, IndexError) as error:
             raise LinkwiseError(f"ezc3d does not read it: {' '.join(str(error).split())}") from None
-        _require_whole(path, int(file["data"]["points"].shape[2]))
-        return _recorded(file, axes)
+        if head is None:
+            raise LinkwiseError("it is no C3D file; export it again")
+        given, frames = C3DParameters(file), int(file["data"]["points"].shape[2])
+        actual = [given.numbers("TRIAL", f"ACTUAL_{end}_FIELD").ravel() for end in ("START", "END")]
+        head.require_whole(frames, actual)
+        return _recorded(file, given, head.rate, axes)
 
 
-def _require_whole(path: Path, frames: int) -> None:
-    """Raise LinkwiseError where fewer frames are there than the header says: ezc3d reads what is left."""
-    with path.open("rb") as file:
-        head = file.read(HEAD)
-        file.seek((head[0] - 1) * BLOCK + 3)
-        order = ">" if file.read(1) == BIG_ENDIAN else "<"
-    first, last = struct.unpack(order + COUNTS, head[-4:])
-    if last < MOST and frames < last - first + 1:
-        raise LinkwiseError(
-            f"its head says {last - first + 1} frames, and {frames} are there: it was cut short; export or"
-            " copy it again"
-        )
-
-
-def _recorded(file: Any, axes: str) -> RecordedC3D:
-    point = file["parameters"]["POINT"]
+def _recorded(file: Any, given: C3DParameters, rate: float, axes: str) -> RecordedC3D:
     places = np.asarray(file["data"]["points"], dtype=float)[:3].transpose(2, 1, 0)
-    labels = [str(name).strip() for name in point["LABELS"]["value"]][: places.shape[1]]
+    labels = given.texts("POINT", "LABELS")[: places.shape[1]]
     kept = [at for at, name in enumerate(labels) if name and not name.startswith("*")]
     if not kept or len(places) < 2:
         raise LinkwiseError(
@@ -84,25 +71,21 @@ def _recorded(file: Any, axes: str) -> RecordedC3D:
             f"several markers have one name, {listed(map(repr, twice[:4]))}, where what stands before the"
             " colon is left out; keep those of one subject, or rename them"
         )
-    told = axes or ",".join(_text(point, name) for name in ("X_SCREEN", "Y_SCREEN"))
+    told = axes or ",".join(given.text("POINT", name) for name in ("X_SCREEN", "Y_SCREEN"))
     turn = _turn(told, "--c3d-axes" if axes else "POINT:X_SCREEN and Y_SCREEN")
-    rate = float(file["parameters"]["POINT"]["RATE"]["value"][0])
     begin = float(file["header"]["points"]["first_frame"]) / rate
-    unit = _text(point, "UNITS")
+    unit = given.text("POINT", "UNITS")
     if unit not in METRES:
         raise LinkwiseError(f"POINT:UNITS is {unit!r}; lengths are read in {listed(METRES)}")
     markers = recorded_markers(
-        begin + np.arange(len(places)) / rate, names, places[:, kept] * METRES[unit] @ turn.T
+        begin + np.arange(len(places)) / rate,
+        names,
+        METRES[unit] * _turned(places[:, kept], turn),
+        lambda frame: f"frame {frame + 1}",
     )
-    plates = tuple(plate_wrenches(file, METRES[unit], turn))
-    every = float(file["header"]["analogs"]["frame_rate"] or rate)
-    count = len(plates[0].force) if plates else 0
-    return RecordedC3D(markers, begin + np.arange(count) / every, plates, told)
-
-
-def _text(group: Any, name: str) -> str:
-    values = group[name]["value"] if name in group else []
-    return str(values[0]).strip() if len(values) else ""
+    plates = ForcePlates(file, METRES[unit], turn)
+    every = rate * max(plates.samples // len(places), 1)
+    return RecordedC3D(markers, begin + np.arange(plates.samples) / every, plates, told)
 
 
 def _turn(text: str, source: str) -> Array:
@@ -119,3 +102,9 @@ def _turn(text: str, source: str) -> Array:
             " which is up; give --c3d-axes +X,+Z, say"
         )
     return np.array([*rows, np.cross(*rows)])
+
+
+def _turned(places: Array, turn: Array) -> Array:
+    """Return places (..., 3) in the model's axes; a product would make a number of infinity none."""
+    found: Array = places[..., np.abs(turn).argmax(axis=1)] * turn.sum(axis=1)
+    return found

@@ -10,11 +10,12 @@ from linkwise.analysis.filtering import lowpass
 from linkwise.analysis.loads import Load, Loads
 from linkwise.analysis.markers import SUFFIXES, MarkerChoices
 from linkwise.analysis.markers.c3d import RecordedC3D, read_c3d
+from linkwise.analysis.markers.force_plates import ForcePlates
 from linkwise.analysis.opensim.inverse_kinematics import MOTION, FollowedMarkers, inverse_kinematics
 from linkwise.analysis.opensim.trc_file import read_trc
 from linkwise.analysis.settings import Lowpass
 from linkwise.arrays import Array
-from linkwise.errors import LinkwiseError
+from linkwise.errors import LinkwiseError, within
 from linkwise.escape import listed
 from linkwise.input_file import require_file
 from linkwise.own_opensim import asked_of_opensim
@@ -100,7 +101,8 @@ def followed(
         recorded = read_c3d(log, asked.axes)
         markers = recorded.markers
         told.append(f"{recorded.axes} of the laboratory are x of the model, and up")
-        given, notes = _plates(log, asked, recorded)
+        with within(str(log)):
+            given, notes = _plates(log, asked, recorded)
         loads, told = replace(loads, given=(*loads.given, *given)), [*told, *notes]
     elif not asked.is_of_plates:
         markers = read_trc(log)
@@ -129,21 +131,17 @@ def followed(
 def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tuple[Load, ...], list[str]]:
     """Return the loads of the plates that are given, and what is told of them and the others."""
     under = {one.number: one for one in asked.under}
-    missing = [number for number in under if number > len(recorded.plates)]
+    missing = [number for number in under if number > recorded.plates.count]
     if missing:
-        raise LinkwiseError(
-            f"{log}: --plate {missing[0]}: it has {len(recorded.plates)} plates, counted from 1"
-        )
+        raise LinkwiseError(f"--plate {missing[0]}: it has {recorded.plates.count} plates, counted from 1")
     found, told = [], []
-    for number, plate in enumerate(recorded.plates, 1):
-        size = np.linalg.norm(plate.force, axis=1)
-        most = float(np.nan_to_num(size).max(initial=0.0))
-        is_bare = size < asked.least
+    for number in range(1, recorded.plates.count + 1):
         if (given := under.get(number)) is None:
-            if most > asked.least:
-                told.append(f"plate {number} bears up to {most:.4g} N and is left out; --plate {number}=BODY")
+            told += _left_out(recorded.plates, number, asked.least)
             continue
+        plate = recorded.plates.wrench(number)
         told += plate.told
+        is_bare = np.linalg.norm(plate.force, axis=1) < asked.least
         wrench = np.column_stack([plate.force, plate.moment])
         wrench[is_bare] = 0.0  # where a file may have no centre of pressure
         # The ground presses and does not pull: a force that points down is that on the plate.
@@ -154,7 +152,7 @@ def _plates(log: Path, asked: MarkerChoices, recorded: RecordedC3D) -> tuple[tup
             told.append(f"plate {number} never bears {asked.least:g} N: it loads {given.body} with nothing")
         if gaps := np.flatnonzero(np.isnan(wrench).any(axis=1)).tolist():
             raise LinkwiseError(
-                f"{log}: plate {number}: {len(gaps)} of its {len(wrench)} samples have no numbers, first the"
+                f"plate {number}: {len(gaps)} of its {len(wrench)} samples have no numbers, first the"
                 f" {gaps[0] + 1}th; fill the gap"
             )
         load = Load(
@@ -176,3 +174,14 @@ def _filtered(load: Load, wrench: Array, cutoff: float) -> Load:
     time, smooth = np.asarray(load.time), wrench.copy()
     lowpass(smooth, 1.0 / float(time[1] - time[0]), Lowpass(cutoff), flag="--loads-cutoff")
     return replace(load, force=smooth[:, :3], moment=smooth[:, 3:], filtered=cutoff, unfiltered=load)
+
+
+def _left_out(plates: ForcePlates, number: int, least: float) -> list[str]:
+    """Return a line on a plate under no body, where it bears more than `least`, or is not read."""
+    try:
+        most = float(np.nan_to_num(plates.size(number)).max(initial=0.0))
+    except LinkwiseError as error:
+        return [f"{error}; it is under no body, and left out"]
+    if most > least:
+        return [f"plate {number} bears up to {most:.4g} N and is left out; --plate {number}=BODY"]
+    return []

@@ -22,8 +22,6 @@ FIRST = 6
 """Line of the first row, where none is empty above it."""
 OFF = 0.01
 """Part by which the rate of the times may be off what the head says."""
-FARTHEST = 1e4
-"""Largest coordinate of a marker, in m."""
 
 
 def read_trc(path: Path) -> RecordedMarkers:
@@ -33,7 +31,7 @@ def read_trc(path: Path) -> RecordedMarkers:
     do not increase, another unit, and two markers of one name.
     """
     with within(path.name):
-        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+        lines = path.read_text(encoding="utf-8-sig", errors="replace").split("\n")
         if len(lines) < FIRST or not lines[0].startswith("PathFileType"):
             raise LinkwiseError("its first line is not that of a .trc file, PathFileType, or no row follows")
         head = dict(zip(_words(lines[1]), _words(lines[2]), strict=False))
@@ -53,11 +51,12 @@ def read_trc(path: Path) -> RecordedMarkers:
         for bad, why in (
             (~np.isfinite(time), "it has no time"),
             (np.diff(time, prepend=-np.inf) <= 0.0, "its time is not after that of the row before it"),
-            ((np.abs(places) > FARTHEST).any(axis=(1, 2)), f"a marker is farther than {FARTHEST:g} m away"),
         ):
             if bad.any():
                 raise LinkwiseError(f"line {rows[int(bad.argmax())][0]}: {why}")
-        return recorded_markers(time, names, places, list(_odd(head, time)))
+        return recorded_markers(
+            time, names, places, lambda row: f"line {rows[row][0]}", list(_odd(head, time))
+        )
 
 
 def _words(line: str) -> list[str]:
@@ -107,7 +106,11 @@ def _cell(text: str, number: int) -> float:
 
 def _odd(head: Mapping[str, str], time: Array) -> Iterator[str]:
     """Yield lines on numbers of the head that are not those of the rows, whose count and times are taken."""
-    frames, rate = (_number(head.get(key, "")) for key in ("NumFrames", "DataRate"))
+    said = {key: head.get(key, "") for key in ("NumFrames", "DataRate")}
+    frames, rate = map(_number, said.values())
+    for key, text in said.items():
+        if text and np.isnan(_number(text)):
+            yield f"its head says {short(text)!r} as {key}, which is no number, and is not heeded"
     if np.isfinite(frames) and frames != len(time):
         yield f"its head says {frames:.0f} frames, and {len(time)} are there"
     own = 1.0 / float(np.diff(time).mean()) if len(time) > 1 else rate
@@ -116,8 +119,9 @@ def _odd(head: Mapping[str, str], time: Array) -> Iterator[str]:
 
 
 def _number(text: str) -> float:
+    """Return a number of the head, where programs of some countries write a comma for the point."""
     try:
-        return float(text)
+        return float(text.replace(",", "."))
     except ValueError:
         return float("nan")
 
