@@ -80,8 +80,8 @@ def test_frames_that_the_head_cannot_count_are_those_of_the_parameters(tmp_path:
     ):
         read_c3d(file, "+X,+Z")
     again = ezc3d.c3d(str(file))
-    again.add_parameter("TRIAL", "ACTUAL_START_FIELD", np.array([11, 0]))
-    again.add_parameter("TRIAL", "ACTUAL_END_FIELD", np.array([5, 1]))
+    again.add_parameter("TRIAL", "ACTUAL_START_FIELD", [11, 0])
+    again.add_parameter("TRIAL", "ACTUAL_END_FIELD", [5, 1])
     again.write(str(file))
     with pytest.raises(
         LinkwiseError, match=r"TRIAL:ACTUAL_END_FIELD says 65531 frames, and \d+ are there: it was cut"

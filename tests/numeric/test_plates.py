@@ -240,6 +240,17 @@ def test_a_plate_that_is_not_read_is_refused_only_when_it_is_asked_for(
     assert file_of(tmp_path, 2, values, units, origin, USED=np.array([0])).count == 0
 
 
+def test_channels_whose_offset_is_below_zero_are_refused(wrench: tuple[np.ndarray, np.ndarray]) -> None:
+    """ezc3d drops the sign, so that all would be off by twice the offset."""
+    file = made(2, *moments(wrench))
+    file["parameters"]["ANALOG"]["OFFSET"]["value"] = [0, -200, 0, 0, 0, 0]
+    with pytest.raises(LinkwiseError, match="plate 1: ANALOG:OFFSET of its channels is below 0"):
+        ForcePlates(file, 0.001, LAB.T).wrench(1)
+    file["parameters"]["ANALOG"]["OFFSET"]["value"] = [-32768] * 6
+    file["parameters"]["ANALOG"]["FORMAT"]["value"] = ["UNSIGNED"]
+    assert relative_error(ForcePlates(file, 0.001, LAB.T).wrench(1).force, wrench[0]) < 1e-6
+
+
 def test_corners_that_are_missing_or_do_not_go_round_are_refused(
     wrench: tuple[np.ndarray, np.ndarray], tmp_path: Path
 ) -> None:

@@ -24,13 +24,11 @@ class C3DParameters:
 
     def texts(self, group: str, name: str) -> list[str]:
         """Return the texts of a parameter and of its further parts, as `LABELS2`, without spaces around."""
-        found: list[str] = []
-        part = 1
-        while len(values := self._values(group, f"{name}{part}" if part > 1 else name)):
-            found += [""] * (PART * (part - 1) - len(found))
-            found += [decoded(str(text)).strip() for text in values]
-            part += 1
-        return found
+        return [decoded(str(text)).strip() for text in self._of_parts(group, name, "")]
+
+    def of_channels(self, name: str) -> Array:
+        """Return the numbers (C,) of a parameter in ANALOG and of its further parts, 0 where one is short."""
+        return np.array(self._of_parts("ANALOG", name, 0.0), dtype=float)
 
     def text(self, group: str, name: str) -> str:
         """Return the first text of a parameter, empty where it has none."""
@@ -41,18 +39,28 @@ class C3DParameters:
 
         shape: of one plate's numbers; -1 for as many as there are
 
-        Raises LinkwiseError where the file has fewer.
+        Raises LinkwiseError where the file has fewer, or in another shape.
         """
         values = self.numbers("FORCE_PLATFORM", name)
+        is_other = len(shape) > 1 and values.ndim > len(shape) and values.shape[: len(shape)] != shape
         if shape == (-1,):
             shape = (values.shape[0],) if values.ndim == 2 else (values.size,)
         flat, size = values.ravel(order="F"), int(np.prod(shape))
         own = flat[size * (number - 1) : size * number]
-        if not size or len(own) < size:
+        if is_other or not size or len(own) < size:
             raise LinkwiseError(
-                f"plate {number}: FORCE_PLATFORM:{name} has none of its numbers; export the file again"
+                f"plate {number}: FORCE_PLATFORM:{name} has not its {size} numbers; export the file again"
             )
         return own.reshape(shape, order="F")
+
+    def _of_parts(self, group: str, name: str, lacking: Any) -> list[Any]:
+        found: list[Any] = []
+        part = 1
+        while len(values := self._values(group, f"{name}{part}" if part > 1 else name)):
+            found += [lacking] * (PART * (part - 1) - len(found))
+            found += list(values)
+            part += 1
+        return found
 
     def _values(self, group: str, name: str) -> Sequence[Any]:
         found: Sequence[Any] = self._groups.get(group, {}).get(name, {}).get("value", ())

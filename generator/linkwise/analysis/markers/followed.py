@@ -181,7 +181,7 @@ def _left_out(plates: ForcePlates, number: int, least: float) -> list[str]:
     try:
         most = float(np.nan_to_num(plates.size(number)).max(initial=0.0))
     except LinkwiseError as error:
-        return [f"{error}; it is under no body, and left out"]
+        return [f"left out, as it is under no body: {error}"]
     if most > least:
         return [f"plate {number} bears up to {most:.4g} N and is left out; --plate {number}=BODY"]
     return []

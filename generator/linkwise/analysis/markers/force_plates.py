@@ -74,8 +74,8 @@ class ForcePlates:
         kind = int(self._given.of_plate(number, "TYPE", 1)[0])
         if kind not in CHANNELS:
             raise LinkwiseError(
-                f"plate {number} is of type {kind}; types {listed(CHANNELS)} are read; leave it out, or"
-                " export the file with one of these"
+                f"plate {number} is of type {kind}; types {listed(CHANNELS)} are read; export the file"
+                " with one of these"
             )
         letters = CHANNELS[kind]
         at = self._given.of_plate(number, "CHANNEL", -1)[: len(letters)].astype(int) - 1
@@ -84,6 +84,7 @@ class ForcePlates:
                 f"plate {number}: FORCE_PLATFORM:CHANNEL names no {len(letters)} of the file's"
                 f" {len(self._channels)} channels; export the file again"
             )
+        self._require_offsets(number, at)
         units = [self._units[channel] if channel < len(self._units) else "" for channel in at]
         values, sized = self._channels[at], sizes
         if kind == OF_MATRIX and (matrix := self._calibration(number)) is not None:
@@ -93,6 +94,17 @@ class ForcePlates:
         origin, lines = self._origin(number, kind)
         force, moment = WRENCHES[kind](values, origin)
         return force.T, moment.T, told + lines
+
+    def _require_offsets(self, number: int, at: Array) -> None:
+        """Raise LinkwiseError where ezc3d, which drops the sign of ANALOG:OFFSET, scales channels wrongly."""
+        offsets = self._given.of_channels("OFFSET")
+        own = offsets[at[at < len(offsets)]]
+        is_unsigned = self._given.text("ANALOG", "FORMAT").upper() == "UNSIGNED"
+        if ((own % 65536 if is_unsigned else own) != np.abs(own)).any():
+            raise LinkwiseError(
+                f"plate {number}: ANALOG:OFFSET of its channels is below 0, which ezc3d takes for above 0;"
+                " export the file with an offset of 0"
+            )
 
     def _calibration(self, number: int) -> Array | None:
         """Return the matrix (6, 6) of a plate of type 4; None where a program left it out, or empty."""
