@@ -9,7 +9,7 @@ from threading import Lock
 
 from mutation.mutants import Mutant
 from mutation.reach import Map, digest
-from mutation.rooms import NOT_COUNTED, ROOMS
+from mutation.rooms import NOT_COUNTED, ROOMS, test_files
 from mutation.tree import ROOT, Ended, Tree, say
 from mutation.verdicts import Record
 
@@ -37,8 +37,8 @@ class Decider:
         """Tests of each process, and their seconds: what reaches the change, else what the room names.
 
         First what caught it before; what it is known to survive is left out. Last what the room names and no
-        map has measured: tests of `make ship`. Where the map is not whole, quick ones of what it knows to
-        reach the change are all.
+        map has measured: tests of `make ship`. Where the map is not whole, quick ones that reach the change
+        are all, once it has the tests of the room's own folder.
         """
         tried = self.record.survived(mutant)
         before = self.record.caught_before(mutant)
@@ -46,7 +46,8 @@ class Decider:
             known = self.reach.files.get(before.partition("::")[0])
             yield [before], known.seconds.get(before, UNMEASURED) if known else UNMEASURED
             tried |= {before}
-        near, far = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
+        is_mapped = mutant.path.endswith(".py") and (whole or self._has_own_tests(room))
+        near, far = self.reach.tests(mutant.path, mutant.line) if is_mapped else ([], [])
         limits, last = STAGES if whole else STAGES[:2], self._named(room)
         if not near and whole:
             near, limits, last = last, (*STAGES[:2], float("inf")), []
@@ -67,6 +68,11 @@ class Decider:
                     break
             if tests:
                 yield tests, total
+
+    def _has_own_tests(self, room: str) -> bool:
+        """Return whether the map has all tests in the folder with a room's name."""
+        own = [name for name in test_files() if name.startswith(f"tests/{room.partition('/')[0]}/")]
+        return bool(own) and all(name in self.reach.files for name in own)
 
     def _named(self, room: str) -> list[tuple[str, float]]:
         """Tests of the files that a room names, with their seconds, quick ones first."""

@@ -26,7 +26,7 @@ COMMANDS = {
     "replay": "Run the analysis of a bundle again, and compare its result with the bundle's.",
     "identify": "Identify links from a log of motion and torques: masses, centres, inertias, friction.",
     "example": "Put a whole case into a folder: robot, movement, forces, and what to type next.",
-    "cite": "Print the references of what a result used, as BibTeX.",
+    "cite": "Print the references of what a result used, as BibTeX; without one those of linkwise itself.",
     "graph": "Show what autograd computes for a partial torque, or a part of it; equal operations are one.",
     "motion": "Write two motions modelled on the paper's Fig. 5 and 10, for the arm of Table 2, `planar3`.",
 }
