@@ -9,7 +9,7 @@ from threading import Lock
 
 from mutation.mutants import Mutant
 from mutation.reach import Map, digest
-from mutation.rooms import NOT_COUNTED, ROOMS, test_files
+from mutation.rooms import NOT_COUNTED, ROOMS
 from mutation.tree import ROOT, Ended, Tree, say
 from mutation.verdicts import Record
 
@@ -36,9 +36,8 @@ class Decider:
     def stages(self, room: str, mutant: Mutant, whole: bool = True) -> Iterator[tuple[list[str], float]]:
         """Tests of each process, and their seconds: what reaches the change, else what the room names.
 
-        First what caught it before; what it is known to survive is left out. Last what the room names and no
-        map has measured: tests of `make ship`. Where the map is not whole, quick ones that reach the change
-        are all, once it has the tests of the room's own folder.
+        First what caught it before, which is all where the map is not whole; what it is known to survive is
+        left out. Last what the room names and no map has measured: tests of `make ship`.
         """
         tried = self.record.survived(mutant)
         before = self.record.caught_before(mutant)
@@ -46,15 +45,16 @@ class Decider:
             known = self.reach.files.get(before.partition("::")[0])
             yield [before], known.seconds.get(before, UNMEASURED) if known else UNMEASURED
             tried |= {before}
-        is_mapped = mutant.path.endswith(".py") and (whole or self._has_own_tests(room))
-        near, far = self.reach.tests(mutant.path, mutant.line) if is_mapped else ([], [])
-        limits, last = STAGES if whole else STAGES[:2], self._named(room)
-        if not near and whole:
+        if not whole:
+            return
+        near, far = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
+        limits, last = STAGES, self._named(room)
+        if not near:
             near, limits, last = last, (*STAGES[:2], float("inf")), []
-        last = [item for item in last if item[0] in ROOMS[room].tests and whole]
+        last = [item for item in last if item[0] in ROOMS[room].tests]
         close, beside, apart = (
             iter([item for item in part if not tried & {item[0], item[0].partition("::")[0]}])
-            for part in (near, far if whole else [], last)
+            for part in (near, far, last)
         )
         every = (*((close, limit) for limit in limits), (beside, BESIDE), (apart, float("inf")))
         for ranked, limit in every:
@@ -68,11 +68,6 @@ class Decider:
                     break
             if tests:
                 yield tests, total
-
-    def _has_own_tests(self, room: str) -> bool:
-        """Return whether the map has all tests in the folder with a room's name."""
-        own = [name for name in test_files() if name.startswith(f"tests/{room.partition('/')[0]}/")]
-        return bool(own) and all(name in self.reach.files for name in own)
 
     def _named(self, room: str) -> list[tuple[str, float]]:
         """Tests of the files that a room names, with their seconds, quick ones first."""

@@ -6,8 +6,7 @@ Each mutant runs in a process forked from one that has the heavy libraries, in a
 killed when a test that may notice it fails, or takes far more processor time than without it. What survives
 is to be killed by a test, or listed in equivalents.json with the reason why nothing that is promised changes.
 First each is put to the test that caught it when its file was another. For what is left, files of tests that
-are new run once under coverage, which tells what they reach; mutants of a room are put to those of its folder
-when these are through, all others when all are.
+are new run once under coverage, which tells what they reach.
 --minutes ends the sweep, and the next one goes on from there, in any clone: what is caught is in caught.json.
 --write puts the scores into docs/trust.md.
 """
@@ -18,7 +17,6 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import groupby
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TypeVar
@@ -85,9 +83,8 @@ def swept(options: argparse.Namespace) -> bool:
     with tempfile.TemporaryDirectory() as folder:
         trees = [Tree(Path(folder) / str(k)) for k in range(options.jobs)]
         unknown = [name for name in test_files() if name not in reach.files]
-        folders = [list(files) for _, files in groupby(unknown, key=lambda name: name.rpartition("/")[0])]
         every = todo = in_turn(options.only, record)
-        for new in ([], *folders):
+        for new in ([], unknown):
             for name in side_by_side(new, reach.add, trees, end):
                 say(f"mapped: {name}")
             whole = all(name in reach.files for name in test_files())
