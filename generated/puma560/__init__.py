@@ -122,7 +122,11 @@ def load(
 
 
 def bodies() -> Bodies[Any]:
-    """Return what the links carry, in arrays of NumPy; with run-time parameters, for their built-in values."""
+    """Return what the links carry, in arrays of NumPy; with run-time parameters, for their built-in values.
+
+    Raises RuntimeError as `load` does.
+    """
+    require_as_imported(ROBOT, __file__)
     from .tree import RULE
 
     return RULE.bodies()

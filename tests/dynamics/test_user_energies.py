@@ -419,6 +419,8 @@ def test_defect_of_a_python_file_is_named(case: str, tmp_path: Path) -> None:
         (sp.Symbol("m") * X.qd**2 * (1 + X.q**2), []),
         (sp.Symbol("m") * X.q**2, [("odd", "kinetic energies without any velocity")]),
         (-sp.Symbol("m") * X.qd**2, [("odd", "kinetic energies that are negative")]),
+        (-sp.pi * X.qd**2 / 2, [("odd", "kinetic energies that are negative")]),
+        (X.q * X.qd**2 / 2, []),  # of a chain that has fallen by X, which is above 0
         (sp.S.Zero, []),
     ],
 )
@@ -454,6 +456,13 @@ def test_a_coordinate_without_mass_is_taken_where_something_else_has_its_velocit
     constraints = more.get("constraints")
     made = energy_system("puck", [X, Y], links, {sp.Symbol("c"): 2.0}, constraints=constraints)
     assert made.coordinates == (X, Y)
+
+
+def test_a_symbol_called_like_time_that_nothing_is_derived_by_is_let_be(tmp_path: Path) -> None:
+    other = "del x\nt, time = sp.symbols('t', real=True), sp.Symbol('t')\n_shown = sp.sin(2 * t)\n"
+    function = "u = sp.Function('x')(time)\ncoordinates = {u: 'm'}\n"
+    (tmp_path / "a.py").write_text(f"{HEAD}{other}{function}links = [LinkEnergy('a', u.diff(time) ** 2)]")
+    assert read_system(tmp_path / "a.py").notes == ()
 
 
 def test_a_python_file_is_no_robot_and_what_reads_it_is_told(tmp_path: Path) -> None:

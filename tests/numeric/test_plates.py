@@ -249,6 +249,17 @@ def test_channels_whose_offset_is_below_zero_are_refused(wrench: tuple[np.ndarra
     file["parameters"]["ANALOG"]["OFFSET"]["value"] = [-32768] * 6
     file["parameters"]["ANALOG"]["FORMAT"]["value"] = ["UNSIGNED"]
     assert relative_error(ForcePlates(file, 0.001, LAB.T).wrench(1).force, wrench[0]) < 1e-6
+    file["parameters"]["POINT"]["SCALE"]["value"] = [0.1]  # then numbers are whole ones
+    with pytest.raises(LinkwiseError, match="plate 1: ANALOG:FORMAT is UNSIGNED, and ezc3d reads"):
+        ForcePlates(file, 0.001, LAB.T).wrench(1)
+
+
+def test_a_matrix_of_zeros_beside_another_is_refused(wrench: tuple[np.ndarray, np.ndarray]) -> None:
+    matrices = np.dstack([np.zeros((6, 6)), np.eye(6)])
+    file = made(4, *moments(wrench))
+    file["parameters"]["FORCE_PLATFORM"]["CAL_MATRIX"]["value"] = matrices
+    with pytest.raises(LinkwiseError, match="plate 1: FORCE_PLATFORM:CAL_MATRIX is all zeros"):
+        ForcePlates(file, 0.001, LAB.T).wrench(1)
 
 
 def test_corners_that_are_missing_or_do_not_go_round_are_refused(

@@ -10,7 +10,7 @@ from helpers.motion_logs import JOINTS, LEG, write_csv
 from helpers.studies import Here
 from linkwise import LinkwiseError
 from linkwise.study import run_study
-from linkwise.study.cycles import CycleSink, written_cycles
+from linkwise.study.cycles import CycleSink, without_flicker, written_cycles
 
 TIME = np.arange(0, 60, 0.01)
 ROWS = np.stack([TIME, np.sin(TIME), TIME**2])
@@ -117,11 +117,15 @@ def test_cycles_by_a_plate_begin_where_its_own_samples_cross_the_threshold(way: 
 def test_cycles_by_a_filtered_load_begin_where_its_force_as_measured_crosses_the_threshold(
     tmp_path: Path,
 ) -> None:
-    """A filter spreads the steep edges, and swings below zero beside them by more than the threshold."""
+    """A filter spreads the steep edges, and swings below zero beside them by more than the threshold.
+
+    Noise above the threshold for less than half of its period counts neither alone nor beside an edge.
+    """
     time, own = np.arange(0, 1.5, 0.01), np.round(np.arange(0, 1.5, 0.001), 3)
     write_csv(tmp_path / "a.csv", np.column_stack([time, np.sin(time)[:, None] * [1, 0.5, 0.2]]))
     stands = ((own > 0.2) & (own < 0.5)) | ((own > 0.8) & (own < 1.1))
-    forces = np.column_stack([own, 800.0 * stands, 0 * own, 0 * own])
+    noise = 30.0 * np.isin(own, [0.1, 0.502, 0.65, 0.796])
+    forces = np.column_stack([own, 800.0 * stands + noise, 0 * own, 0 * own])
     write_csv(tmp_path / "forces.csv", forces, [f"push:link3/force_{axis}" for axis in "xyz"])
     choices = "[analysis]\nloads_cutoff = 20\n"
     trial = '[[trial]]\nlog = "a.csv"\nrobot = "planar3"\nloads = ["forces.csv"]\n'
@@ -130,6 +134,13 @@ def test_cycles_by_a_filtered_load_begin_where_its_force_as_measured_crosses_the
     assert run_study(file, tmp_path / "out", Here()).broken == ()
     found = pd.read_parquet(tmp_path / "out/trials/a/_cycles.parquet")[["start", "end"]]
     np.testing.assert_allclose(found, [(0.2, 0.5), (0.8, 1.1)], rtol=0, atol=0.001)
+
+
+def test_flicker_is_left_out_and_then_gaps_are_filled() -> None:
+    up, down = np.array([0.1, 0.3, 0.305, 0.41, 0.9]), np.array([0.05, 0.102, 0.304, 0.4, 0.6, 0.95])
+    found = without_flicker(up, down, 0.025)
+    np.testing.assert_array_equal(np.concatenate(found), [0.305, 0.9, 0.05, 0.6, 0.95])
+    np.testing.assert_array_equal(np.concatenate(without_flicker(up, down, 0.0)), [*up, *down])
 
 
 @pytest.mark.parametrize(

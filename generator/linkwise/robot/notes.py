@@ -21,7 +21,7 @@ FLOATS = f"six coordinates without any contact forces, {TURNS}"
 
 TURN = 6.3
 """A full turn in rad, and some rounding."""
-MOST_DEGREES = 720.0
+LEAST_DEGREES, MOST_DEGREES = 30.0, 720.0
 SHOWN = 5
 """Most subjects that one line of effects names."""
 LONGEST_ITEM = 150
@@ -106,14 +106,14 @@ def effects(notes: Iterable[Note], every: bool = False) -> tuple[str, ...]:
 def winding(turns: Mapping[str, Sequence[float]], ends: Mapping[str, Sequence[float]]) -> tuple[Note, ...]:
     """Return a note for each place in a file whose angles, which are radians there, look like degrees.
 
-    turns: angles of poses, none of which needs more than a full turn; ends: ranges of hinges, of which whole
-    fives from two turns to a robot's 720 degrees are told
+    turns: angles of poses, none of which needs more than a full turn; ends: ranges of hinges, of which 30 to
+    720 in steps of 15 are told: a winch turns as far, but seldom by just so much
     """
     places = [place for place, angles in turns.items() if max(map(abs, angles)) > TURN]
     places += [
         place
         for place, angles in ends.items()
-        if any(2 * TURN < abs(angle) <= MOST_DEGREES and angle % 5 == 0 for angle in angles)
+        if any(LEAST_DEGREES <= abs(angle) <= MOST_DEGREES and angle % 15 == 0 for angle in angles)
     ]
     return tuple(Note("doubtful", place, effect=WINDING) for place in places)
 

@@ -16,6 +16,7 @@ from linkwise.analysis.disk_rows import let_go
 from linkwise.analysis.job import Job
 from linkwise.analysis.loads import FORCE
 from linkwise.analysis.logs.checks import named_once
+from linkwise.analysis.phases import PlacedPhase
 from linkwise.arrays import Array, Index, Mask
 from linkwise.errors import LinkwiseError, within
 from linkwise.extras import extra
@@ -69,7 +70,8 @@ def _edges(job: Job) -> tuple[Array, Array]:
         table = pressing.table
         edges = crossings(table[:, 0], np.linalg.norm(table[:, FORCE], axis=1), job.phases[-1].above)
         first, last = time[0], time[-1]
-        up, down = (edge[(edge >= first) & (edge <= last)] for edge in edges)
+        steady = without_flicker(*edges, _flicker(job.phases[-1]))
+        up, down = (edge[(edge >= first) & (edge <= last)] for edge in steady)
         return up, down
     on = _on(job)
     return time[1:][on[1:] & ~on[:-1]], time[:-1][~on[1:] & on[:-1]]
@@ -85,6 +87,34 @@ def crossings(time: Array, values: Array, above: float) -> tuple[Array, Array]:
     return edges[0], edges[1]
 
 
+def without_flicker(up: Array, down: Array, shortest: float) -> tuple[Array, Array]:
+    """Return when something begins and ends, without spans and then without gaps of less than `shortest`.
+
+    Gaps come last: noise about a threshold would else join to long spans.
+    """
+    edges = sorted([*((at, True) for at in up.tolist()), *((at, False) for at in down.tolist())])
+    for is_begin in (True, False):
+        kept: list[tuple[float, bool]] = []
+        for at, begins in edges:
+            if kept and kept[-1][1] is is_begin and begins is not is_begin and at - kept[-1][0] < shortest:
+                kept.pop()
+            else:
+                kept.append((at, begins))
+        edges = kept
+    return np.array([at for at, begins in edges if begins]), np.array(
+        [at for at, begins in edges if not begins]
+    )
+
+
+def _flicker(phase: PlacedPhase) -> float:
+    """Return how long, in s, a load must press or leave off to count: half a period of its low-pass.
+
+    What is shorter that filter takes for noise; without one all counts.
+    """
+    cutoff = None if phase.load is None else phase.load.cutoff
+    return 0.5 / cutoff if cutoff else 0.0
+
+
 def told_of_ends(cycles: Cycles, job: Job) -> str:
     """Return in words at which instants cycles begin and end."""
     if cycles.table:
@@ -95,7 +125,9 @@ def told_of_ends(cycles: Cycles, job: Job) -> str:
         return f"{told}; at samples of the motion"
     own = phase.pressing.table[:, 0]
     rate = (len(own) - 1) / np.ptp(own) if len(own) > 1 else 0.0
-    return f"{told}; between the load's own samples, of {rate:.6g} Hz, by straight lines"
+    least = 1000 * _flicker(phase)
+    passed_over = f"; what lasts less than {least:.3g} ms does not count" if least else ""
+    return f"{told}; between the load's own samples, of {rate:.6g} Hz, by straight lines{passed_over}"
 
 
 def _on(job: Job) -> Mask:

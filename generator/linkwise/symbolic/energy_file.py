@@ -2,7 +2,7 @@
 
 import ast
 import runpy
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from traceback import walk_tb
 from types import FrameType, ModuleType
@@ -67,7 +67,7 @@ def _system(path: Path, scope: Mapping[str, Any], symbolic: bool, as_made: bool)
     coordinates = scope.get("coordinates")
     if not isinstance(coordinates, (list, tuple, Mapping)):
         raise LinkwiseError("the file must define 'coordinates', a list of linkwise.Coordinate")
-    _refuse_other_times(coordinates, scope)
+    _refuse_other_times(path.read_bytes(), coordinates, scope)
     return energy_system(
         scope.get("name", path.stem),
         coordinates,
@@ -81,20 +81,31 @@ def _system(path: Path, scope: Mapping[str, Any], symbolic: bool, as_made: bool)
     )
 
 
-def _refuse_other_times(coordinates: Iterable[object], scope: Mapping[str, Any]) -> None:
-    """Raise LinkwiseError for a symbol called like the coordinates' time that is another to SymPy.
+def _refuse_other_times(source: bytes, coordinates: Iterable[object], scope: Mapping[str, Any]) -> None:
+    """Raise LinkwiseError where something is derived by a symbol that only looks like the coordinates' time.
 
-    Derivatives by it are zero, and with them whole kinetic energies.
+    To SymPy it is another where assumptions differ: derivatives by it are zero, and with them whole kinetic
+    energies.
     """
+    by = {name for call in ast.walk(ast.parse(source)) for name in _derived_by(call)}
     for function in coordinates:
         for time in function.args if isinstance(function, AppliedUndef) else ():
-            for name, other in scope.items():
+            for name in sorted(by):
+                other = scope.get(name)
                 if isinstance(other, sp.Symbol) and other.name == str(time) and other != time:
                     raise LinkwiseError(
                         f"`{name}` is another symbol than the {time} of which {function} is a function, as "
                         f"their assumptions differ: {function}.diff({name}) is 0; give that of {function}, "
                         "sympy.physics.mechanics.dynamicsymbols._t where dynamicsymbols made it"
                     )
+
+
+def _derived_by(node: ast.AST) -> Iterator[str]:
+    """Yield the names among the arguments of a call of diff or Derivative."""
+    if isinstance(node, ast.Call):
+        called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        if called in ("diff", "Derivative"):
+            yield from (argument.id for argument in node.args if isinstance(argument, ast.Name))
 
 
 def _refuse_doubles(source: bytes) -> None:

@@ -96,10 +96,18 @@ class ForcePlates:
         return force.T, moment.T, told + lines
 
     def _require_offsets(self, number: int, at: Array) -> None:
-        """Raise LinkwiseError where ezc3d, which drops the sign of ANALOG:OFFSET, scales channels wrongly."""
+        """Raise LinkwiseError where ezc3d scales channels wrongly.
+
+        It drops the sign of ANALOG:OFFSET, and reads whole numbers above 32767 as below 0.
+        """
         offsets = self._given.of_channels("OFFSET")
         own = offsets[at[at < len(offsets)]]
         is_unsigned = self._given.text("ANALOG", "FORMAT").upper() == "UNSIGNED"
+        if is_unsigned and self._given.numbers("POINT", "SCALE").max(initial=0.0) > 0.0:
+            raise LinkwiseError(
+                f"plate {number}: ANALOG:FORMAT is UNSIGNED, and ezc3d reads such numbers above 32767 as"
+                " below 0; export the file with signed or with real numbers"
+            )
         if ((own % 65536 if is_unsigned else own) != np.abs(own)).any():
             raise LinkwiseError(
                 f"plate {number}: ANALOG:OFFSET of its channels is below 0, which ezc3d takes for above 0;"
@@ -107,9 +115,16 @@ class ForcePlates:
             )
 
     def _calibration(self, number: int) -> Array | None:
-        """Return the matrix (6, 6) of a plate of type 4; None where a program left it out, or empty."""
-        given = self._given.numbers("FORCE_PLATFORM", "CAL_MATRIX")
-        return self._given.of_plate(number, "CAL_MATRIX", 6, 6) if given.any() else None
+        """Return the matrix (6, 6) of a plate of type 4; None where a program left it out, or all empty."""
+        if not self._given.numbers("FORCE_PLATFORM", "CAL_MATRIX").any():
+            return None
+        matrix = self._given.of_plate(number, "CAL_MATRIX", 6, 6)
+        if not matrix.any():
+            raise LinkwiseError(
+                f"plate {number}: FORCE_PLATFORM:CAL_MATRIX is all zeros, and that of another plate is not;"
+                " export the file with the matrix of each"
+            )
+        return matrix
 
     def _origin(self, number: int, kind: int) -> tuple[Array, list[str]]:
         """Return a plate's origin in m, its z above the surface turned round, as z of plates points down.
