@@ -14,7 +14,7 @@ STATICS = (
     "no kinetic energy, so that accelerations load nothing: derivatives by another symbol than that of which "
     "coordinates are functions are 0"
 )
-STILL = "kinetic energies without any velocity, which count as potential energies do: is a derivative missing"
+STILL = "kinetic energies without any velocity, which count as potential energies do (a derivative missing?)"
 NEGATIVE = "kinetic energies that are negative, as that of no body is"
 STATES = 8
 """Random states at which the sign of a kinetic energy is looked at, half with numbers above 0 alone."""
