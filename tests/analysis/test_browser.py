@@ -13,7 +13,7 @@ import pytest
 from helpers import urdf_text
 from helpers.motion_logs import LEG, PLANAR3, smooth, write_csv
 from linkwise import generate, read_system, write_package
-from linkwise.analysis import Contact, Contacts, Payload, analyze
+from linkwise.analysis import Contact, Contacts, Lowpass, Payload, Processing, analyze
 from linkwise.analysis.certain_signs import plus_minus
 from linkwise.analysis.load_robot import load_robot
 from linkwise.analysis.loads import Load, Loads
@@ -142,6 +142,30 @@ def test_numbers_in_the_table_are_the_files(page, result):
     sizes = [np.abs(table[name].to_numpy()).mean() for (name,), _, _ in cells[:-1]]
     assert sizes == sorted(sizes, reverse=True)
     assert sum(value for _, value, _ in cells[:-1]) == pytest.approx(cells[-1][1], rel=1e-12)
+
+
+def test_shares_that_the_cutoff_changes_are_listed_and_what_is_left_out_is_told(
+    driver, tmp_path, monkeypatch
+):
+    log = write_csv(tmp_path / "log.csv", smooth(300, 3))
+    found = analyze(log, PLANAR3, processing=Processing(lowpass=Lowpass(6.0)), cutoff_sweep=(4, 12, 3))
+    sweep = found.cutoff_sweep
+    for left, told in ((0, "left out."), (1, "left out, and 1 that change least.")):
+        monkeypatch.setattr("linkwise.analysis.show.page_cutoff.MOST", len(sweep.listed) - left)
+        (tmp_path / "report.html").write_text(report(found), encoding="utf-8")
+        opened(driver, (tmp_path / "report.html").as_uri())
+        assert driver.find_element("id", "cutoff-caption").text.endswith(told)
+        driver.execute_script("document.getElementById('every-swept').click()")
+        rows = driver.execute_script(
+            "return [...document.querySelectorAll('#swept tbody tr')]"
+            ".map((row) => [...row.cells].map((cell) => cell.textContent))"
+        )
+        assert len(rows) == len(sweep.listed) - left
+    for cells, at in zip(rows, sweep.listed.tolist(), strict=False):
+        ends = sweep.rms[at, [0, sweep.own, -1]]
+        assert cells[1] == found.robot.joints[sweep.columns[at].joint]
+        assert [float(cell) for cell in cells[3:6]] == pytest.approx(ends.tolist(), rel=6e-3)
+    assert driver.get_log("browser") == []
 
 
 def test_what_accelerates_a_point_is_shown_by_source_and_adds_up(driver, tmp_path):

@@ -158,6 +158,20 @@ def test_lines_of_the_figure_are_the_sizes(tmp_path: Path) -> None:
             np.testing.assert_array_equal(lines[label], np.abs(found.cutoff_sweep[name][at]))
 
 
+def test_the_figure_names_the_joints_that_it_leaves_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = write_csv(tmp_path / "log.csv", smooth(300, 3))
+    found = analyze(log, PLANAR3, processing=Processing(lowpass=Lowpass(6.0)), cutoff_sweep=(4, 12, 3))
+    assert "Not drawn" not in found.figure("cutoff").get_supxlabel()
+    monkeypatch.setattr("linkwise.analysis.show.cutoff_figure.JOINTS", 1)
+    figure = found.figure("cutoff")
+    shown = figure.axes[0].get_title("left").partition(":")[0]
+    others = [f"joint{k}" for k in (1, 2, 3) if f"joint{k}" != shown]
+    words = " ".join(figure.get_supxlabel().split())
+    assert f"Not drawn, as their shares change less: {', '.join(others)}." in words
+
+
 def test_next_to_nothing_is_left_out_of_the_list_and_not_of_the_table(tmp_path: Path) -> None:
     table = smooth(300, 3) * [1, 1, 1, 1e-5]
     log = write_csv(tmp_path / "log.csv", table)

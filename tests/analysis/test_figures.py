@@ -9,6 +9,7 @@ from helpers.motion_logs import LEG, PLANAR3, smooth, write_csv
 from linkwise import Contact, Load, generate, read_system, write_package
 from linkwise.analysis import Analysis, analyze
 from linkwise.analysis.contacts import Contacts
+from linkwise.plotstyle import GRAVITY
 
 JOINTS = ("pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r")
 LINKS = ("pelvis", "thigh", "shank", "foot")
@@ -25,7 +26,7 @@ def stance(tmp_path_factory: pytest.TempPathFactory) -> Analysis:
         Load(body, body, np.stack([40 * np.sin(9 * time), size * (time > 0.2), 0 * time], 1), time=time)
         for body, size in (("foot", 500.0), ("shank", 300.0))
     ]
-    held = Contact("foot", "held", (0.1, -0.06, 0.0), name="sole"), Contact("shank", "point", name="knee")
+    held = Contact("shank", "point", name="knee"), Contact("foot", "held", (0.1, -0.06, 0.0), name="sole")
     push = Load("push", "pelvis", (50.0, -80.0, 0.0))
     return analyze(log, folder / "leg", contacts=Contacts(held, loads=tuple(plates)), loads=[push])
 
@@ -36,13 +37,17 @@ def heights(area: Any, time: Any) -> Any:
     return np.array([np.ptp(corners[np.isclose(corners[:, 0], t), 1]) for t in time])
 
 
+def has_zero_line(panel: Any) -> bool:
+    return any(list(line.get_ydata()) == [0, 0] for line in panel.get_lines())
+
+
 def test_the_ground_bears_areas_of_links_and_lines_of_all(stance: Analysis) -> None:
     panels = stance.figure("contacts").axes
     time, on = stance.time, stance["contact/sole"] > 0
     assert 0 < on.sum() < len(on)
     below = {
-        "sole": ("y", "x", "ankle_angle_r", "knee_angle_r", "hip_flexion_r"),
         "knee": ("y", "x", "knee_angle_r", "hip_flexion_r"),
+        "sole": ("y", "x", "ankle_angle_r", "knee_angle_r", "hip_flexion_r"),
     }
     for c, name in enumerate(below):
         for row, what in enumerate(below[name]):
@@ -53,6 +58,7 @@ def test_the_ground_bears_areas_of_links_and_lines_of_all(stance: Analysis) -> N
                 assert panel.get_title(loc="left") == f"torque of right {word} (N·m)"
                 np.testing.assert_array_equal(lines["found from the motion"], stance[f"tau/{what}"])
                 np.testing.assert_array_equal(lines["by what was measured"], stance[f"tau_as_loads/{what}"])
+                assert has_zero_line(panel)
                 continue
             whole = stance[f"force/{name} force_{what}"]
             scale = np.abs(whole).max()
@@ -66,6 +72,19 @@ def test_the_ground_bears_areas_of_links_and_lines_of_all(stance: Analysis) -> N
                 side = np.maximum if at < len(parts) else np.minimum
                 expected = np.abs(side(parts[area.get_label()], 0.0))
                 np.testing.assert_allclose(heights(area, time), expected, rtol=0, atol=1e-9 * scale)
+
+
+def test_torques_without_a_line_of_their_own_are_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("linkwise.analysis.show.induced_figure.MOST", 1)
+    result = analyze(write_csv(tmp_path / "log.csv", smooth(60, 3)), PLANAR3, induced=["joints"])
+    for panel in result.figure("induced:joints").axes:
+        lines = {line.get_label(): line.get_ydata() for line in panel.get_lines()}
+        assert "torques of 2 others" in lines
+        whole = lines.pop("all together")
+        parts = [values for label, values in lines.items() if not label.startswith("_")]
+        np.testing.assert_allclose(sum(parts), whole, rtol=0, atol=1e-9 * np.abs(whole).max())
 
 
 @pytest.mark.parametrize("point", ["joints", "link3,0.25,0.1,0"])
@@ -94,6 +113,9 @@ def test_accelerations_are_drawn_source_by_source(point: str, tmp_path: Path) ->
             }
 
         lines = {line.get_label(): line.get_ydata() for line in panel.get_lines()}
+        assert has_zero_line(panel)
+        (grey,) = (line.get_color() for line in panel.get_lines() if line.get_label() == "gravity")
+        assert grey == GRAVITY
         expected = {f"torque of {joint}": values for joint, values in column("_tau").items()}
         expected["gravity"] = sum(column("_gravity").values())
         expected["velocities"] = sum(column("_qd").values()) + sum(column("_kinematic").values())

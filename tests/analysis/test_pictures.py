@@ -164,6 +164,17 @@ def test_causes_in_each_phase_are_numpys_and_add_up(pushed):
     figure.draw_without_rendering()
 
 
+def test_bars_of_phases_stand_side_by_side(pushed):
+    path, push, _ = pushed
+    figure = analyze(path, PLANAR3, loads=[push], phases=["on/off=push", "grip=grip"]).figure("causes:joint1")
+    for panel in figure.axes[1:]:
+        ends = sorted(
+            (bar.get_y(), bar.get_y() + bar.get_height()) for one in panel.containers for bar in one
+        )
+        assert len(ends) == 3 * len(figure.axes[1].get_yticklabels())
+        assert all(below[1] < above[0] for below, above in pairwise(ends))
+
+
 def test_a_joint_that_bears_one_load_has_the_phases_of_that_load(pushed, analysis):
     path, push, on = pushed
     result = analyze(path, PLANAR3, Reading(ignore_extra=True), loads=[push])

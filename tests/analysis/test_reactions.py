@@ -8,6 +8,7 @@ import pytest
 from conftest import DATA
 from helpers.command_line import run_linkwise
 from helpers.motion_logs import LEG, smooth, write_csv
+from helpers.urdf_text import chain, joint
 from linkwise import Load, Payload, generate, read_system, write_package
 from linkwise.analysis import Contact, Processing, analyze
 from linkwise.errors import LinkwiseError
@@ -170,6 +171,16 @@ def test_a_figure_shows_the_whole_and_its_causes(folder: Path) -> None:
         shares = [y for label, y in lines.items() if not label.startswith("_")]
         np.testing.assert_allclose(sum(shares), whole, rtol=0, atol=1e-9)
         assert {"gravity", "load push"} <= lines.keys()
+
+
+def test_a_joint_that_turns_in_space_has_six_panels(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(chain(*(joint(name, a, b) for name, a, b in ("pab", "qbc"))))
+    write_package(generate(read_system(tmp_path / "arm.urdf"), ["numpy"]), tmp_path / "arm")
+    log = write_csv(tmp_path / "arm.csv", smooth(40, 2), ["p", "q"])
+    panels = analyze(log, tmp_path / "arm", reactions=["q"]).figure("reaction:q").axes
+    assert [panel.get_ylabel().partition(" (")[0] for panel in panels] == [
+        part.replace("_", " ") for part in PARTS
+    ]
 
 
 def test_what_cannot_be_told_is_refused_by_name(folder: Path) -> None:

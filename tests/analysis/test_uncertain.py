@@ -10,7 +10,7 @@ from conftest import DATA
 from helpers.command_line import run_linkwise
 from helpers.motion_logs import PLANAR3, smooth, write_csv
 from helpers.studies import CHOICES, HEAD, Here
-from helpers.urdf_text import chain, joint
+from helpers.urdf_text import chain, joint, link, robot
 from linkwise import (
     Contact,
     Contacts,
@@ -217,6 +217,7 @@ def test_a_value_has_as_many_digits_as_its_deviation_tells(value: float, deviati
         ('[link.link1]\nmas = "10 %"', "[link.link1] has the unknown key 'mas'"),
         ('[all]\ncentre = ["1 mm", "2 mm"]', "[all]: centre has 2 numbers"),
         ("[body_mass]\n", '[body_mass] needs sd, such as "2 %"'),
+        ('[body_mass]\nsd = "200 %"', "[body_mass]: sd is 200 %; give 100 % at most"),
         ('[body_mass]\nsd = "2 %"\nlinks = ["hand"]', "[body_mass]: planar3 has no link 'hand'"),
         (
             '[correlation]\nlinks = ["link1", "link2"]\nmatrix = [[1, 2], [2, 1]]',
@@ -276,6 +277,15 @@ def test_what_is_not_modelled_is_refused_by_name(arm: Path, tmp_path: Path) -> N
     refused("payloads count as certain", file="carried", payloads=[Payload("d", 1.0)])
     (arm / "noise.toml").write_text('schema = 1\n[motion]\nangle = "1 mrad"\n')
     refused("leave --resample out", file="noise", reading=Reading(resample=50.0))
+
+
+def test_what_weighs_nothing_in_the_file_has_no_deviation_in_kg(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(robot(link("a"), link("b", "0"), joint("ab", "a", "b")))
+    write_package(generate(read_system(tmp_path / "arm.urdf"), ["numpy"]), tmp_path / "arm")
+    log = write_csv(tmp_path / "log.csv", smooth(20, 1), ["ab"])
+    (tmp_path / "bodies.toml").write_text('schema = 1\n[link.b]\nmass = "0.1 kg"\n')
+    with pytest.raises(LinkwiseError, match="'b' has no mass in the robot's file; give a part of it, in %"):
+        analyze(log, tmp_path / "arm", uncertain=tmp_path / "bodies.toml")
 
 
 def test_a_study_takes_the_file_as_a_key_and_works_anew_when_it_changes(tmp_path: Path) -> None:

@@ -344,6 +344,10 @@ BODIES = {
         RigidBody("a", 1, ROOM, sp.eye(3), [[1, 0.2, 0], [0, 1, 0], [0, 0, 1]]),
         "its inertia is not symmetric; give I_xy twice",
     ),
+    "a small lopsided inertia": (
+        RigidBody("a", 1, ROOM, sp.eye(3), [[1e-3, 2e-4, 0], [0, 1e-3, 0], [0, 0, 1e-3]]),
+        "its inertia is not symmetric; give I_xy twice",
+    ),
     "a long inertia": (
         RigidBody("a", 1, ROOM, sp.eye(3), np.array([1, 1, 5])),
         "its principal inertias are 1, 1 and 5, which no rigid body has",

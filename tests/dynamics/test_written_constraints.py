@@ -453,6 +453,10 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
         {"constraints": {"a": X.q - Y.q, "b": X.q + Y.q - 1}},
         "the constraints 'a', 'b' leave nothing to move",
     ),
+    "a square beside what is not defined everywhere": (
+        {"constraints": {"a": (X.q - Y.q) ** 2 * sp.sqrt(X.q + 1)}},
+        "'a' closes only where it is singular",
+    ),
     "a sum of squares": (
         {"constraints": {"a": X.q**2 + Y.q**2}},
         "'a' closes only where it is singular",

@@ -460,6 +460,7 @@ def test_the_command_counts_and_writes(
     rows = [line.split()[:4] for line in told.splitlines()]
     assert ["c2_1,2,2", "q̈_2", str(part), str(part)] in rows
     assert ["τ_1,2", "unsplit", str(whole)] in rows
+    assert "all parts" not in told, "there is one"
     through = {node.key for node in robot.graph(0, 2).operations}
     there = sum(node.key in through for node in robot.graph(0, 1, 1, 2).operations)
     beside = [row for row in told.splitlines() if row.endswith(" too")]

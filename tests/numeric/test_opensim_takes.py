@@ -126,11 +126,12 @@ def test_torques_of_a_point_on_a_line_move_opensims_model_as_it_moved(tmp_path: 
     assert np.abs(found - qdd[:-1]).max() <= 1e-6 * np.abs(qdd).max()
 
 
-@pytest.mark.parametrize("axes", [("", ""), ("-y", "+x"), ("z", "-y"), ("+x", "-z")])
-def test_a_frame_by_stations_stands_where_opensims_does(axes: tuple[str, str], tmp_path: Path) -> None:
+def on_stations(folder: Path, axes: tuple[str, str] = ("", ""), origin: str = "b0") -> Path:
+    """A model of two bodies, the second on a frame by stations of the first; origin: the last one's body."""
     places = {"a": "0 0 0.1", "b": "1 0.2 0", "c": "0.1 1 0.3", "origin": "0.5 0.5 0.5"}
+    carriers = dict.fromkeys(places, "b0") | {"origin": origin}
     stations = "".join(
-        f'<Station name="{name}"><socket_parent_frame>/bodyset/b0</socket_parent_frame>'
+        f'<Station name="{name}"><socket_parent_frame>/bodyset/{carriers[name]}</socket_parent_frame>'
         f"<location>{place}</location></Station>"
         for name, place in places.items()
     )
@@ -144,8 +145,18 @@ def test_a_frame_by_stations_stands_where_opensims_does(axes: tuple[str, str], t
     frame = f'<StationDefinedFrame name="by_stations">{sockets}{given}</StationDefinedFrame>'
     bodies = body("b0", 1.0, f"<components>{stations}{frame}</components>") + body("b1", 2.0)
     joints = TREE[0] + pin("j1", "/bodyset/b0/by_stations", "1 0 0", "/bodyset/b1", "0 0.1 0")
-    both = Beside(written(tmp_path, of(bodies, joints)), tmp_path / "package")
+    return written(folder, of(bodies, joints))
+
+
+@pytest.mark.parametrize("axes", [("", ""), ("-y", "+x"), ("z", "-y"), ("+x", "-z")])
+def test_a_frame_by_stations_stands_where_opensims_does(axes: tuple[str, str], tmp_path: Path) -> None:
+    both = Beside(on_stations(tmp_path, axes), tmp_path / "package")
     assert max(both.errors()) <= LIMIT
+
+
+def test_a_frame_by_stations_of_several_bodies_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(LinkwiseError, match="frame 'by_stations': its stations are on several bodies; give"):
+        read_robot(on_stations(tmp_path, origin="b1"))
 
 
 @pytest.mark.parametrize("old", [False, True])

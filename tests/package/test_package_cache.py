@@ -16,6 +16,7 @@ from linkwise import (
     analyze,
     check_package,
     generate,
+    generator_fingerprint,
     kept_package,
     read_robot,
     read_system,
@@ -227,3 +228,13 @@ def test_columns_of_joints_that_the_file_couples_are_left_out_unasked(tmp_path: 
     log.write_text("\n".join([f"{head},arm", *(f"{row},0.1" for row in rows)]))
     with pytest.raises(LinkwiseError, match="no joint for column 'arm'"):
         analyze(log, kept_package(KNEE, "numpy").directory)
+
+
+def test_the_order_in_which_a_disk_lists_files_changes_no_fingerprint(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rglob, of_now = Path.rglob, generator_fingerprint.fingerprint.__wrapped__
+    monkeypatch.setattr(generator_fingerprint, "_own_files", generator_fingerprint._own_files.__wrapped__)
+    usual = of_now()
+    monkeypatch.setattr(Path, "rglob", lambda self, pattern: reversed(list(rglob(self, pattern))))
+    assert of_now() == usual

@@ -325,6 +325,10 @@ BAD = {
         ("<inertial><pose>0 0.1", "<inertial><pose relative_to='__model__'>0 0.1"),
         "link 'lower': the pose of <inertial> is relative to '__model__'",
     ),
+    "the way to say it of old": (
+        ('<pose rotation_format="quat_xyzw">', '<pose frame="top">'),
+        "joint 'slide': <pose frame='top'> is obsolete; write relative_to",
+    ),
     "another order of a quaternion": (
         ("quat_xyzw", "quat_wxyz"),
         "joint 'slide': <pose rotation_format='quat_wxyz'> is not read; "

@@ -323,6 +323,14 @@ def test_every_back_end_of_rigid_links_says_the_same(package_of: Packages) -> No
         package.load("autograd").identifiability()
 
 
+def test_what_nothing_drives_determines_nothing(tmp_path: Path) -> None:
+    box = '<body name="box"><freejoint/><geom type="box" size=".1 .2 .3" mass="2"/></body>'
+    (tmp_path / "box.xml").write_text(f"<mujoco><worldbody>{box}</worldbody></mujoco>")
+    write_package(generate(read_system(tmp_path / "box.xml"), ["numpy"]), tmp_path / "box")
+    with pytest.raises(ValueError, match="nothing drives a joint of box; name those with `measured`"):
+        import_package(tmp_path / "box").load().identifiability()
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
