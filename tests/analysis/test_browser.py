@@ -594,6 +594,16 @@ def test_deviations_are_bands_numbers_hatches_and_a_list(driver, tmp_path):
     )
     column = "tau_gravity/joint1/link3"
     assert dict(cells)[column] == plus_minus(result[column][50], result[f"sd/{column}"][50])
+    choose(driver, "link", "")
+    choose(driver, "joint", 1)
+    of_sums = driver.execute_script(
+        "return [...document.querySelectorAll('#numbers td[data-value]')].map((td) =>"
+        "[JSON.parse(td.dataset.columns).length, td.textContent.includes('± ≤')])"
+    )
+    assert {1, 2} <= {count for count, _ in of_sums}
+    assert all(is_most == (count > 1) for count, is_most in of_sums), "deviations of sums are bounds"
+    choose(driver, "joint", 0)
+    choose(driver, "link", 2)
     open_now = [
         abs(result[name][50]) < 2 * result[f"sd/{name}"][50]
         for name in (f"tau_qdd/joint1/link3/joint{k}" for k in (1, 2, 3))

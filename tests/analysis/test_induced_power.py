@@ -185,6 +185,19 @@ def test_the_figure_has_a_lane_for_each_segment_arrows_for_flows_and_bars_for_wo
     np.testing.assert_allclose(max(widths), 0.9 * step, rtol=1e-9)
 
 
+def test_flows_that_are_nothing_beside_the_work_are_not_told(
+    swing: Analysis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def flows() -> list[str]:
+        return [
+            text.get_text() for text in swing.figure("energy:once").axes[1].texts if " J" in text.get_text()
+        ]
+
+    assert len(flows()) == 3
+    monkeypatch.setattr("linkwise.analysis.show.energy_figure.NOTHING", 1e6)
+    assert flows() == []
+
+
 def test_what_is_missing_for_the_figure_is_told(swing: Analysis, tmp_path: Path) -> None:
     with pytest.raises(LinkwiseError, match=r"^--figure energy:never: add --phase never=\.\.\., over which"):
         swing.figure("energy:never")

@@ -42,6 +42,7 @@ def test_without_a_name_all_are_listed_with_what_they_are(tmp_path: Path) -> Non
     assert ended.returncode == 0
     assert [line.split()[0] for line in ended.stdout.splitlines()[:4]] == NAMES == list(example_cases())
     assert "walk     A person walks on a treadmill with force plates" in ended.stdout
+    assert ended.stdout.endswith("\n\nlinkwise example NAME puts one into a folder of that name\n")
     assert not list(tmp_path.iterdir())
 
 

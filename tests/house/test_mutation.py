@@ -296,7 +296,7 @@ def test_what_a_mutant_survived_is_not_run_again_on_it(
     assert list(decider.stages("single-files", mutant)) == [([f"{changed}::x"], 1.0)]
 
 
-def test_quick_tests_that_are_about_a_function_come_first_and_the_rest_of_their_files_last(
+def test_a_line_has_the_tests_that_reach_it_and_the_rest_of_their_files(
     tmp_path: Path,
 ) -> None:
     path = "generator/linkwise/extras.py"
@@ -324,12 +324,25 @@ def test_quick_tests_that_are_about_a_function_come_first_and_the_rest_of_their_
     def near_and_far(line: int) -> list[list[str]]:
         return [[name for name, _ in part] for part in reach.tests(path, line)]
 
-    assert near_and_far(line) == [["b::y", "b::x", "a::quick", "a::slow", "d::of_all"], ["a::far"]]
-    at_import = ["a::far", "c::z", "a::quick", "b::y", "d::of_all", "b::x", "a::slow"]
+    assert near_and_far(line) == [["a::slow", "a::quick", "b::x", "b::y", "d::of_all"], ["a::far"]]
+    at_import = ["a::slow", "a::quick", "a::far", "b::x", "b::y", "d::of_all", "c::z"]
     assert near_and_far(1) == [at_import, []]
     of_line = {path: {text.splitlines()[line - 1].strip(): ["a::slow"]}}
     reach.files["tests/a.py"] = replace(reach.files["tests/a.py"], lines=of_line)
-    assert near_and_far(line) == [["a::slow"], ["a::far", "a::quick"]]
+    assert near_and_far(line) == [["a::slow"], ["a::quick", "a::far"]]
+
+
+def test_what_caught_changes_of_the_file_comes_first_then_what_is_quick(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mutant, other = some_mutants()[:2]
+    assert mutant.path == other.path
+    record, reach = Record(tmp_path / "survived.json", tmp_path / "caught.json"), Map(tmp_path / "reach")
+    record.add(other, "killed", "tests/a.py::telling[one]")
+    tests = [("tests/a.py::slow", 9.0), ("tests/a.py::telling", 4.0), ("tests/a.py::quick", 1.0)]
+    monkeypatch.setattr(reach, "tests", lambda path, line: (tests, []))
+    ((ranked, _), *_) = Decider(reach, record).stages("single-files", mutant)
+    assert [name.partition("::")[2] for name in ranked] == ["telling", "quick", "slow"]
 
 
 def test_a_sweep_maps_decides_and_goes_on(tmp_path: Path) -> None:

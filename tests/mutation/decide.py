@@ -19,6 +19,8 @@ BESIDE = 40.0
 """Seconds of the other tests of the same files."""
 UNKNOWN = 300.0
 """Seconds for a file that a room names, which no map has measured: new ones, and those of `make ship`."""
+START = 0.1
+"""Seconds that each test takes beside its own."""
 UNMEASURED = 15.0
 """Seconds for a test that caught a change before, where no map has measured it yet."""
 
@@ -36,8 +38,9 @@ class Decider:
     def stages(self, room: str, mutant: Mutant, whole: bool = True) -> Iterator[tuple[list[str], float]]:
         """Tests of each process, and their seconds: what reaches the change, else what the room names.
 
-        First what caught it before, which is all where the map is not whole; what it is known to survive is
-        left out. Last what the room names and no map has measured: tests of `make ship`.
+        First what caught it before, which is all where the map is not whole; then what has caught most of
+        other changes in its seconds, above all in the same file. What it is known to survive is left out.
+        Last what the room names and no map has measured: tests of `make ship`.
         """
         tried = self.record.survived(mutant)
         before = self.record.caught_before(mutant)
@@ -47,8 +50,13 @@ class Decider:
             tried |= {before}
         if not whole:
             return
-        near, far = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
-        limits, last = STAGES, self._named(room)
+        parts = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
+        caught = self.record.catches(mutant.path)
+        near, far, last = (
+            sorted(part, key=lambda item: -(1 + caught[item[0]]) / (item[1] + START))
+            for part in (*parts, self._named(room))
+        )
+        limits = STAGES
         if not near:
             near, limits, last = last, (*STAGES[:2], float("inf")), []
         last = [item for item in last if item[0] in ROOMS[room].tests]
@@ -70,12 +78,12 @@ class Decider:
                 yield tests, total
 
     def _named(self, room: str) -> list[tuple[str, float]]:
-        """Tests of the files that a room names, with their seconds, quick ones first."""
+        """Tests of the files that a room names, with their seconds."""
         found = []
         for name in ROOMS[room].tests:
             known = self.reach.files.get(name)
             found += list(known.seconds.items()) if known and known.seconds else [(name, UNKNOWN)]
-        return sorted(found, key=lambda item: item[1])
+        return found
 
     def decide(self, room: str, mutant: Mutant, tree: Tree, whole: bool = True) -> tuple[str, str] | None:
         """Killed, too slow or survived; and by which test, or after how many seconds of tests.

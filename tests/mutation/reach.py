@@ -54,12 +54,6 @@ class Reached:
         tests = self.lines[path][text]
         return set(self.functions[path].get(function, ()) if tests is None else tests)
 
-    def share(self, folder: str) -> float:
-        """Return the part of all reached functions that is in a folder."""
-        counts = {path: sum(bool(name) for name in found) for path, found in self.functions.items()}
-        inside = sum(count for path, count in counts.items() if path.rpartition("/")[0] == folder)
-        return max(inside, 1) / max(sum(counts.values()), 1)
-
 
 def digest(path: Path) -> str:
     """Short hash of a file's bytes."""
@@ -122,20 +116,17 @@ class Map:
         kept.write_text(json.dumps(vars(reached)))
 
     def tests(self, path: str, line: int) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:
-        """Tests that reach a line, else its function, with their seconds; first what tells most in a second.
+        """Tests that reach a line, else its function, with their seconds, and the other tests of their files.
 
-        Files are in turn by their seconds for each share of them that is about the path's folder, in each the
-        quick tests first. Beside these the other tests of these files, which may use what those kept. What is
-        run at import alone may matter to all that use the module: the quickest tests of all come first.
+        These may use what those kept. What is run at import alone may matter to all that use the module.
         """
         source = (ROOT / path).read_text(encoding="utf-8")
         function, text = name_at(source, line), source.splitlines()[line - 1].strip()
         is_known = any(function in reached.functions.get(path, {}) for reached in self.files.values())
         of_line = {name: reached.of_line(path, function, text) for name, reached in self.files.items()}
         is_reached = bool(function) and any(of_line.values())
-        at_import = True
-        near: list[tuple[float, list[tuple[str, float]]]] = []
-        far: list[tuple[float, list[tuple[str, float]]]] = []
+        near: list[tuple[str, float]] = []
+        far: list[tuple[str, float]] = []
         for file, reached in self.files.items():
             here = reached.functions.get(path, {})
             if is_reached:
@@ -144,25 +135,11 @@ class Map:
                 names = set(here.get(function, ()))
             elif function:
                 names = {name for found in here.values() for name in found if name}
-            else:  # what runs at import may matter to all that use the module
+            else:
                 names = {""} if here else set()
-            if not names:
-                continue
-            at_import = at_import and "" in names
-            ranked = sorted(reached.seconds.items(), key=lambda item: item[1])
-            close = [item for item in ranked if item[0] in names or "" in names]
-            share = reached.share(path.rpartition("/")[0])
-            near.append((sum(seconds for _, seconds in close) / share, close))
-            far.append(
-                (sum(reached.seconds.values()) / share, [item for item in ranked if item not in close])
-            )
-
-        def joined(part: list[tuple[float, list[tuple[str, float]]]]) -> list[tuple[str, float]]:
-            return [item for _, group in sorted(part, key=lambda pair: pair[0]) for item in group]
-
-        if at_import:
-            return sorted((item for _, group in near for item in group), key=lambda item: item[1]), []
-        return joined(near), joined(far)
+            for item in reached.seconds.items() if names else ():
+                (near if item[0] in names or "" in names else far).append(item)
+        return near, far
 
 
 @cache

@@ -3,6 +3,7 @@
 import ast
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -78,6 +79,16 @@ class Record:
         kept = self.verdicts.get(mutant.key)
         by = test_of(kept.by) if kept is not None and kept.verdict in CAUGHT else ""
         return by if is_there(by) else ""
+
+    def catches(self, path: str) -> Counter[str]:
+        """How often each test has caught a change; ten times as often in this file, three times near it."""
+        found: Counter[str] = Counter()
+        for key, kept in self.verdicts.copy().items():
+            if kept.verdict in CAUGHT:
+                other = key.partition(": ")[0]
+                is_near = other.rpartition("/")[0] == path.rpartition("/")[0]
+                found[test_of(kept.by)] += 10 if other == path else 3 if is_near else 1
+        return found
 
     def survived(self, mutant: Mutant) -> set[str]:
         """Tests, and files of them, as they are now, that pass with this change of the text as it is."""

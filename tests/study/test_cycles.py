@@ -195,6 +195,19 @@ def test_cycles_lie_in_the_range_of_time_that_is_analysed(tmp_path: Path) -> Non
         np.testing.assert_allclose(ends, [(1, 2), (2, 3)], atol=1e-9)
 
 
+def test_a_cycle_may_begin_between_the_first_two_samples(tmp_path: Path) -> None:
+    time = np.round(np.arange(0, 3, 0.01), 2)
+    write_csv(tmp_path / "a.csv", np.column_stack([time, np.sin(time)[:, None] * [1, 0.5, 0.2]]))
+    forces = np.column_stack([time, 50.0 * ((time % 1 >= 0.25) & (time % 1 < 0.55)), 0 * time, 0 * time])
+    write_csv(tmp_path / "forces.csv", forces, [f"push:link3/force_{axis}" for axis in "xyz"])
+    trial = '[[trial]]\nlog = "a.csv"\nrobot = "planar3"\nloads = ["forces.csv"]\nfrom_time = 0.24\n'
+    file = tmp_path / "study.toml"
+    file.write_text(f'schema = 1\npages = false\n[cycles]\nstart = "push>20"\n{trial}')
+    assert run_study(file, tmp_path / "out", Here()).broken == ()
+    found = pd.read_parquet(tmp_path / "out/trials/a/_cycles.parquet")[["start", "end"]]
+    np.testing.assert_allclose(found, [(0.244, 1.244), (1.244, 2.244)], rtol=0, atol=1e-9)
+
+
 def test_cycles_last_as_long_as_a_contact_is_on(tmp_path: Path) -> None:
     time = np.round(np.arange(0, 3, 0.01), 2)
     names = ["pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r"]
