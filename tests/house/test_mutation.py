@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -13,6 +14,7 @@ import pytest
 from mutation import rooms, verdicts
 from mutation.decide import Decider
 from mutation.mutants import Mutant, mutants
+from mutation.order import in_order
 from mutation.reach import Map, Reached, digest, digest_of_code, digest_of_test, name_at
 from mutation.rooms import LEFT_OUT, NOT_COUNTED, ROOMS, drawn, rooms_of, sources
 from mutation.tree import ROOT, Ended
@@ -156,7 +158,7 @@ FAILS, PASSES = Ended(1, BY), Ended(0)
 def decider(tmp_path: Path) -> Decider:
     """One that has a room's three files of tests to ask."""
     made = Decider(Map(tmp_path / "reach"), Record(tmp_path / "survived.json", tmp_path / "caught.json"))
-    made.stages = lambda room, mutant, whole: iter([(["a"], 1.0), (["b"], 2.0)])  # type: ignore[method-assign]
+    made.stages = lambda room, mutant: iter([(["a"], 1.0), (["b"], 2.0)])  # type: ignore[method-assign]
     return made
 
 
@@ -254,15 +256,13 @@ def test_what_caught_a_mutant_is_tried_first_once_the_text_is_another_with_a_map
     reach = Map(tmp_path / "reach")
     decider = Decider(reach, Record(*files))
     assert not decider.record.decided(mutant)
-    assert [tests for tests, _ in decider.stages("single-files", mutant, whole=False)] == [[by]]
+    assert [tests for tests, _ in decider.before(mutant)] == [[by]]
     seconds = {"tests/graphs/test_graphs.py::quick": 1.0, by: 2.0}
     monkeypatch.setattr(reach, "files", {"tests/graphs/test_graphs.py": Reached("", seconds, {}, {})})
-    monkeypatch.setattr(reach, "tests", lambda path, line: (list(seconds.items()), []))
-    stages = list(decider.stages("single-files", mutant))
-    assert stages == [([by], 2.0), (["tests/graphs/test_graphs.py::quick"], 1.0)]
+    assert list(decider.before(mutant)) == [([by], 2.0)]
 
 
-def test_what_passes_before_the_map_is_whole_decides_nothing_and_is_not_run_again(
+def test_what_passes_at_first_decides_nothing_and_is_not_run_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mutant, files = some_mutants()[0], (tmp_path / "survived.json", tmp_path / "caught.json")
@@ -273,10 +273,10 @@ def test_what_passes_before_the_map_is_whole_decides_nothing_and_is_not_run_agai
     monkeypatch.setattr(reach, "tests", lambda path, line: ([(quick, 20.0), (slow, 50.0)], []))
     first = Decider(reach, Record(*files))
     tree: Any = Scripted([PASSES, PASSES])
-    assert first.decide("single-files", mutant, tree, whole=False) is None
+    assert first.decide("single-files", mutant, tree, "first") is None
     again = Decider(reach, Record(*files))
     assert again.record.decided(mutant) is None
-    assert list(again.stages("single-files", mutant, whole=False)) == []
+    assert next(again.stages("single-files", mutant))[0] == [slow]
     monkeypatch.setattr(verdicts, "digest_of_test", lambda file, test: "another")
     assert next(again.stages("single-files", mutant))[0] == [quick]
 
@@ -293,7 +293,7 @@ def test_what_a_mutant_survived_is_not_run_again_on_it(
     monkeypatch.setattr(reach, "files", tests)
     monkeypatch.setattr(reach, "tests", lambda path, line: ([(f"{name}::x", 1.0) for name in tests], []))
     decider = Decider(reach, Record(tmp_path / "survived.json", tmp_path / "caught.json"))
-    assert list(decider.stages("single-files", mutant)) == [([f"{changed}::x"], 1.0)]
+    assert [tests for tests, _ in decider.stages("single-files", mutant)] == [[f"{changed}::x"]]
 
 
 def test_a_line_has_the_tests_that_reach_it_and_the_rest_of_their_files(
@@ -330,6 +330,13 @@ def test_a_line_has_the_tests_that_reach_it_and_the_rest_of_their_files(
     of_line = {path: {text.splitlines()[line - 1].strip(): ["a::slow"]}}
     reach.files["tests/a.py"] = replace(reach.files["tests/a.py"], lines=of_line)
     assert near_and_far(line) == [["a::slow"], ["a::quick", "a::far"]]
+
+
+def test_tests_of_a_file_stand_together_as_long_as_its_fixtures_pay() -> None:
+    tests = [("a::x", 1.0), ("a::y", 1.1), ("a::slow", 60.0), ("b::x", 0.4), ("b::y", 0.4), ("c::x", 3.0)]
+    found = in_order(tests, Counter({"c::x": 2}), {"a": 9.0, "b": 0.0})
+    assert [name for name, _ in found] == ["b::x", "b::y", "c::x", "a::x", "a::y", "a::slow"]
+    assert [seconds for _, seconds in found] == [0.4, 0.4, 3.0, 10.0, 1.1, 60.0]
 
 
 def test_what_caught_changes_of_the_file_comes_first_then_what_is_quick(

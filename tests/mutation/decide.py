@@ -4,25 +4,39 @@ A test that fails without the mutant too, or passes when it runs again, decides 
 left out.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from itertools import chain, islice
 from threading import Lock
+from typing import Literal
 
 from mutation.mutants import Mutant
+from mutation.order import in_order
 from mutation.reach import Map, digest
 from mutation.rooms import NOT_COUNTED, ROOMS
 from mutation.tree import ROOT, Ended, Tree, say
 from mutation.verdicts import Record
 
 STAGES = (10.0, 40.0, 160.0)
-"""Seconds of tests, as the map has measured them, of the processes that a mutant is put to in turn."""
+"""Seconds of tests, as the map has measured them, of the processes that a mutant is put to in turn.
+
+All that are left are put to the first before any goes on to the second.
+"""
 BESIDE = 40.0
 """Seconds of the other tests of the same files."""
 UNKNOWN = 300.0
 """Seconds for a file that a room names, which no map has measured: new ones, and those of `make ship`."""
-START = 0.1
-"""Seconds that each test takes beside its own."""
 UNMEASURED = 15.0
 """Seconds for a test that caught a change before, where no map has measured it yet."""
+
+
+Depth = Literal["before", "first", "all"]
+"""To which tests a mutant is put: that which caught it before, the first stage too, or all."""
+
+
+def _is_new(test: str, tried: Collection[str]) -> bool:
+    """Return whether a test counts, and neither it nor its file is among those that were tried."""
+    is_tried = test in tried or test.partition("::")[0] in tried
+    return not is_tried and not any(test.startswith(left) for left in NOT_COUNTED)
 
 
 class Decider:
@@ -35,68 +49,64 @@ class Decider:
         self.unsteady: dict[str, str] = {}
         self._lock = Lock()
 
-    def stages(self, room: str, mutant: Mutant, whole: bool = True) -> Iterator[tuple[list[str], float]]:
+    def stages(self, room: str, mutant: Mutant) -> Iterator[tuple[list[str], float]]:
         """Tests of each process, and their seconds: what reaches the change, else what the room names.
 
-        First what caught it before, which is all where the map is not whole; then what has caught most of
-        other changes in its seconds, above all in the same file. What it is known to survive is left out.
-        Last what the room names and no map has measured: tests of `make ship`.
+        First what has caught most of other changes in its seconds, above all in the same file. What it is
+        known to survive is left out. Last what the room names and no map has measured: tests of `make ship`.
         """
         tried = self.record.survived(mutant)
-        before = self.record.caught_before(mutant)
-        if before and not tried & {before, before.partition("::")[0]}:
-            known = self.reach.files.get(before.partition("::")[0])
-            yield [before], known.seconds.get(before, UNMEASURED) if known else UNMEASURED
-            tried |= {before}
-        if not whole:
-            return
         parts = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
-        caught = self.record.catches(mutant.path)
+        caught, limits = self.record.catches(mutant.path), STAGES
+        openings = {name: reached.opening for name, reached in self.reach.files.items()}
         near, far, last = (
-            sorted(part, key=lambda item: -(1 + caught[item[0]]) / (item[1] + START))
+            in_order([one for one in part if _is_new(one[0], tried)], caught, openings)
             for part in (*parts, self._named(room))
         )
-        limits = STAGES
-        if not near:
+        if not parts[0]:
             near, limits, last = last, (*STAGES[:2], float("inf")), []
-        last = [item for item in last if item[0] in ROOMS[room].tests]
-        close, beside, apart = (
-            iter([item for item in part if not tried & {item[0], item[0].partition("::")[0]}])
-            for part in (near, far, last)
-        )
+        close, beside = iter(near), iter(far)
+        apart = (item for item in last if item[0] in ROOMS[room].tests)
         every = (*((close, limit) for limit in limits), (beside, BESIDE), (apart, float("inf")))
         for ranked, limit in every:
             tests: list[str] = []
             total = 0.0
             for name, seconds in ranked:
-                if not any(name.startswith(left) for left in NOT_COUNTED):
-                    tests.append(name)
-                    total += seconds
+                tests.append(name)
+                total += seconds
                 if total >= limit:
                     break
             if tests:
                 yield tests, total
+
+    def before(self, mutant: Mutant) -> Iterator[tuple[list[str], float]]:
+        """The test that caught a change before, with its seconds, where the change is not known to pass it."""
+        before = self.record.caught_before(mutant)
+        if before and _is_new(before, self.record.survived(mutant)):
+            known = self.reach.files.get(before.partition("::")[0])
+            yield [before], known.seconds.get(before, UNMEASURED) if known else UNMEASURED
 
     def _named(self, room: str) -> list[tuple[str, float]]:
         """Tests of the files that a room names, with their seconds."""
         found = []
         for name in ROOMS[room].tests:
             known = self.reach.files.get(name)
-            found += list(known.seconds.items()) if known and known.seconds else [(name, UNKNOWN)]
+            found += list(known.own.items()) if known and known.seconds else [(name, UNKNOWN)]
         return found
 
-    def decide(self, room: str, mutant: Mutant, tree: Tree, whole: bool = True) -> tuple[str, str] | None:
+    def decide(self, room: str, mutant: Mutant, tree: Tree, depth: Depth = "all") -> tuple[str, str] | None:
         """Killed, too slow or survived; and by which test, or after how many seconds of tests.
 
-        None where tests pass and the map of what they reach is not whole.
+        None where the tests so far pass and it is put to others later.
         """
         total = 0.0
-        for tests, seconds in self.stages(room, mutant, whole):
+        most = {"before": 0, "first": 1, "all": None}[depth]
+        for tests, seconds in chain(self.before(mutant), islice(self.stages(room, mutant), most)):
             total += seconds
             if verdict := self._caught(mutant, tests, seconds, tree):
                 return verdict
             self.record.passes(mutant, tests)
-        if not whole:
+        if depth != "all":
             return None
         kept = self.record.verdicts.get(mutant.key)
         if not total and kept and kept.verdict == "survived":

@@ -15,11 +15,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from mutation.tree import FORKING, ROOT, Tree, say
 
 HOUSE = "generator"
+IMPORT = 0.7
+"""Seconds that importing a file of tests takes."""
 SLOW = 1800
 """Seconds of processor time for one file of tests."""
 SETTINGS = """[run]
@@ -53,6 +56,24 @@ class Reached:
             return None
         tests = self.lines[path][text]
         return set(self.functions[path].get(function, ()) if tests is None else tests)
+
+    @property
+    def opening(self) -> float:
+        """Seconds before the first test: the import, and what the first takes more than most, for fixtures."""
+        first = next(iter(self.seconds.values()), 0.0)
+        return IMPORT + max(0.0, first - self._usual)
+
+    @property
+    def own(self) -> dict[str, float]:
+        """Seconds of each test without those of the opening."""
+        return {
+            name: seconds if at else min(seconds, self._usual)
+            for at, (name, seconds) in enumerate(self.seconds.items())
+        }
+
+    @property
+    def _usual(self) -> float:
+        return median(self.seconds.values()) if self.seconds else 0.0
 
 
 def digest(path: Path) -> str:
@@ -118,10 +139,11 @@ class Map:
     def tests(self, path: str, line: int) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:
         """Tests that reach a line, else its function, with their seconds, and the other tests of their files.
 
-        These may use what those kept. What is run at import alone may matter to all that use the module.
+        These may use what those kept. What is run at import alone may matter to all that use the module; a
+        function's header, as its defaults, to those that call it.
         """
         source = (ROOT / path).read_text(encoding="utf-8")
-        function, text = name_at(source, line), source.splitlines()[line - 1].strip()
+        function, text = name_at(source, line, headed=True), source.splitlines()[line - 1].strip()
         is_known = any(function in reached.functions.get(path, {}) for reached in self.files.values())
         of_line = {name: reached.of_line(path, function, text) for name, reached in self.files.items()}
         is_reached = bool(function) and any(of_line.values())
@@ -137,15 +159,15 @@ class Map:
                 names = {name for found in here.values() for name in found if name}
             else:
                 names = {""} if here else set()
-            for item in reached.seconds.items() if names else ():
+            for item in reached.own.items() if names else ():
                 (near if item[0] in names or "" in names else far).append(item)
         return near, far
 
 
 @cache
-def _functions(text: str) -> list[tuple[int, int, str]]:
-    """First and last line of the body of each function, outer ones first, and its name."""
-    found: list[tuple[int, int, str]] = []
+def _functions(text: str) -> list[tuple[int, int, int, str]]:
+    """Line of the header of each function, first and last of its body, and its name; outer ones first."""
+    found: list[tuple[int, int, int, str]] = []
 
     def visit(node: ast.AST, above: str) -> None:
         for child in ast.iter_child_nodes(node):
@@ -153,16 +175,20 @@ def _functions(text: str) -> list[tuple[int, int, str]]:
             if isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
                 name = f"{above}.{child.name}".removeprefix(".")
                 if not isinstance(child, ast.ClassDef):
-                    found.append((child.body[0].lineno, child.end_lineno or 0, name))
+                    found.append((child.lineno, child.body[0].lineno, child.end_lineno or 0, name))
             visit(child, name)
 
     visit(ast.parse(text), "")
     return found
 
 
-def name_at(text: str, line: int) -> str:
-    """Name of the innermost function whose body has this line; "" for what runs at import."""
-    inside = [name for first, last, name in _functions(text) if first <= line <= last]
+def name_at(text: str, line: int, headed: bool = False) -> str:
+    """Name of the innermost function whose body, or header, has this line; "" for what runs at import."""
+    inside = [
+        name
+        for header, first, last, name in _functions(text)
+        if (header if headed else first) <= line <= last
+    ]
     return inside[-1] if inside else ""
 
 

@@ -6,7 +6,8 @@ Each mutant runs in a process forked from one that has the heavy libraries, in a
 killed when a test that may notice it fails, or takes far more processor time than without it. What survives
 is to be killed by a test, or listed in equivalents.json with the reason why nothing that is promised changes.
 First each is put to the test that caught it when its file was another. For what is left, files of tests that
-are new run once under coverage, which tells what they reach.
+are new run once under coverage, which tells what they reach; then each is put to a few tests that reach it, and
+at last to many.
 --minutes ends the sweep, and the next one goes on from there, in any clone: what is caught is in caught.json.
 --write puts the scores into docs/trust.md.
 """
@@ -23,7 +24,7 @@ from typing import TypeVar
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from mutation.decide import Decider
+from mutation.decide import Decider, Depth
 from mutation.mutants import Mutant
 from mutation.reach import Map
 from mutation.rooms import ROOMS, drawn, test_files
@@ -84,14 +85,14 @@ def swept(options: argparse.Namespace) -> bool:
         trees = [Tree(Path(folder) / str(k)) for k in range(options.jobs)]
         unknown = [name for name in test_files() if name not in reach.files]
         every = todo = in_turn(options.only, record)
-        for new in ([], unknown):
-            for name in side_by_side(new, reach.add, trees, end):
+        depths: tuple[Depth, ...] = ("before", "first", "all")
+        for depth in depths:
+            for name in side_by_side(unknown if depth == "first" else [], reach.add, trees, end):
                 say(f"mapped: {name}")
-            whole = all(name in reach.files for name in test_files())
 
-            def decide(item: tuple[str, Mutant], tree: Tree, whole: bool = whole) -> None:
+            def decide(item: tuple[str, Mutant], tree: Tree, depth: Depth = depth) -> None:
                 room, mutant = item
-                if verdict := decider.decide(room, mutant, tree, whole):
+                if verdict := decider.decide(room, mutant, tree, depth):
                     record.add(mutant, *verdict)
                     if verdict[0] == "survived":
                         say(f"survives: {mutant.key} (line {mutant.line}; {verdict[1]})")

@@ -447,6 +447,7 @@ def test_a_trc_file_is_analysed_by_the_command(walk: Walk, tmp_path: Path) -> No
     assert f"{len(walk.names)} markers are met within" in told.stdout
     assert (out / "inverse_kinematics.mot").is_file()
     assert json.loads((out / "analysis.json").read_text())["markers"]["file"] == "walk.trc"
+    assert {path.name for path in tmp_path.iterdir()} == {"walk.trc", "out"}
 
 
 def test_what_does_not_say_all_is_refused_in_a_line(walk: Walk, tmp_path: Path) -> None:
