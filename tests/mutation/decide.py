@@ -52,8 +52,8 @@ class Decider:
     def stages(self, room: str, mutant: Mutant) -> Iterator[tuple[list[str], float]]:
         """Tests of each process, and their seconds: what reaches the change, else what the room names.
 
-        First what has caught most of other changes in its seconds, above all in the same file. What it is
-        known to survive is left out. Last what the room names and no map has measured: tests of `make ship`.
+        First what has caught most of other changes in its seconds, above all in the same file. What it
+        is known to survive is left out. Last what the room names and no map has measured: tests of `make ship`.
         """
         tried = self.record.survived(mutant)
         parts = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
@@ -80,7 +80,7 @@ class Decider:
                 yield tests, total
 
     def before(self, mutant: Mutant) -> Iterator[tuple[list[str], float]]:
-        """The test that caught a change before, with its seconds, where the change is not known to pass it."""
+        """The test that caught a change before, with its seconds; none where the change passes it now."""
         before = self.record.caught_before(mutant)
         if before and _is_new(before, self.record.survived(mutant)):
             known = self.reach.files.get(before.partition("::")[0])

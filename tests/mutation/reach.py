@@ -59,7 +59,7 @@ class Reached:
 
     @property
     def opening(self) -> float:
-        """Seconds before the first test: the import, and what the first takes more than most, for fixtures."""
+        """Seconds before the first test: the import, and what that takes more than most, for fixtures."""
         first = next(iter(self.seconds.values()), 0.0)
         return IMPORT + max(0.0, first - self._usual)
 
