@@ -53,7 +53,7 @@ class Decider:
         """Tests of each process, and their seconds: what reaches the change, else what the room names.
 
         First what has caught most of other changes in its seconds, above all in the same file. What it
-        is known to survive is left out. Last what the room names and no map has measured: tests of `make ship`.
+        is known to survive is left out. Last what the room names and no map has measured, as of `make ship`.
         """
         tried = self.record.survived(mutant)
         parts = self.reach.tests(mutant.path, mutant.line) if mutant.path.endswith(".py") else ([], [])
