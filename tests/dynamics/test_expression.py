@@ -151,6 +151,17 @@ def test_a_sympy_expression_keeps_its_value(expression: sp.Expr) -> None:
     assert evaluate(g, [lower(expression)], at) == pytest.approx([float(expression.subs(at))], rel=1e-14)
 
 
+@pytest.mark.parametrize("relation", [sp.Eq, sp.Ne, sp.Lt, sp.Le, sp.Gt, sp.Ge])
+@pytest.mark.parametrize("x", [-0.5, 0.25, 1.0])
+def test_a_branch_is_taken_where_its_condition_holds(relation: type[sp.Rel], x: float) -> None:
+    expression = sp.Piecewise((3 * X, relation(X, Y)), (X - 1, True))
+    g = Graph()
+    (found,) = evaluate(
+        g, [Lowering(g, {X: g.symbol("x"), Y: g.symbol("y")})(expression)], {"x": x, "y": 0.25}
+    )
+    assert found == (3 * x if bool(relation(x, 0.25)) else x - 1)
+
+
 def random_expression(g: Graph, leaves: list[Node], steps: int, seed: int) -> Node:
     choice, nodes = random.Random(seed), list(leaves)
     for _ in range(steps):

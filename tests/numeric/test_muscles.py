@@ -204,6 +204,19 @@ def test_a_reserve_of_another_file_is_a_generalized_force(leg: Leg) -> None:
     assert any(RESERVE in warning and "left out" in warning for warning in without.load_warnings)
 
 
+def test_a_muscle_and_a_reserve_of_one_group_give_what_both_give(leg: Leg) -> None:
+    values = forces(leg.time, (*MUSCLES, RESERVE))
+    write_sto(leg.folder / "both.sto", (*MUSCLES, RESERVE), leg.time, values)
+    given = leg.folder / "both.sto", leg.file
+    apart = leg.analysed(Muscles(*given, force_sets=(leg.folder / "reserves.xml",)))
+    groups = (f"one=moving, {RESERVE}",)
+    both = leg.analysed(Muscles(*given, groups=groups, force_sets=(leg.folder / "reserves.xml",)))
+    names, (one, *_) = apart.rows.axes["load"].names, both.rows.axes["load"].names
+    assert one == "one"
+    torque = sum(apart.load_torque[..., names.index(name)] for name in ("moving", RESERVE))
+    assert relative_error(both.load_torque[..., 0], torque) <= 1e-12
+
+
 def test_moment_arms_by_functions_give_torques(tmp_path: Path) -> None:
     model, zero = osim.Model(), osim.Vec3(0)
     arm = osim.Body("arm", 1.0, osim.Vec3(0, -0.2, 0), osim.Inertia(0.02, 0.005, 0.02))
