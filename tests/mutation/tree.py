@@ -14,7 +14,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
 
@@ -102,21 +102,31 @@ class Tree:
             file.write_text(original, encoding="utf-8")
 
     def tested(self, tests: Sequence[str], cpu: float, deselected: Sequence[str] = ()) -> Ended:
-        """Run tests until one fails, and that one again, within `cpu` seconds of processor time."""
+        """Run tests until one fails, and that one again, within `cpu` seconds of processor time.
+
+        A file that cannot be imported is tried again in another process: its imports are half there in this.
+        """
         told = self.folder / "told.json"
         told.unlink(missing_ok=True)
         leave = [f"--deselect={name}" for name in deselected]
+
+        def fails(pytest_main: Callable[..., int], by: str) -> bool:
+            return int(pytest_main(["-x", *leave, by], [First()])) not in (0, 5)
 
         def work(pytest_main: Callable[..., int]) -> int:
             first = First()
             code = int(pytest_main(["-x", *leave, *tests], [first]))
             if code == 1 or first.by:
-                again = int(pytest_main(["-x", *leave, first.by], [First()])) not in (0, 5)
+                again = "::" not in first.by or fails(pytest_main, first.by)
                 told.write_text(json.dumps({"by": first.by, "again": again}))
             return code
 
         code = self.forked(work, cpu)
-        return Ended(code, **(json.loads(told.read_text()) if told.is_file() and code > 0 else {}))
+        ended = Ended(code, **(json.loads(told.read_text()) if told.is_file() and code > 0 else {}))
+        if ended.by and "::" not in ended.by:
+            again = self.forked(lambda pytest_main: int(fails(pytest_main, ended.by)), cpu) != 0
+            return replace(ended, again=again)
+        return ended
 
     def forked(self, work: Callable[[Callable[..., int]], int], cpu: float) -> int:
         """Exit status, or minus the signal, of work in a process forked from this one.
