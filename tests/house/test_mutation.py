@@ -23,10 +23,17 @@ from mutation.verdicts import END, HEAD, MARK, Record, explained
 HOUSE = {
     "generator/linkwise/__init__.py": "",
     "generator/linkwise/errors.py": "def kept(a):\n    return a + 1\n\n\ndef lost(a):\n    return a * 3\n",
+    "generator/linkwise/progress.py": """
+import linkwise
+steps = linkwise.__dict__.setdefault("steps", [])
+steps.append(7)
+FIRST = steps[0]
+""",
     "generator/linkwise_runtime/__init__.py": "",
     "generator/linkwise_runtime/units.py": "def copied(a):\n    return a - 2\n",
     "templates/a.txt.j2": "",
     "docs/trust.md": f"before\n{MARK}an older table\n{END}after\n",
+    "tests/test_imports.py": "import linkwise.progress\n\n\ndef test_none():\n    pass\n",
     "tests/test_one.py": """
 import importlib.util, pathlib, shutil, subprocess, sys
 import linkwise_runtime
@@ -54,7 +61,8 @@ def test_fails_now_and_then():
     assert len(count.read_text()) != 2
 """,
 }
-"""A house with a function that a program runs, one that a package carries, and one that no test looks at."""
+"""A house with a function that a program runs, one that a package carries, one that no test looks at, and a
+module that, changed, can be imported at the second time alone."""
 SWEEP = "import mutation.tree as t; t.HEAVY = ('pytest',); from mutation.run import main; main()"
 
 
@@ -370,7 +378,7 @@ def test_a_sweep_maps_decides_and_goes_on(tmp_path: Path) -> None:
         return done.stdout + done.stderr
 
     assert "mapped" not in swept("--minutes=0")
-    assert swept("--write").endswith("3 mutants are not decided yet: run `make mutate` before --write\n")
+    assert swept("--write").endswith("5 mutants are not decided yet: run `make mutate` before --write\n")
     said = swept()
     assert "mapped: tests/test_one.py" in said
     assert "no verdict by tests/test_one.py::test_fails_now_and_then: failed, and passed" in said
@@ -379,10 +387,11 @@ def test_a_sweep_maps_decides_and_goes_on(tmp_path: Path) -> None:
     assert by["return a + 1"] == ("killed", "tests/test_one.py::test_program")
     assert by["return a - 2"] == ("killed", "tests/test_one.py::test_copy")
     assert by["return a * 3"][0] == "survived"
-    assert "| single-files | 2 | 1 | 0 | 50.0 % |" in said
+    assert by["FIRST = steps[0]"] == ("killed", "tests/test_imports.py")
+    assert "| single-files | 4 | 2 | 0 | 50.0 % |" in said
     assert "0 of 0 mutants decided" in swept()
     assert swept("--write", status=0) == ""
     page = (tmp_path / "docs/trust.md").read_text()
     assert page.startswith(f"before\n{MARK}{HEAD}| cli | 0 | – | 0 | – |\n")
-    assert "| single-files | 2 | 1 | 0 | 50.0 % |\n" in page
+    assert "| single-files | 4 | 2 | 0 | 50.0 % |\n" in page
     assert page.endswith(f"{END}after\n")
