@@ -103,16 +103,20 @@ def _is_text(node: ast.stmt) -> bool:
 
 def digest_of_test(path: Path, test: str) -> str:
     """Short hash of a test and of what its file has beside tests and imports: other tests may change."""
-    text = path.read_text(encoding="utf-8")
-    lines = text.splitlines()
-    kept = []
-    for node in ast.parse(text).body:
-        name = getattr(node, "name", "")
-        if isinstance(node, ast.Import | ast.ImportFrom) or (name.startswith("test_") and name != test):
-            continue
-        first = min([node.lineno, *(one.lineno for one in getattr(node, "decorator_list", []))])
-        kept += lines[first - 1 : node.end_lineno]
+    pieces = _pieces(path.read_text(encoding="utf-8"))
+    kept = [text for name, text in pieces if name == test or not name.startswith("test_")]
     return hashlib.sha256("\n".join(kept).encode()).hexdigest()[:16]
+
+
+@cache
+def _pieces(text: str) -> tuple[tuple[str, str], ...]:
+    """Name and text of what a file has beside imports; "" for what has none."""
+    lines, found = text.splitlines(), []
+    for node in ast.parse(text).body:
+        if not isinstance(node, ast.Import | ast.ImportFrom):
+            first = min([node.lineno, *(one.lineno for one in getattr(node, "decorator_list", []))])
+            found.append((getattr(node, "name", ""), "\n".join(lines[first - 1 : node.end_lineno])))
+    return tuple(found)
 
 
 class Map:
