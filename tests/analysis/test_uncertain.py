@@ -142,6 +142,7 @@ def test_signs_and_sentence_are_those_of_the_largest_magnitudes(arm: Path) -> No
     assert {one["name"] for one in record["without_certain_sign"]} == set(unsure)
     assert unsure
     assert record["shares"] > len(unsure)
+    assert not record["covariance_of_parameters"]
     name = max(largest, key=lambda name: abs(largest[name][0]))
     (value, deviation, time), (_, i, j, k) = largest[name], name.split("/")
     told = f"the velocity of {k} asked {i} for {plus_minus(value, deviation)}"

@@ -7,6 +7,7 @@ import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
@@ -15,6 +16,7 @@ import pytest
 from helpers.command_line import run_linkwise
 from helpers.induced_setup import write_case
 from helpers.motion_logs import LEG, PLANAR3, smooth, write_csv
+from linkwise import LinkwiseError
 from linkwise.analysis.choices import AnalysisChoices
 from linkwise.bundle import unpacked
 from linkwise.option import chosen
@@ -398,6 +400,16 @@ def test_what_is_no_bundle_is_refused(tmp_path: Path) -> None:
     ):
         done = run_linkwise("replay", name, folder=tmp_path)
         assert (done.returncode, done.stderr.count("\n"), told in done.stderr) == (2, 1, True), done.stderr
+
+
+def test_what_has_no_room_is_refused_before_it_is_unpacked(
+    case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bundle = analysed(case, "log.csv", "--robot", "planar3")
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=2**12))
+    with pytest.raises(LinkwiseError, match=r"MiB unpacked, and .* has 0 MiB left"):
+        unpacked(bundle, tmp_path / "there")
+    assert not list((tmp_path / "there").iterdir())
 
 
 def test_written_options_come_back_as_they_were(case: Path) -> None:

@@ -116,6 +116,7 @@ def test_analyze_takes_what_identify_writes(arm: Path, own: bool) -> None:
     assert f"uncertain.toml: {told}" in done.stdout
     record = json.loads((arm / out / "result/analysis.json").read_text())["uncertain"]
     assert record["note"] == told
+    assert record["covariance_of_parameters"]
     found = identify(log, arm / "arm", processing=Processing(edges="trim"), uncertain=arm / "before.toml")
     write_package(generate(read_system(written), ["numpy"]), arm / out / "again")
     after = arm / out / "again"

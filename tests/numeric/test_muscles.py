@@ -8,7 +8,7 @@ import pytest
 from helpers.answers import relative_error
 from helpers.command_line import run_linkwise
 from helpers.muscled_leg import COORDINATES, MUSCLES, RESERVE, built, forces, motion, reserves, write_sto
-from linkwise import Muscles, kept_package
+from linkwise import Load, Muscles, kept_package
 from linkwise.analysis import Analysis, analyze
 from linkwise.analysis.loads.muscles import grouped
 from linkwise.errors import LinkwiseError
@@ -328,6 +328,12 @@ def test_a_muscle_that_the_model_does_not_apply_is_told(leg: Leg, tmp_path: Path
         assert not any("no column for" in warning for warning in told)
     shown = run_linkwise("inspect", tmp_path / "off.osim", "--details", folder=tmp_path)
     assert "a Thelen2003Muscle that the model does not apply" in shown.stdout
+
+
+def test_a_load_that_is_called_as_a_muscle_is_refused(leg: Leg) -> None:
+    named = Load("straight", "shank", force=(0.0, 9.0, 0.0))
+    with pytest.raises(LinkwiseError, match="muscle 'straight': another has that name; rename one of them"):
+        leg.analysed(leg.muscles(), loads=[named])
 
 
 def test_files_that_do_not_fit_are_refused_in_a_line(leg: Leg, tmp_path: Path) -> None:

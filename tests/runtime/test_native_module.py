@@ -9,12 +9,15 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 from conftest import DATA, needs_compiler
+from linkwise_runtime.native import build
+from linkwise_runtime.native.compiler import MinGW
 
 pytestmark = needs_compiler
 
@@ -301,3 +304,9 @@ def test_memory_that_is_not_there_is_an_error(planar3: ModuleType) -> None:
     many = np.broadcast_to(few, (1 << 56, 3))
     with pytest.raises((MemoryError, ValueError)):
         planar3.load("native").propagation(many, many, many)
+
+
+def test_a_compiler_for_windows_makes_no_module(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(build, "find_compiler", lambda: MinGW(("gcc",)))
+    with pytest.raises(RuntimeError, match="gcc makes no modules for Python here"):
+        build.extension(tmp_path / "calls.c", (), ())
