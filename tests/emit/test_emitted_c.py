@@ -18,6 +18,7 @@ from helpers.answers import random_states, relative_error
 from helpers.compiled import Compiled, check_syntax, compile_library, library_of, link_parts, name_of
 from helpers.kept import run_kept
 from helpers.needed import missing
+from helpers.urdf_text import chain, joint
 from linkwise import Coordinate, LinkEnergy, Options, energy_system, generate, read_system, write_package
 from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.package.load import import_package
@@ -529,3 +530,10 @@ def test_no_samples_touch_no_memory(directory_of: Callable[[str], Path]) -> None
                 getattr(library, f"planar3_{name}{suffix}")(ctypes.c_size_t(0), *nowhere)
         os._exit(0)
     assert os.waitpid(child, 0)[1] == 0
+
+
+@pytest.mark.parametrize(("joints", "told"), [("ab", "of link_1.h."), ("ab bc", "of link_1.h to link_2.h.")])
+def test_the_code_of_a_robot_names_the_files_of_its_links(joints: str, told: str, tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(chain(*(joint(name, *name) for name in joints.split())))
+    write_package(generate(read_system(tmp_path / "arm.urdf"), ["native"]), tmp_path / "arm")
+    assert f"The arithmetic is in the closed forms {told}" in (tmp_path / "arm/c/test.c").read_text()

@@ -77,6 +77,18 @@ def test_missing_field_raises() -> None:
         render("package/init.py.j2", {"package": "arm"})
 
 
+@pytest.mark.parametrize("derivation", ["rule", "energy"])
+def test_both_pages_of_formulas_in_steps_say_what_names_mean(derivation: str) -> None:
+    text, latex = (
+        formula_page.formula_page(ending, [("t1", "2*q_1"), (torque, "t1")], ["a"], ["b"], [], derivation)
+        for ending, torque in (("txt", "tau_1_1"), ("tex", r"\tau_{1,1}"))
+    )
+    told = [line for line in text.partition("\n\nt1")[0].splitlines() if line]
+    said = [line.removeprefix("%").removeprefix(" ") for line in latex.splitlines() if line.startswith("%")]
+    assert len(told) > 8
+    assert [line for line in said if line][1:] == told[1:]
+
+
 def test_numbers_of_formulas_are_rounded_to_what_they_are_worth() -> None:
     files = generate(read_system(str(DATA / "skew.toml"), Options(tip="b")), ["formulas"], "skew")
     for name in ("formulas.txt", "formulas.tex"):
