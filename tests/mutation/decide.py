@@ -30,7 +30,7 @@ UNMEASURED = 15.0
 
 
 Depth = Literal["before", "first", "all"]
-"""To which tests a mutant is put: that which caught it before, the first stage too, or all."""
+"""To which tests a mutant is put: what caught it before; if it passes none yet, the first stage; all."""
 
 
 def _is_new(test: str, tried: Collection[str]) -> bool:
@@ -99,6 +99,8 @@ class Decider:
 
         None where the tests so far pass and it is put to others later.
         """
+        if depth == "first" and self.record.survived(mutant):
+            return None
         total = 0.0
         most = {"before": 0, "first": 1, "all": None}[depth]
         for tests, seconds in chain(self.before(mutant), islice(self.stages(room, mutant), most)):
