@@ -1,5 +1,6 @@
 """`make mutate` visits every room, trusts no test that fails by itself, and goes on where it stopped."""
 
+import json
 import shutil
 import subprocess
 import sys
@@ -268,6 +269,25 @@ def test_what_caught_a_mutant_is_tried_first_once_the_text_is_another_with_a_map
     seconds = {"tests/graphs/test_graphs.py::quick": 1.0, by: 2.0}
     monkeypatch.setattr(reach, "files", {"tests/graphs/test_graphs.py": Reached("", seconds, {}, {})})
     assert list(decider.before(mutant)) == [([by], 2.0)]
+
+
+def test_a_test_that_is_likely_to_catch_a_mutant_is_tried_first_and_decides_nothing_unless_it_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mutant, files = some_mutants()[0], (tmp_path / "survived.json", tmp_path / "caught.json")
+    likely = "tests/graphs/test_graphs.py::likely"
+    path, _, change = mutant.key.partition(": ")
+    files[1].write_text(json.dumps({path: {change: f"- - likely: {likely}"}}))
+    monkeypatch.setattr(verdicts, "is_there", lambda test: test == likely)
+    monkeypatch.setattr(verdicts, "digest_of_test", lambda file, test: "same")
+    decider = Decider(Map(tmp_path / "reach"), Record(*files))
+    assert decider.record.decided(mutant) is None
+    assert [tests for tests, _ in decider.before(mutant)] == [[likely]]
+    decider.record.save()
+    assert likely in files[1].read_text()
+    tree: Any = Scripted([PASSES])
+    assert decider.decide("single-files", mutant, tree, "before") is None
+    assert likely not in files[1].read_text()
 
 
 def test_what_passes_at_first_decides_nothing_and_is_not_run_again(

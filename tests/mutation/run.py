@@ -5,9 +5,9 @@
 Each mutant runs in a process forked from one that has the heavy libraries, in a copy of the tree. It is
 killed when a test that may notice it fails, or takes far more processor time than without it. What survives
 is to be killed by a test, or listed in equivalents.json with the reason why nothing that is promised changes.
-First each is put to the test that caught it when its file was another. For what is left, files of tests that
-are new run once under coverage, which tells what they reach; then each is put to a few tests that reach it,
-and at last to many.
+First each is put to the test that caught it when its file was another, or that caught.json has as likely
+to, as in "- - likely: tests/FILE.py::NAME". For what is left, files of tests that are new run once under
+coverage, which tells what they reach; then each is put to a few tests that reach it, and at last to many.
 --minutes ends the sweep, and the next one goes on from there, in any clone: what is caught is in caught.json.
 --write puts the scores into docs/trust.md.
 """

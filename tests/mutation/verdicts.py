@@ -16,6 +16,8 @@ from mutation.rooms import ROOMS, drawn, test_files
 from mutation.tree import ROOT
 
 CAUGHT = ("killed", "too slow")
+LIKELY = "likely"
+"""Verdict of somebody who expects a test to catch a mutant, which was not run yet: it decides nothing."""
 KEPT = Path(__file__).with_name("caught.json")
 """Mutants that tests catch, by which test, kept with the tests: a sweep begins with what caught it before."""
 EQUIVALENTS = Path(__file__).with_name("equivalents.json")
@@ -28,7 +30,7 @@ HEAD = "| room | mutants | caught | equivalent | score |\n|---|---:|---:|---:|--
 class Verdict:
     """Verdict on a mutant.
 
-    verdict: killed, too slow or survived; by: the test that failed, else how much was run;
+    verdict: killed, too slow, survived or likely; by: the test that failed, else how much was run;
     source: digest of the code of the file that is changed; tests: of the test that failed, else of all
     together
     """
@@ -75,9 +77,12 @@ class Record:
         return kept if kept.tests == self.tests(kept.verdict, kept.by) else None
 
     def caught_before(self, mutant: Mutant) -> str:
-        """The test that caught a mutant of another text, or did so when it was another itself; else empty."""
+        """The test that caught a mutant of another text, or did so when it was another itself; else empty.
+
+        Also that which is likely to catch it.
+        """
         kept = self.verdicts.get(mutant.key)
-        by = test_of(kept.by) if kept is not None and kept.verdict in CAUGHT else ""
+        by = test_of(kept.by) if kept is not None and kept.verdict in (*CAUGHT, LIKELY) else ""
         return by if is_there(by) else ""
 
     def catches(self, path: str) -> Counter[str]:
@@ -106,7 +111,10 @@ class Record:
         }
 
     def passes(self, mutant: Mutant, tests: Sequence[str]) -> None:
-        """Keep that these tests pass with a change that is not decided yet."""
+        """Keep that these tests pass with a change that is not decided; one that was likely is forgotten."""
+        kept = self.verdicts.get(mutant.key)
+        if kept is not None and kept.verdict == LIKELY and kept.by in tests:
+            del self.verdicts[mutant.key]
         source = digest_of_code(ROOT / mutant.path)
         told = [[test, source, self.tests("killed", test)] for test in tests]
         self.passed.setdefault(mutant.key, []).extend(told)
@@ -125,7 +133,7 @@ class Record:
         survived = {}
         for key, verdict in sorted(self.verdicts.copy().items()):
             path, _, change = key.partition(": ")
-            if verdict.verdict in CAUGHT:
+            if verdict.verdict in (*CAUGHT, LIKELY):
                 told = f"{verdict.source} {verdict.tests} {verdict.verdict}: {verdict.by}"
                 caught.setdefault(path, {})[change] = told
             else:
