@@ -26,7 +26,7 @@ def in_order(tests: Sequence[Timed], caught: Counter[str], openings: Mapping[str
         files.setdefault(name.partition("::")[0], []).append((name, seconds))
 
     def next_of(file: str, opening: float) -> tuple[float, int, str, float]:
-        """How much less than nothing the next tests of a file are worth, and how many these are."""
+        """Return minus the catches per second of the next tests of a file, and how many these are."""
         gains = accumulate(1 + caught[name] for name, _ in files[file])
         costs = accumulate((seconds + START for _, seconds in files[file]), initial=opening)
         next(costs)

@@ -86,7 +86,7 @@ class Record:
         return by if is_there(by) else ""
 
     def catches(self, path: str) -> Counter[str]:
-        """How often each test has caught a change; ten times as often in this file, three times near it."""
+        """Return how many changes each test caught; one of this file counts as ten, one near it as three."""
         found: Counter[str] = Counter()
         for key, kept in self.verdicts.copy().items():
             if kept.verdict in CAUGHT:
