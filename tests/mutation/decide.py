@@ -27,8 +27,6 @@ UNKNOWN = 300.0
 """Seconds for a file that a room names, which no map has measured: new ones, and those of `make ship`."""
 UNMEASURED = 15.0
 """Seconds for a test that caught a change before, where no map has measured it yet."""
-
-
 Depth = Literal["before", "first", "all"]
 """To which tests a mutant is put: what caught it before; if it passes none yet, the first stage; all."""
 
