@@ -155,6 +155,10 @@ def _forget() -> Iterator[None]:
     foreign_text.cache_clear()  # by texts of packages
     if compiler := sys.modules.get("torch._dynamo"):
         compiler.reset()
+    if reader := sys.modules.get("griffe._internal.extensions.dataclasses"):
+        for function in vars(reader).values():
+            if hasattr(function, "cache_clear"):  # one keeps every class of every checkout that it has read
+                function.cache_clear()
     gc.collect()
     if native := sys.modules.get("linkwise_runtime.native.memory"):
         native.lasting(native.MOST)  # which takes the place of all blocks that are kept for results to come

@@ -392,6 +392,8 @@ def test_what_does_not_go_with_contacts_is_refused(folder: Path) -> None:
         analyze(folder / "moving.csv", leg, contacts=Contacts((FOOT, knee), loads=shank))
     with pytest.raises(LinkwiseError, match="goes with --contact; add it"):
         Contacts(columns={"sole": WhileColumn("stands")})
+    with pytest.raises(LinkwiseError, match="--contact-threshold -1: give a force in N, 0 or more"):
+        Contacts((FOOT,), loads=shank, threshold=-1.0)
     with pytest.raises(LinkwiseError, match="give a list of Contact"):
         analyze(log, leg, contacts=FOOT)
     with pytest.raises(LinkwiseError, match="'foot' is not a Contact"):

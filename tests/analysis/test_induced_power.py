@@ -185,6 +185,14 @@ def test_the_figure_has_a_lane_for_each_segment_arrows_for_flows_and_bars_for_wo
     np.testing.assert_allclose(max(widths), 0.9 * step, rtol=1e-9)
 
 
+def test_the_seven_segments_that_most_work_is_done_on_have_lanes(tmp_path: Path) -> None:
+    write_package(generate(read_system("planar9"), ["numpy"], kernel="loops"), tmp_path / "arm")
+    log = write_csv(tmp_path / "a.csv", smooth(40, 9), [f"joint{k}" for k in range(1, 10)])
+    found = analyze(log, tmp_path / "arm", induced_power=True)
+    shown = [label.get_text() for label in found.figure("energy").axes[0].get_yticklabels()]
+    assert len(shown) == 7
+
+
 def test_flows_that_are_nothing_beside_the_work_are_not_told(
     swing: Analysis, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -92,6 +92,24 @@ def test_every_deviation_is_that_of_perturbed_rows(arm: Path, stated: str, conve
     assert ("sd-motion/tau" in named) == (stated in ("both", "lengths"))
 
 
+@pytest.mark.parametrize("convention", ["closing", "gradient"])
+def test_net_torques_have_the_deviations_of_their_convention(convention: Any, tmp_path: Path) -> None:
+    """Every torque is as many times too large as the one mass of the robot."""
+    massless = '<link name="b"/>'
+    parts = (link("a"), massless, link("c"), joint("ab", "a", "b"), joint("bc", "b", "c"))
+    (tmp_path / "arm.urdf").write_text(robot(*parts))
+    (tmp_path / "mass.toml").write_text('schema = 1\n[link.c]\nmass = "10 %"\n')
+    write_package(generate(read_system(tmp_path / "arm.urdf"), ["numpy"]), tmp_path / "arm")
+    log, by = write_csv(tmp_path / "log.csv", smooth(60, 2), JOINTS[:2]), Processing(convention=convention)
+    found = analyze(
+        log, tmp_path / "arm", processing=by, columns=["by-cause"], uncertain=tmp_path / "mass.toml"
+    )
+    for cause in ("ab", "bc", "gravity"):
+        np.testing.assert_allclose(
+            found[f"sd/tau_by/ab/{cause}"], 0.1 * np.abs(found[f"tau_by/ab/{cause}"]), rtol=1e-9
+        )
+
+
 @pytest.mark.parametrize(
     "columns", [["tau_gravity/*/*", "power/ab"], ["tau_qdd/*/d/*", "tau_qd/cd/*/*"], ["sums"]]
 )

@@ -277,6 +277,12 @@ def test_storage_files_are_headed_as_opensims_and_in_degrees_where_they_say_so(t
         )
 
 
+def test_a_setup_that_does_not_say_so_is_in_degrees(tmp_path: Path) -> None:
+    """OpenSim's own default."""
+    setup = changed(write_case(tmp_path), "<in_degrees>false</in_degrees>", "")
+    assert read_setup(setup).options["sto_units"] == "deg"
+
+
 def test_what_a_setup_says_is_not_given_again(tmp_path: Path) -> None:
     write_case(tmp_path)
     told = analyze(tmp_path, "--opensim-setup", "setup.xml", "--cutoff", "4", code=2)

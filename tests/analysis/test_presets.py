@@ -38,6 +38,30 @@ def test_segments_add_up_to_the_body_that_was_measured(preset: str, body: float)
     assert total == pytest.approx(body, rel=0.006)
 
 
+RADII = {
+    ("zatsiorsky-men", "foot"): (25.81, 25.7, 24.5),
+    ("zatsiorsky-men", "shank"): (43.40, 25.5, 24.9),
+    ("zatsiorsky-men", "thigh"): (42.22, 32.9, 32.9),
+    ("zatsiorsky-men", "forearm"): (26.89, 27.6, 26.5),
+    ("zatsiorsky-men", "upper arm"): (28.17, 28.5, 26.9),
+    ("zatsiorsky-women", "foot"): (22.83, 29.9, 27.9),
+    ("zatsiorsky-women", "shank"): (43.23, 27.1, 26.7),
+    ("zatsiorsky-women", "thigh"): (36.85, 36.9, 36.4),
+    ("zatsiorsky-women", "forearm"): (26.43, 26.1, 25.7),
+    ("zatsiorsky-women", "upper arm"): (27.51, 27.8, 26.0),
+}
+"""Lengths in cm, and sagittal and transverse radii of gyration in % of them: de Leva 1996, table 4."""
+
+
+@pytest.mark.parametrize(("preset", "segment"), RADII)
+def test_moments_of_limbs_are_those_of_published_radii(preset: str, segment: str) -> None:
+    """I = m r^2, up to the three digits that both sources print."""
+    length, *percents = RADII[preset, segment]
+    one = PRESETS[preset].segments[segment]
+    moments = [one.mass * (percent / 100 * length) ** 2 for percent in percents]
+    assert [one.sagittal, one.transverse] == pytest.approx(moments, rel=0.008)
+
+
 @pytest.mark.parametrize("preset", list(PRESETS))
 def test_drawn_segments_have_the_errors_of_the_source(preset: str) -> None:
     rng = np.random.default_rng(3)

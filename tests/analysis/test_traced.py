@@ -131,8 +131,9 @@ def test_tensors_are_refused_where_arrays_are_needed(tmp_path: Path) -> None:
     write_package(generate(read_system(DATA / "crank_rocker.toml"), ["numpy", "torch"]), tmp_path / "robot")
     own, torch = log(tmp_path, ["crank"], size=0.3), load_robot(tmp_path / "robot", "torch")
     for asked in ({"trace": ["all"]}, {"induced_power": True}, {"induced": ["joints"]}):
-        with pytest.raises(LinkwiseError, match="--backend torch computes in tensors"):
-            analyze(own, torch, **asked)  # type: ignore[arg-type]
+        for carried in ([], [Payload(torch.links[0], 5.0)]):  # the payload's own model is in arrays
+            with pytest.raises(LinkwiseError, match="--backend torch computes in tensors"):
+                analyze(own, torch, payloads=carried, **asked)  # type: ignore[arg-type]
 
 
 def test_the_force_of_each_contact_is_a_source(tmp_path: Path) -> None:

@@ -172,6 +172,19 @@ def test_shares_about_zero_and_loads_have_signs_too(arm: Path) -> None:
     assert told["tau_load/ab/push"].deviation > abs(told["tau_load/ab/push"].value)
 
 
+def test_a_load_may_be_uncertain_in_its_own_way(arm: Path) -> None:
+    path = arm / "apart.toml"
+    path.write_text('schema = 1\n[loads]\nforce = "1 N"\n[load.second]\nforce = "3 N"\n')
+    loads = [Load(name, "d", [0.0, 3.0, 0.0]) for name in ("first", "second")]
+    result = analyze(arm / "log.csv", arm / "arm", loads=loads, uncertain=path)
+    one, other = (result[f"sd/tau_load/ab/{load.name}"] for load in loads)
+    np.testing.assert_allclose(other, 3.0 * one, rtol=1e-9)
+    assert one.min() > 0
+    path.write_text(path.read_text().replace("second", "third"))
+    with pytest.raises(LinkwiseError, match=r"\[load\.third\]: there is no load 'third'; loads are first, s"):
+        analyze(arm / "log.csv", arm / "arm", loads=loads, uncertain=path)
+
+
 def test_a_sentence_says_where_velocities_count_twice(arm: Path) -> None:
     how = Processing(convention="gradient")
     result = analyze(arm / "log.csv", arm / "arm", processing=how, uncertain=arm / "bodies.toml")

@@ -218,8 +218,10 @@ def test_a_wrong_term_of_a_parameter_that_is_zero_fails(tmp_path: Path) -> None:
 def test_a_fault_in_one_derivation_shows_against_the_others(tmp_path: Path) -> None:
     write_package(generate(read_system("planar2"), ["numpy"]), tmp_path / "planar2")
     change_file(tmp_path / "planar2", "forms/link_2.py", "g_2,  # g(2, 2)", "g_1,  # g(2, 2)")
-    failing = {name for name, mark in marks(tmp_path / "planar2").items() if mark == "FAIL"}
-    assert "derivations: closed forms (by the rigid rule) against rule" in failing
+    details = {
+        result.name: result.detail for result in check_package(tmp_path / "planar2", 10) if result.failed
+    }
+    assert details["derivations: closed forms (by the rigid rule) against rule"].endswith(" at g(2, 2)")
 
 
 def test_a_result_given_twice_is_computed_once(tmp_path: Path) -> None:
@@ -395,6 +397,21 @@ def test_one_wrong_formula_in_any_file_fails(case: str, copy_for: Copy) -> None:
     package = copy_for(*FOR[re.split(r"[/.]", file)[0]])
     change_file(package, file, old, new)
     assert [name for name, mark in marks(package).items() if mark == "FAIL" and name.startswith(failing)]
+
+
+@needs_compiler
+def test_what_controllers_answer_is_measured_by_magnitudes(
+    passing: Copy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Measured by less than nothing, every answer would pass."""
+
+    def measured(*given: Any) -> Entries:
+        entries = Entries(*given)
+        assert (entries.scale >= 0).all(), entries.what
+        return entries
+
+    monkeypatch.setattr("linkwise.check.control_functions.Entries", measured)
+    assert set(marks(passing("c")).values()) <= {"ok", "skip"}
 
 
 @needs_compiler

@@ -330,6 +330,9 @@ def test_text_is_read_as_the_formula_it_shows() -> None:
         "1/0",
         "(" * 9_999,
         "",
+        "Piecewise(q_1)",
+        "Piecewise((q_1, q_1 < 0))",
+        "Piecewise((q_1, c), (2, True))",
     ],
 )
 def test_text_that_is_no_formula_is_refused(text: str) -> None:

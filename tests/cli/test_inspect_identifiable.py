@@ -50,6 +50,17 @@ def test_limits_of_masses_and_what_is_measured_are_taken_and_json_has_every_mask
     assert all(row["proved"] for row in free["tau"])
 
 
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [
+        ([], "whatever their masses (--mass-limit)"),
+        (["--mass-limit", "link2=0,0.65"], "within --mass-limit"),
+    ],
+)
+def test_the_table_says_whether_masses_are_held(limits: list[str], said: str) -> None:
+    assert f"the same joint torques, {said}," in told("planar3", "--identifiable", *README, *limits).stdout
+
+
 def test_a_loop_is_looked_at_where_it_closes() -> None:
     data = json.loads(told(str(DATA / "fourbar.toml"), "--identifiable", "--json").stdout)
     assert data["joints"] == ["a"]

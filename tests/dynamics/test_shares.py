@@ -138,6 +138,18 @@ def test_velocity_forces_of_degree_four_are_owned_in_equal_parts(backend: str, t
         robot.christoffel(*given(backend, q))
 
 
+def test_an_imposed_motion_counts_at_every_degree(tmp_path: Path) -> None:
+    """(x' + cos t)^4 / 4 + x'^2, by SymPy's LagrangesMethod."""
+    kinetic = (X.diff(T) + sp.cos(T)) ** 4 / 4 + X.diff(T) ** 2
+    whole = LagrangesMethod(kinetic, [X]).form_lagranges_equations()
+    named = {X.diff(T, 2): sp.Symbol("a"), X.diff(T): sp.Symbol("v")}
+    exact = sp.lambdify([*named.values(), T], whole[0].xreplace(named))
+    robot = loaded(energy_system("shaken", {X: "m"}, [LinkEnergy("it", kinetic)]), tmp_path, "numpy")
+    q, qd, qdd = random_states(1, 20)
+    tau = robot.at(t=0.37).inverse_dynamics(q, qd, qdd)
+    assert relative_error(tau[:, 0], exact(qdd[:, 0], qd[:, 0], 0.37)) <= 1e-12
+
+
 @pytest.mark.parametrize("system", [crane, lambda: rolling_in_pieces()], ids=["crane", "pieces"])
 def test_check_proves_every_back_end(system: Any, tmp_path: Path) -> None:
     pytest.importorskip("torch")
@@ -170,6 +182,17 @@ def test_an_equality_holds_at_its_place_alone(backend: str, tmp_path: Path) -> N
     motion = given(backend, q, rest, rest)
     at, beside = values_of(robot.inverse_dynamics(*motion))
     np.testing.assert_allclose(at - beside, [0.0, -3.0], atol=1e-6)
+
+
+@pytest.mark.parametrize("backend", ["numpy", "torch", "autograd"])
+def test_a_power_of_what_is_pressed_in_has_no_slope_before_it_is(backend: str, tmp_path: Path) -> None:
+    """Max(0, x)^(3/2) by itself has the slope 0 / 0 where x < 0."""
+    x = Coordinate("x", "m")
+    ball = LinkEnergy("ball", x.qd**2 / 2, {"stop": sp.Max(0, x.q) ** sp.Rational(3, 2)})
+    robot = loaded(energy_system("ball", [x], [ball]), tmp_path, backend)
+    q, rest = np.array([[-0.5], [0.25]]), np.zeros((2, 1))
+    slopes = values_of(robot.position_gradient(*given(backend, q, rest, rest)))
+    np.testing.assert_allclose(slopes.reshape(2), [0.0, 0.75 / 0.5], rtol=1e-14)
 
 
 @pytest.mark.parametrize("backend", ["numpy", pytest.param("native", marks=needs_compiler)])
@@ -373,6 +396,10 @@ GIVEN = {
     "an input of nothing": (
         {"inputs": [LOOSE]},
         "the input u is in no force and no dissipation",
+    ),
+    "one independent coordinate": (
+        {"independent": FLAT},
+        "`independent` is .*; give a list of coordinates",
     ),
     "no links": ({"links": None}, "`links` is None; give a list of linkwise.LinkEnergy"),
     "a kind of links": ({"links": [LinkEnergy]}, "`links` is .*; give a list of linkwise.LinkEnergy"),

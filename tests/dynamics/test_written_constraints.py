@@ -156,6 +156,15 @@ def test_a_disc_rolls_as_kanes_method_says(tmp_path: Path) -> None:
         np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
 
 
+def test_where_something_rolls_positions_do_not_tell_those_of_others(tmp_path: Path) -> None:
+    z = dynamicsymbols("z")
+    rod, rolls = {"rod": x**2 + y**2 - 1}, {"rolls": z.diff(T) - y * x.diff(T)}
+    bead = Particle("bead", M, [x, y, z])
+    for number, (held, told) in enumerate(((rod, True), (rod | rolls, False))):
+        made = energy_system(f"bead{number}", dict.fromkeys((x, y, z), "m"), [bead], constraints=held)
+        assert loaded(made, tmp_path).constraints.ties.chosen.of_positions is told
+
+
 def test_a_pendulum_in_plane_coordinates_swings_and_pulls_as_by_its_angle(tmp_path: Path) -> None:
     length = 1.5
     rod = {"rod": x**2 + y**2 - length**2}

@@ -10,10 +10,12 @@ import pytest
 from conftest import DATA
 from helpers.motion_logs import write_csv
 from helpers.urdf_text import joint, link, mimic, robot
-from linkwise import LinkwiseError, generate, read_robot, read_system, write_package
+from linkwise import LinkwiseError, Options, generate, read_robot, read_system, write_package
 from linkwise.analysis.load_robot import load_robot
 from linkwise.cli.app import app
+from linkwise.identification.identified_robot import constraint_text
 from linkwise.identification.shared_mass import shared_mass
+from linkwise.package.manifest import Manifest
 from typer.testing import CliRunner
 
 from identification.test_identify import other_bodies, own_parameters, swings
@@ -129,6 +131,22 @@ def test_the_friction_of_a_joint_that_follows_counts_in_that_of_the_other(tmp_pa
     assert list(passive) == ["ab"]
     assert (passive["ab"].damping, passive["ab"].friction) == pytest.approx((12, 2), rel=1e-3)
     assert b'<dynamics damping="0" friction="0"/>' in (tmp_path / "out/arm.urdf").read_bytes()
+
+
+def test_couplings_are_written_beside_the_file_as_they_were(tmp_path: Path) -> None:
+    text = robot(*map(link, "abc"), joint("ab", "a", "b"), joint("bc", "b", "c"))
+    (tmp_path / "arm.urdf").write_text(text)
+    gear = 'name = "gear"\ntype = "coupling"\nterms = { ab = 1.5, bc = [0.1, -2.0, 0.3] }\n'
+    (tmp_path / "own.toml").write_text(f"schema = 1\n[[constraint]]\n{gear}")
+    tied = [tmp_path / "own.toml", tmp_path / "again.toml"]
+    system = read_system(tmp_path / "arm.urdf", Options(constraints=str(tied[0])))
+    write_package(generate(system, ["numpy"]), tmp_path / "arm")
+    manifest = Manifest.read(tmp_path / "arm")
+    assert manifest.tree is not None
+    tied[1].write_text(constraint_text(manifest.tree, manifest.joints))
+    one, other = (read_robot(tmp_path / "arm.urdf", Options(constraints=str(path))) for path in tied)
+    assert one.couplings
+    assert one.couplings == other.couplings
 
 
 def test_friction_that_the_file_has_no_place_for_is_told(tmp_path: Path) -> None:

@@ -86,6 +86,8 @@ def test_whole_trials_are_the_tools(name: str, trial: tuple[float, int, float], 
     assert done.returncode == 0, done.stderr
     found = columns(osim.TimeSeriesTable(str(tmp_path / "out/leg_InverseDynamics.sto")))
     assert sorted(found) == sorted(expected)
+    titles = (path.read_text().splitlines()[0] for path in tmp_path.rglob("*tool.sto"))
+    assert (tmp_path / "out/leg_InverseDynamics.sto").read_text().splitlines()[0] in titles
     for column in set(expected) - {"time"}:
         here = np.interp(expected["time"], found["time"], found[column])
         off = np.sqrt(np.mean((here - expected[column]) ** 2)) / np.ptp(expected[column])

@@ -209,6 +209,10 @@ WRONG: Mapping[str, tuple[str, str]] = {
         chain([KNEE]).replace("<coordinates>joint0_angle", "<coordinates>knee"),
         "names 'knee', which is not a coordinate of the joint; it has joint0_angle",
     ),
+    "axis of no direction": (
+        chain([KNEE]).replace("<axis>0 0 1</axis>", "<axis>0 0 0</axis>", 1),
+        "joint 'joint0', rotation1 has a zero axis; give its direction",
+    ),
     "two coordinates": (
         chain([ROLLING]).replace("<coordinates>joint0_turn<", "<coordinates>joint0_turn joint0_slip<"),
         "rotation1 is a function of 2 coordinates; only functions of one are modelled",

@@ -12,7 +12,9 @@ from helpers.answers import random_states, relative_error
 from helpers.urdf_text import chain, joint
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
+from linkwise_runtime.answers.inertia_solve import Told
 from linkwise_runtime.control.joint_impedance import JointImpedance
+from linkwise_runtime.control.target_solve import TargetInertia, solve_target
 
 torch = pytest.importorskip("torch")
 
@@ -221,6 +223,24 @@ def test_a_controller_maps_over_samples(package_of: Packages) -> None:
     controller = model.partial_impedance(2.0, 3.0, 4.0)
     mapped = torch.func.vmap(lambda *state: controller(*state))(q, qd, at)
     assert relative_error(mapped, controller(q, qd, at)) <= 1e-12
+
+
+def test_samples_may_lie_along_several_axes(package_of: Packages) -> None:
+    model = package_of("planar3").load("numpy")
+    q, qd, at = random_states(3, 10, seed=5)
+    controller = model.partial_impedance(2.0, 3.0, 4.0)
+    shaped = controller(*(a.reshape(2, 5, 3) for a in (q, qd, at)))
+    assert relative_error(shaped.reshape(10, 3), controller(q, qd, at)) <= 1e-14
+
+
+@pytest.mark.parametrize("positive", [True, False])
+def test_a_wanted_inertia_is_solved_in_any_unit(positive: bool) -> None:
+    """A regular one may have zeros on its diagonal, so it is measured by what it is made from."""
+    about = TargetInertia("singular", Told("hardly known", ("a", "b")))
+    wanted = np.array([[2.0, 1.0], [1.0, 2.0]]) if positive else np.array([[0.0, 1.0], [1.0, 0.0]])
+    for unit in (1.0, 1e-20, 1e20):
+        found = solve_target(about, unit * wanted, unit * np.ones((2, 1)), 2.0 * unit * np.ones(2), positive)
+        np.testing.assert_allclose(found, np.full((2, 1), 1 / 3 if positive else 1.0), rtol=1e-14)
 
 
 @pytest.mark.parametrize("backend", BACKENDS)

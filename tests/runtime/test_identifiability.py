@@ -12,7 +12,8 @@ from conftest import DATA, PANDA
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise_runtime.certainty.feasible_bodies import feasible_bodies
-from linkwise_runtime.certainty.pseudo_inertia import pseudo_inertia
+from linkwise_runtime.certainty.pseudo_inertia import pseudo_inertia, squared
+from linkwise_runtime.certainty.torque_space import torque_space
 from linkwise_runtime.parameter_values import faults
 from linkwise_runtime.rule.joint_tree import Bodies
 from linkwise_runtime.rule.regressors import inertial_parameters
@@ -250,12 +251,23 @@ def test_whatever_the_solver_returns_the_bound_is_one() -> None:
     hidden = np.linalg.qr(random.normal(size=(30, 7)))[0]
     limits = np.stack([0.5 * own[:, 0], 1.5 * own[:, 0]], 1)
     bodies = feasible_bodies(own, hidden, limits, ("a", "b", "c"))
+    assert np.abs(bodies.rows.T @ bodies._ones).max() <= 1e-9, "seen from the analytic centre"
     end = bodies.least(random.normal(size=(3, 10)))
     assert end.bound <= end.attained <= end.bound + 1e-8 * abs(end.bound)
+    for _ in range(20):
+        drawn = bodies._inside(9.0 * random.normal(size=7))
+        moved = squared(bodies._ones[:30].reshape(3, 10) + (bodies.rows @ drawn)[:30].reshape(3, 10))
+        assert np.linalg.eigvalsh(moved).min() >= 0.0, "bodies that could exist"
     c = np.eye(7)[2]
     least = bodies._proved(c, bodies._solved(c, bodies.rows)[1])
     for _ in range(20):
         assert bodies._proved(c, random.normal(size=len(bodies.rows))) <= least + 1e-12
+
+
+def test_torques_that_are_zero_in_every_motion_determine_nothing() -> None:
+    space = torque_space(np.zeros((4, 10)), "nothing")
+    assert space.count == 0
+    assert space.hidden.shape == (10, 10)
 
 
 def _parameters(j: Any) -> Any:

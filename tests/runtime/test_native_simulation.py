@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from conftest import DATA, needs_compiler
 from helpers.answers import relative_error
+from helpers.urdf_text import chain, joint
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise_runtime.motion.c_controller import CONTROLLER
@@ -161,6 +162,23 @@ def test_lost_ties_and_motions_without_bound_are_told_as_in_arrays(
                 np.ones(crane.n), np.ones(crane.n), [0.0, 1.0, 2.0], lambda t, q, qd: 1e3 * qd * qd
             )
     assert told["numpy"] == told["native"]
+
+
+def test_arrays_go_on_from_the_last_instant_that_c_has_reached(tmp_path: Path) -> None:
+    """At 1 m/s the level slide comes to where its motor fails, at 1 m, and not before."""
+    level = joint("ab", "a", "b", type="prismatic", rpy="0 0 0", axis="1 0 0")
+    (tmp_path / "slide.urdf").write_text(chain(level))
+    write_package(generate(read_system(tmp_path / "slide.urdf"), ["numpy", "native"]), tmp_path / "slide")
+    for backend in ("numpy", "native"):
+        robot = import_package(tmp_path / "slide").load(backend)
+        with pytest.raises(ValueError, match="the motion is not finite at t = 1 s"):
+            robot.simulate(
+                [0.05],
+                [1.0],
+                np.arange(0.0, 1.6, 0.125),
+                lambda t, q, qd: np.where(q < 1.0, 0.0, np.nan),
+                step=0.125,
+            )
 
 
 class Tired(Exception):

@@ -114,6 +114,21 @@ def test_large_batches_in_pieces_are_what_single_samples_are(
             assert relative_error(piece, one) <= 1e-15
 
 
+def test_batches_beyond_the_cache_are_what_single_samples_are(
+    package_of: Callable[[str], ModuleType],
+) -> None:
+    robot = package_of("planar3").load("numpy", kernel="rule")
+    frame, motion = robot.kinematics.frames[-1], motion_of("numpy", robot.n, 60_000)
+
+    def accelerated(*at: Any) -> Any:
+        return robot.kinematics.acceleration(*at, frame)
+
+    for call, samples in ((robot.regressor, 9_000), (accelerated, 60_000)):
+        whole = call(*(a[:samples] for a in motion))
+        for at in (0, 4_321, samples - 1):
+            assert relative_error(whole[at], call(*(a[at] for a in motion))) <= 1e-14
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 @pytest.mark.parametrize("batch", [(), (2, 3), (0,)])

@@ -11,6 +11,7 @@ import pytest
 from conftest import needs_compiler
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
+from linkwise_runtime.motion import simulated
 from linkwise_runtime.native.library import symbol
 
 torch = pytest.importorskip("torch")
@@ -195,6 +196,39 @@ def test_c_induces_what_numpy_induces(
         expected = induced(exact, q, qd, tau)
         compare(induced(compiled, q, qd, tau), expected, EXACT)
         compare(induced(compiled, q[3], qd[3], tau[3]), type(expected)(*(a[3] for a in expected)), EXACT)
+
+
+def test_c_says_where_joints_follow_without_arrays(tied: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = tied.load("native")
+    q, *_ = motion(robot.constraints)
+    own = np.ones((len(q), len(robot.constraints.independent)))
+    expected = tied.load("numpy").constraints.velocity(q, own)
+    slide, far = robot.joint_names.index("slide"), q.copy()
+    far[:, slide] += 12.0
+    for of_arrays in ("tie_rows.RowsAt", "newton_closing.ties_at"):
+        monkeypatch.setattr(
+            f"linkwise_runtime.constraints.{of_arrays}", lambda *given: pytest.fail("arrays were asked")
+        )
+    compare(robot.constraints.velocity(q, own), expected, EXACT)
+    compare(robot.constraints.closed(far), q, EXACT)
+
+
+def test_c_starts_anew_with_other_joints_where_its_own_do_not_close_ties(
+    tied: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Arrays close ties before C is asked, so C is given a position where they are open."""
+    q, started = motion(tied.load("numpy").constraints)[0][0], simulated._started
+    q[2] -= 1.5
+    with pytest.raises(ValueError, match="does not close"):
+        tied.load("numpy").constraints.closed(q)
+    expected = tied.load("numpy").simulate(q, 0.0 * q, [0.0, 1e-3])
+
+    def opened(*given: Any) -> Any:
+        equations, state = started(*given)
+        return equations, state._replace(q=q)
+
+    monkeypatch.setattr(simulated, "_started", opened)
+    compare(tied.load("native").simulate(q, 0.0 * q, [0.0, 1e-3]).q, expected.q, EXACT)
 
 
 def test_forces_by_cause_are_those_of_the_links(tied: ModuleType) -> None:

@@ -100,6 +100,7 @@ def test_a_figure_has_its_own_words_order_unit_and_size(drawn_of: Any) -> None:
     assert files == ["tau-hip.eps"]
     assert axis.figure.get_suptitle() == "Two paces"
     assert axis.figure.get_figwidth() == pytest.approx(120 / 25.4)
+    assert axis.figure.get_figheight() == pytest.approx(1.2 * 2.3 + 0.3), "a wide panel is not as much higher"
     assert (axis.get_title("left"), axis.get_ylabel()) == ("Load of the hip", "kN·m")
     assert axis.get_legend().get_title().get_text() == "pace"
     assert [line.get_label() for line in axis.lines] == ["quickly", "slow"]

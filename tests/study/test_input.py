@@ -106,6 +106,10 @@ BAD: dict[str, tuple[tuple[str, ...], str]] = {
             "a level twice": ["slow", "slow"],
         }.items()
     },
+    "no columns to compare": (
+        (HEAD, '[[compare]]\nfactor = "condition"\nbetween = ["slow", "fast"]\ncolumns = []\n', TRIALS),
+        "[[compare]]: 'columns' is empty; name one or more",
+    ),
     "subjects who are not others": (
         (HEAD, f"{COMPARE}paired = false\n", TRIALS),
         "[[compare]] condition: 'paired' is false, and 'slow' and 'fast' have subjects in common, 'S1', 'S2'",

@@ -80,6 +80,7 @@ def test_curves_of_groups_are_means_of_subjects_each_the_mean_of_its_trials(arms
     expected = of_subjects.groupby(["condition", "percent"], observed=True).agg(["mean", "std", "min", "max"])
     curves = pd.read_parquet(arms / "out/curves.parquet")
     found = curves[curves.column == "tau/joint1"].set_index(["condition", "percent"]).sort_index()
+    assert found.index.get_level_values("percent").max() == 100
     for statistic in ("mean", "std", "min", "max"):
         np.testing.assert_allclose(found[statistic], expected[statistic].sort_index(), rtol=1e-9, atol=1e-12)
     whosever = of_trials.groupby(["condition", "percent"], observed=True).agg(["mean", "std", "min", "max"])
@@ -227,6 +228,9 @@ def test_a_broken_trial_is_told_and_stops_no_other(tmp_path: Path) -> None:
     run_study(file, tmp_path / "out", Here())
     told = json.loads((tmp_path / "out/study.json").read_text())["broken"]["S1-fast-2"]
     assert "no column for joint" not in told, "it is broken in another way now"
+    record = (tmp_path / "out/study.json").read_text()
+    run_study(file, tmp_path / "out", Here())
+    assert (tmp_path / "out/study.json").read_text() == record, "it was tried again, and nothing is new"
 
 
 def test_every_trial_is_read_whatever_it_is_called(tmp_path: Path) -> None:

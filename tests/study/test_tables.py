@@ -1,6 +1,7 @@
 """Tables, tests and figures of trials together, held against pandas, SciPy and spm1d."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -174,6 +175,18 @@ def test_means_differ_where_p_is_below_alpha(paired: bool) -> None:
         ((found,), _) = compared([comparison], trials)
         assert [*found.statistic, found.p] == pytest.approx([*t.statistic, *t.pvalue], rel=1e-9)
         assert [(c.start, c.end, c.p) for c in found.clusters] == [(0, 100, found.p)] * is_found
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_means_that_do_not_vary_are_told_in_own_words(paired: bool) -> None:
+    """SciPy warns of lost digits, which here would be an error."""
+    same = [
+        replace(one, statistics={"tau": np.full_like(one.statistics["tau"], one.labels["pace"] == "slow")})
+        for one in trials_of(1)
+    ]
+    made, (reason,) = compared([Comparison("pace", ("slow", "fast"), ("tau",), paired)], same)
+    assert made == []
+    assert reason.endswith("subjects do not vary, so that there is nothing to test")
 
 
 @pytest.mark.parametrize(("paired", "told"), [(True, "2 subjects in both"), (False, "2 subjects on a side")])
