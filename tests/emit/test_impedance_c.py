@@ -311,7 +311,7 @@ def test_equations_of_nine_joints_stay_within_their_arrays(tmp_path: Path) -> No
     )
     twice = {"inertia": np.eye(9)}
     found = c.cancelled(q, qd, q, twice)
-    np.testing.assert_allclose(found, cancel_formula(model, q, qd, q, twice), rtol=1e-11)
+    np.testing.assert_allclose(found, cancel_formula(model, q, qd, q, twice, None), rtol=1e-11)
 
 
 def test_an_arm_of_parallel_slides_has_one_motion_too_many(tmp_path: Path) -> None:
