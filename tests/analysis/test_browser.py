@@ -567,6 +567,21 @@ def test_a_browser_that_cannot_unpack_says_which_can(driver, result):
     assert driver.get_log("browser") == []
 
 
+def test_signs_are_no_matter_where_nothing_is_uncertain(driver, tmp_path):
+    """Motion of one arm loads no joint of the other, and has no sign there."""
+    system = read_system("torso")
+    write_package(generate(system, ["numpy"]), tmp_path / "torso")
+    names = [coordinate.name for coordinate in system.coordinates]
+    log = write_csv(tmp_path / "a.csv", smooth(40, len(names)), names)
+    (tmp_path / "report.html").write_text(report(analyze(log, tmp_path / "torso")), encoding="utf-8")
+    opened(driver, (tmp_path / "report.html").as_uri())
+    said = "return JSON.stringify(document.getElementById('shares').data.map((trace) => trace.customdata))"
+    assert "motion" in driver.execute_script(said)
+    assert "no certain sign" not in driver.execute_script(said)
+    bars = driver.execute_script("return document.getElementById('shares').data.map((trace) => trace.y)")
+    assert list(range(len(names))) in bars, "a row for each joint"
+
+
 def test_deviations_are_bands_numbers_hatches_and_a_list(driver, tmp_path):
     (tmp_path / "bodies.toml").write_text(
         'schema = 1\n[all]\nmass = "10 %"\ncentre = "60 mm"\nradii = "20 %"\n'

@@ -80,6 +80,15 @@ def test_net_torques_are_pinocchios_and_sum_to_joint_torques(backend: str, arm: 
     np.testing.assert_array_equal(named.sel(joint="wrist", by="load:push"), result["tau_by/wrist/load:push"])
 
 
+def test_one_net_torque_alone_may_be_asked_for(arm: Path) -> None:
+    one = "tau_by/shoulder/gravity"
+    alone, beside = (
+        analyze(arm / "log.csv", arm / "arm", columns=asked) for asked in ([one], ["tau_gravity/**", one])
+    )
+    for found in (alone, beside):
+        assert [name for name in found.table if name.startswith("tau_by/")] == [one]
+
+
 @pytest.mark.parametrize("convention", ["closing", "gradient"])
 @pytest.mark.parametrize("contacts", [(), (Contact("foot", "held", (0.1, -0.06, 0.0), name="sole"),)])
 def test_tied_and_standing_robots_sum_up_as_their_columns_do(

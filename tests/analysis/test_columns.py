@@ -80,6 +80,7 @@ def test_what_is_asked_for_is_as_among_all_columns(
         name in names for name in whole.table if kinds([name]) & expected and choice in ("sums", "causes")
     )
     assert some.closure.recursion_relative is not None
+    assert some.closure.recursion_relative < 1e-9
     assert 0 < some.closure.terms_relative < 1e-12
     assert some.record()["asked_columns"] == list(asked)
     assert some.record()["closure_is_of"].startswith("8 samples")

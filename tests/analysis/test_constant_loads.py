@@ -90,6 +90,15 @@ def test_what_is_noticed_in_a_file_of_loads_is_told_once(place: Path) -> None:
     assert [first, second] == [f"warning: {warning}" for warning in told]
 
 
+def test_a_force_at_a_place_of_the_world_is_one_at_its_origin_with_its_moment(place: Path) -> None:
+    point, force = np.array([0.3, 0.2, -0.1]), np.array([4.0, -5.0, 6.0])
+    there = Load("there", "link3", force, point=point, point_in="world")
+    moved = Load("moved", "link3", force, np.cross(point, force), point_in="world")
+    there, moved = (analyze(place / "log.csv", place / "planar3", loads=[one]) for one in (there, moved))
+    np.testing.assert_allclose(there.load_torque, moved.load_torque, rtol=0, atol=1e-12)
+    assert np.abs(there.load_torque).max() > 1
+
+
 def test_pictures_tell_a_load_from_the_link_that_bears_it(place: Path) -> None:
     result = analyze(place / "log.csv", place / "planar3", loads=[Load("link3", "link3", (0, -20, 0))])
     assert "loads link3" in result.provenance

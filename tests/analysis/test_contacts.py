@@ -412,6 +412,8 @@ def test_a_wheel_rolls_on_ground_across_gravity(folder: Path) -> None:
     result = analyze(folder / "moving.csv", folder / "leg", contacts=[wheel])
     assert result.robot.contacts is not None
     assert result.robot.contacts.contacts[0].normal == (0.0, GRAVITY, 0.0)
+    (told,) = result.robot.contacts.record(result.robot.joints)["held"]
+    assert (told["normal"], told["radius"]) == ([0.0, GRAVITY, 0.0], 0.05)
     down = np.cross([0.0, -0.05, 0.0], result.contact_wrench[:, 0, 3:])
     assert np.abs(result.contact_wrench[:, 0, :3] - down).max() < 1e-9 * np.abs(down).max()
 

@@ -325,6 +325,13 @@ def test_a_bag_with_fewer_messages_than_it_promises_is_refused(
         analyze(told.parent, PLANAR3)
 
 
+def test_a_file_may_name_its_joints_itself(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["time"], file["q"] = TIME, Q[:, ::-1]
+        file.attrs["joint_names"] = list(JOINTS[::-1])
+    np.testing.assert_allclose(analyze(tmp_path / "a.h5", PLANAR3).q, Q, atol=1e-12)
+
+
 def test_units_of_datasets_count(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     for units, factor in (("degrees", 180 / np.pi), ("rad", 1.0)):

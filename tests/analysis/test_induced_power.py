@@ -174,6 +174,8 @@ def test_the_figure_has_a_lane_for_each_segment_arrows_for_flows_and_bars_for_wo
     figure = swing.figure("energy:once")
     lanes, bars = figure.axes[:2]
     assert [label.get_text() for label in lanes.get_yticklabels()] == ["link1", "link2", "link3"]
+    beside = [text.get_text().splitlines()[0] for text in lanes.texts]
+    assert [text for text in beside if text.startswith("through")] == [f"through joint{k}" for k in (1, 2, 3)]
     net = swing.work_in_phases[1]["gain"].net
     (marks,) = (line for line in bars.get_lines() if line.get_label() == "in all: gain of energy")
     np.testing.assert_allclose(marks.get_xdata(), net, rtol=0, atol=1e-9 * np.abs(net).max())

@@ -11,6 +11,7 @@ from helpers.urdf_text import joint, link, robot
 from linkwise import Load, Lowpass, Processing, generate, read_system, write_package
 from linkwise.analysis import analyze
 from linkwise.analysis.load_robot import load_robot
+from linkwise.analysis.passed_noise import PassedNoise
 
 pytestmark = needs_compiler
 
@@ -90,6 +91,32 @@ def test_every_deviation_is_that_of_perturbed_rows(arm: Path, stated: str, conve
     own = {"sd/tau_spring", "sd/tau_damping", "sd/tau_armature"}
     assert named >= own if stated != "bodies" else not named & own
     assert ("sd-motion/tau" in named) == (stated in ("both", "lengths"))
+
+
+def test_noise_of_a_position_comes_through_a_spring_by_its_stiffness(arm: Path) -> None:
+    """Without a filter, 1 mm of noise at 4 N/m."""
+    found = analyze(arm / "log.csv", load_robot(arm / "smooth", "numpy"), uncertain=arm / "motion.toml")
+    np.testing.assert_allclose(found["sd/tau_spring/bc"], 0.004, rtol=1e-9)
+
+
+def test_noise_passes_a_filter_in_pieces_as_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    def passed() -> PassedNoise:
+        return PassedNoise.of(200, 100.0, Processing(lowpass=Lowpass(8.0)))
+
+    whole = passed()
+    monkeypatch.setattr("linkwise.analysis.passed_noise.AT_ONCE", 1_000)
+    pieces = passed()
+    for name in ("gram", "removed", "followed"):
+        np.testing.assert_allclose(getattr(pieces, name), getattr(whole, name), rtol=1e-9, atol=1e-12)
+
+
+def test_what_compiled_code_knows_is_not_perturbed(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "linkwise.analysis.deviation_rows.PerturbedRows", lambda *given, **more: pytest.fail("perturbed")
+    )
+    robot = load_robot(arm / "smooth", "native")
+    found = analyze(arm / "log.csv", robot, uncertain=arm / "bodies.toml", columns=["tau_gravity/**"])
+    assert found["sd/tau_gravity/ab/d"].min() > 0
 
 
 @pytest.mark.parametrize("convention", ["closing", "gradient"])

@@ -210,6 +210,11 @@ def test_a_broken_setup_is_refused_in_one_line(name: str, tmp_path: Path) -> Non
     assert "\n" not in str(refused.value)
 
 
+def test_a_setup_that_is_not_there_is_told(tmp_path: Path) -> None:
+    with pytest.raises(LinkwiseError, match=r"gone\.xml: no such file$"):
+        read_setup(tmp_path / "gone.xml")
+
+
 def test_a_pressed_foot_needs_loads(tmp_path: Path) -> None:
     with pytest.raises(
         LinkwiseError, match="'sole' needs an external_loads_file, which says where it presses"

@@ -143,6 +143,7 @@ def test_the_force_of_each_contact_is_a_source(tmp_path: Path) -> None:
     found = analyze(log(tmp_path, names, size=0.1), robot, contacts=Contacts((foot,)), trace=["all"])
     check_closes(found, 1e-6)
     assert "contact:foot" in found.traced["sources"]
+    assert found.traced["weight"] == "apart"
     assert np.abs(found[f"qd_from/{names[-1]}/contact:foot"]).max() > 0.1
 
 

@@ -34,6 +34,7 @@ from linkwise import (
 from linkwise.check import compiled_c, subject, table
 from linkwise.check.as_generated import check_made
 from linkwise.check.compare import Entries, compare
+from linkwise.check.parametric_tree import changed_values
 from linkwise.package.load import load_package, open_package
 from linkwise.package.manifest import LARGEST, Manifest, is_too_large
 from linkwise.package.write import check_target
@@ -148,6 +149,23 @@ def test_a_parameter_that_is_zero_is_held_beside_a_tiny_link_too(tmp_path: Path)
     assert set(marks(tmp_path / "pair").values()) == {"ok"}
     change_file(tmp_path / "pair", "forms/link_1.py", "= p['I_arm_yz']", "= -p['I_arm_yz']")
     assert marks(tmp_path / "pair")["numpy, other parameters: M^j against Newton-Euler recursion"] == "FAIL"
+
+
+def test_a_length_that_is_zero_is_changed_as_those_beside_it(tmp_path: Path) -> None:
+    wrist = 'xyz = ["L", 0, 0.002]'
+    text = PAIR.replace("xyz = [0.5, 0, 0]", wrist).replace("link = [", "parameters = { L = 0 }\nlink = [", 1)
+    (tmp_path / "pair.toml").write_text(text)
+    system = read_system(str(tmp_path / "pair.toml"), Options("symbolic"))
+    write_package(generate(system, ["numpy"], "pair"), tmp_path / "pair")
+    manifest = Manifest.read(tmp_path / "pair")
+    assert 0 < changed_values(manifest.parameters, manifest)["L"] <= 0.03 * 0.002
+
+
+def test_formulas_in_steps_are_held_too(tmp_path: Path) -> None:
+    write_package(generate(read_system("puma560"), ["formulas"]), tmp_path / "puma560")
+    text = (tmp_path / "puma560/formulas.txt").read_text()
+    assert re.search(r"^t1 = ", text, re.MULTILINE)
+    assert "FAIL" not in marks(tmp_path / "puma560").values()
 
 
 @pytest.mark.parametrize("parameters", ["symbolic", "nonzero"])

@@ -9,8 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 from conftest import DATA, needs_compiler
-from linkwise import Options, generate, read_system, write_package
+from linkwise import (
+    Coordinate,
+    LinkEnergy,
+    Options,
+    energy_system,
+    generate,
+    read_system,
+    write_package,
+)
 from linkwise.check.compare import ROUNDINGS, Entries, IndexRows, compare
 from linkwise.check.frame_checks import frame_calls, frame_reference
 from linkwise.check.parametric_tree import check_numbers, tree_with
@@ -142,6 +151,21 @@ def test_states_that_energies_are_not_defined_for_are_left_out() -> None:
     np.testing.assert_allclose(reference.values["c0"][:, 0, 0, 0], 1 / reference.states.q[:, 0], rtol=1e-8)
     assert (reference.states.q > 0).all()
     assert len(reference.values["c0"]) == len(reference.states.q)
+
+
+@pytest.mark.parametrize("size", [1e-4, 1.0, 1e4])
+def test_states_on_a_corner_are_left_out_whatever_the_size_of_torques(size: float, tmp_path: Path) -> None:
+    """Dry friction, of which a joint at rest has no one value, is as large as inertia and spring."""
+    x = Coordinate("x", "m")
+    rubbing = LinkEnergy("it", size * x.qd**2, size * x.q**2, size * sp.Abs(x.qd))
+    write_package(generate(energy_system("rubbing", [x], [rubbing]), ["numpy"]), tmp_path / "it")
+    manifest = Manifest.read(tmp_path / "it")
+    assert manifest.energies is not None
+    names = list(dict.fromkeys(share.name for link in manifest.energies.links for share in link.shares))
+    terms = [TextTerms(link, ["x"], "", {}) for link in manifest.energies.links]
+    found = states_of_energies(terms, names, manifest.joints, 40)
+    assert found.tried - len(found.states.q) == (random_states(manifest.joints, 40).qd == 0).sum() > 0
+    assert np.abs(found.states.qd).min() > 1e-7
 
 
 def test_states_are_looked_for_where_energies_are_defined() -> None:

@@ -60,8 +60,10 @@ def test_simplifications_are_these() -> None:
         (g.div(g.zero, x), g.zero),
         (g.call("cos", g.neg(x)), g.call("cos", x)),
         (g.call("sin", g.neg(x)), g.neg(g.call("sin", x))),
+        (g.call("abs", g.neg(x)), g.call("abs", x)),
         (g.const(-0.0), g.zero),
         (g.add(g.const(1.5), g.const(-1.5)), g.zero),
+        (g.atan2(g.const(0.0), g.const(-2.0)), g.const(np.pi)),
     ]
     assert [at for at, (one, other) in enumerate(same) if one != other] == []
     assert g.call("tanh", g.neg(x)) != g.call("tanh", x)

@@ -134,6 +134,16 @@ def test_velocity_forces_of_degree_four_are_owned_in_equal_parts(backend: str, t
     )
     third = u**3 * v / 2
     assert relative_error(by[:, 1], np.stack([3 * third / 4 - u**3 / 6, third / 4], -1)) <= 1e-13
+    slopes = values_of(robot.propagation(*given(backend, q, qd, qdd), convention="gradient").velocity)
+    for k in range(2):  # what counts is not h alone, as c2 has velocities in it, too
+        step = 1e-6 * np.eye(2)[k]
+        ends = [values_of(robot.inverse_dynamics(*given(backend, q, qd + s * step, qdd))) for s in (1, -1)]
+        slope = (ends[0] - ends[1]) / 2e-6
+        np.testing.assert_allclose(slopes[:, :, 0, k], slope * qd[:, [k]], rtol=0, atol=1e-7)
+    kinetic = u**2 / 2 + v**2 / 2 + q[:, 0] * u**2 * v**2 / 4 + q[:, 1] * u**3 / 6
+    # dK/dqd . qd - K, which torques change; of degree two it is K
+    expected = kinetic + 2 * q[:, 0] * u**2 * v**2 / 4 + q[:, 1] * u**3 / 6
+    assert relative_error(values_of(robot.energy(*given(backend, q, qd)).kinetic)[:, 0], expected) <= 1e-13
     with pytest.raises(ValueError, match="more than two velocities at once, and no Christoffel symbols"):
         robot.christoffel(*given(backend, q))
 

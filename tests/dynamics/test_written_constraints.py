@@ -6,6 +6,7 @@ Oracles: LagrangesMethod and KanesMethod of SymPy, motions of textbooks, SciPy.
 import copy
 import hashlib
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from linkwise import (
 )
 from linkwise.analysis import analyze
 from linkwise.package.load import import_package
+from linkwise_runtime.constraints.chosen_constraints import best_closing
 from scipy.integrate import solve_ivp
 from sympy.physics.mechanics import (
     KanesMethod,
@@ -154,6 +156,22 @@ def test_a_disc_rolls_as_kanes_method_says(tmp_path: Path) -> None:
         expected[order] = np.linalg.solve(*made(q, qd))[:, 0]
         found = robot.constraints.forward_dynamics(q, qd, np.zeros(5)).qdd
         np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e6])
+def test_a_constraint_may_be_written_in_any_size(size: float, tmp_path: Path) -> None:
+    bob, rod = Particle("bob", M, [x, y], gravity=[0, -G]), {"rod": size * (x**2 + y**2 - 1)}
+    robot = loaded(energy_system("bob", {x: "m", y: "m"}, [bob], constraints=rod, independent=[x]), tmp_path)
+    np.testing.assert_allclose(robot.constraints.closed([0.6, -0.7]), [0.6, -0.8], atol=1e-9)
+
+
+def test_of_positions_that_stay_open_the_one_that_is_open_least_is_told() -> None:
+    left = iter([3.0, 1.0, 2.0])
+    tried: Any = SimpleNamespace(
+        closed_from=lambda start: SimpleNamespace(is_closed=False, open_by=next(left))
+    )
+    best, closed = best_closing(tried, np.zeros((3, 1)))
+    assert (best.open_by, closed) == (1.0, ())
 
 
 def test_where_something_rolls_positions_do_not_tell_those_of_others(tmp_path: Path) -> None:

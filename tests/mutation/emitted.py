@@ -15,6 +15,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -148,19 +149,21 @@ def main() -> None:
     parser.add_argument("--each", type=int, default=60, help="mutants of each package")
     parser.add_argument("--only", nargs="*", default=list(ROBOTS))
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     import torch.func  # noqa: F401  # loaded once, for all processes that are forked from this one
 
     options.out.mkdir(parents=True, exist_ok=True)
     record, counts = [], Counter[tuple[str, bool]]()
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(options.jobs) as pool:
         os.environ["LINKWISE_CACHE"] = folder
         for name in options.only:
             directory = package(name, Path(folder))
             if caught(directory, None):
                 sys.exit(f"{name}: `linkwise check` refuses the package as it was generated")
-            for mutant in sample(formula_mutants(directory), options.each, options.seed):
-                killed = caught(directory, mutant)
+            chosen = sample(formula_mutants(directory), options.each, options.seed)
+            verdicts = pool.map(lambda mutant: caught(directory, mutant), chosen)  # noqa: B023  # of this package
+            for mutant, killed in zip(chosen, verdicts, strict=True):
                 counts[name, killed] += 1
                 record.append({"package": name, "mutant": mutant.key, "caught": killed})
                 if not killed:

@@ -13,6 +13,7 @@ from helpers.command_line import run_linkwise
 from helpers.muscled_leg import COORDINATES, built, motion, write_sto
 from linkwise import Analysis, Load, MarkerChoices, kept_package
 from linkwise.analysis import Lowpass, Processing, analyze
+from linkwise.analysis.opensim.recorded_markers import recorded_markers
 from linkwise.errors import LinkwiseError
 
 pytest.importorskip(
@@ -203,13 +204,21 @@ def test_distances_are_of_the_same_instant_at_a_rate_whose_step_is_rounded(
 def test_a_marker_that_is_never_seen_is_lacking(walk: Walk, tmp_path: Path) -> None:
     unseen = walk.markers.copy()
     unseen[:, 2] = np.nan
-    unseen[20:30, 5] = np.nan
+    unseen[20:30, 5, 1] = np.nan  # one coordinate of it
     walk.trc(tmp_path / "unseen.trc", unseen, walk.time)
     result = walk.followed(tmp_path / "unseen.trc")
     told = json.loads(json.dumps(result.record()["markers"], allow_nan=False))
     assert told["lacking"] == [walk.names[2]]
     assert {one["marker"] for one in told["each"]} == {*walk.names} - {walk.names[2]}
     assert np.abs(result.q - walk.known().q).max() < 1e-4
+
+
+def test_a_marker_that_lacks_a_coordinate_is_not_seen() -> None:
+    places = np.ones((2, 3, 3))
+    places[0, 1, 2], places[1, 2] = np.nan, 0.0
+    found = recorded_markers(np.arange(2.0), "abc", places, str)
+    assert np.isnan(found.places).all(axis=2).tolist() == [[False, True, False], [False, False, True]]
+    assert np.isnan(found.places).any(axis=2).tolist() == [[False, True, False], [False, False, True]]
 
 
 def test_joints_that_no_seen_marker_tells_are_named_with_the_time(walk: Walk, tmp_path: Path) -> None:

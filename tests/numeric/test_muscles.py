@@ -351,6 +351,11 @@ def test_files_that_do_not_fit_are_refused_in_a_line(leg: Leg, tmp_path: Path) -
         leg.analysed(Muscles(tmp_path / "twice.sto", leg.file))
     with pytest.raises(LinkwiseError, match="no column is an actuator of the model"):
         leg.analysed(Muscles(tmp_path / "other.sto", leg.file))
+    write_sto(tmp_path / "whole.sto", MUSCLES, leg.time, leg.tension)
+    (tmp_path / "longer.osim").write_text(leg.file.read_text().replace("0 -0.41999", "0 -0.51999"))
+    told = r"body 'shank' is up to 0\.1 m from where .*longer\.osim has it; the motion or the robot does not"
+    with pytest.raises(LinkwiseError, match=told):
+        leg.analysed(Muscles(tmp_path / "whole.sto", tmp_path / "longer.osim"))
 
 
 def test_the_command_tells_what_muscles_leave(leg: Leg, tmp_path: Path) -> None:

@@ -360,6 +360,10 @@ TEXTS: dict[str, tuple[Callable[[str], str], str]] = {
         lambda t: t.replace('"lock": {}', '"lock": {"a": {"b": {}}}'),
         "request.lock.a is not a number, a",
     ),
+    "long name": (
+        lambda t: t.replace('"lock": {}', f'"lock": {{"{"a" * 200}": {{"b": {{}}}}}}'),
+        f"request.lock.'{'a' * 80}' is not a number",
+    ),
     "surrogate": (
         lambda t: t.replace('"robot": "planar2"', '"robot": "\\ud800"', 1),
         "robot is not a string of whole",

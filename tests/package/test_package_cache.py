@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from conftest import DATA
 from helpers.command_line import run_linkwise
+from helpers.motion_logs import smooth, write_csv
 from helpers.osim_text import ROLLING, chain
 from linkwise import (
     LinkwiseError,
@@ -156,6 +157,12 @@ def test_what_a_file_leaves_out_is_told_each_time(tmp_path: Path) -> None:
     for _ in range(2):
         (warning,) = kept_package(file, "numpy").warnings
         assert warning == f"{file}: bushing left out of the torques: disc"
+    names = [coordinate.name for coordinate in read_system(file).coordinates]
+    write_csv(tmp_path / "log.csv", smooth(20, len(names)), names)
+    flags = ("--robot", "leg.osim", "--out", "out", "--no-page")
+    done = run_linkwise("analyze", "log.csv", *flags, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "warning: leg.osim: bushing left out of the torques: disc\n" in done.stderr
 
 
 def test_a_package_is_itself_and_what_is_neither_is_refused_in_a_line(tmp_path: Path) -> None:

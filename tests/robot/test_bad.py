@@ -43,6 +43,10 @@ BAD = {
         robot(link("a"), moments(0.2, 0.3, 0.6), AB),
         "link 'b' has an inertia that breaks the triangle inequality (0.6 > 0.2 + 0.3 kg·m²) by 20 %",
     ),
+    "two moments alike": (
+        robot(link("a"), moments(0.1, 0.1, 0.5), AB),
+        "(0.5 > 0.1 + 0.1 kg·m²) by 1.5e+02 %; correct it",
+    ),
     "one moment": (
         robot(link("a"), moments(0, 0, 0.6), AB),
         "(0.6 > 0 + 0 kg·m²), as it has one moment alone: a thin rod along x has yy = zz; correct it",

@@ -168,8 +168,10 @@ def test_constraints_between_bodies_close_loops(tmp_path: Path) -> None:
         "<location_body_2>0 0.2 0</location_body_2></PointConstraint>"
     )
     bars = ["PlanarJoint", "PlanarJoint"]
-    (tie,) = robot_of(tmp_path, chain(bars, pin)).ties
+    closed = robot_of(tmp_path, chain(bars, pin))
+    (tie,) = closed.ties
     assert (tie.name, tie.kind) == ("pin", "point")
+    assert closed.frames[tie.second].translation == (0.0, 0.2, 0.0), "on the ground"
     for switch in ("<isEnforced>false</isEnforced>", "<isDisabled>true</isDisabled>"):
         off = pin.replace("</PointConstraint>", f"{switch}</PointConstraint>")
         assert robot_of(tmp_path, chain(bars, off)).ties == ()

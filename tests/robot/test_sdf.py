@@ -135,6 +135,12 @@ def test_the_model_stands_in_the_world_where_its_poses_say(place: str, tmp_path:
     assert {"corner", "edge", "tip"} <= set(robot.kinematics.frames)
 
 
+def test_a_model_on_joints_of_the_world_does_not_float(tmp_path: Path) -> None:
+    (tmp_path / "stands.sdf").write_text(POSES)
+    with pytest.raises(LinkwiseError, match="'world' is the world, which cannot float"):
+        read_robot(tmp_path / "stands.sdf", Options(base="floating"))
+
+
 def test_frames_of_a_model_stay_where_a_link_called_world_comes_first(tmp_path: Path) -> None:
     inertia = "".join(f"<{entry}>0.1</{entry}>" for entry in ("ixx", "iyy", "izz"))
     text = f"""<sdf version="1.9"><model name="m"><link name="world"/>

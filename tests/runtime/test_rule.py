@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import needs_compiler
+from conftest import DATA, needs_compiler
 from helpers.answers import relative_error
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
@@ -112,6 +112,13 @@ def test_large_batches_in_pieces_are_what_single_samples_are(
     for piece, one in zip(answers(), whole, strict=True):
         if one.shape[-1]:
             assert relative_error(piece, one) <= 1e-15
+
+
+def test_joints_that_follow_one_coordinate_rest_in_numbers(package_of: Callable[[str], ModuleType]) -> None:
+    robot = package_of(str(DATA / "crane.urdf")).load("numpy", kernel="rule")
+    q, qd, qdd = motion_of("numpy", robot.n, 300)
+    for part in robot.packed(0.0 * q, 0.0 * qd, 0.0 * qdd):
+        assert np.isfinite(part).all()
 
 
 def test_batches_beyond_the_cache_are_what_single_samples_are(

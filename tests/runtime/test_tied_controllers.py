@@ -14,6 +14,7 @@ from helpers.answers import relative_error
 from helpers.walker import Q, feet, moving, walker_in
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
+from scipy.linalg import null_space
 
 torch = pytest.importorskip("torch")
 
@@ -135,6 +136,21 @@ def test_copies_are_those_of_the_copied_robot(walker: ModuleType) -> None:
     for made in (copy.deepcopy(control), pickle.loads(pickle.dumps(control))):
         np.testing.assert_array_equal(made(Q, qd, 0.0 * Q), control(Q, qd, 0.0 * Q))
         assert made.actuated == control.actuated == ("hip_r", "knee_r", "hip_l", "knee_l")
+
+
+def test_torques_are_the_least_by_their_weights(walker: ModuleType) -> None:
+    """The least sum w tau^2 has V' W tau = 0, for changes V that move nothing."""
+    robot, weight = walker.load("numpy"), np.array([1.0, 2.0, 3.0, 9.0])
+    ties = robot.constrained(contacts=feet(walker))
+    control = robot.partial_impedance(stiffness=3.0, constraints=ties, torque_weight=weight)
+    driven = [robot.joint_names.index(name) for name in control.actuated]
+    tau = control(Q, moving(ties, Q), 0.0 * Q)[driven]
+    idle = null_space(ties.velocity_map(Q)[driven].T)
+    assert idle.shape == (4, 1)
+    np.testing.assert_allclose(idle.T @ (weight * tau), 0.0, atol=1e-9 * np.abs(tau).max())
+    changes = control._actuators.idle(ties.velocity_map(Q))
+    np.testing.assert_allclose(changes.T @ (weight[:, None] * changes), np.eye(1), atol=1e-12)
+    assert np.linalg.matrix_rank(np.hstack([idle, changes]), tol=1e-9) == 1
 
 
 def test_a_frame_of_a_loop_has_the_impedance_asked_for(package_of: Callable[[str], ModuleType]) -> None:

@@ -213,6 +213,14 @@ def test_c_says_where_joints_follow_without_arrays(tied: ModuleType, monkeypatch
     compare(robot.constraints.closed(far), q, EXACT)
 
 
+@pytest.mark.parametrize("call", [call for call in ON_MOTION if call != "inverse_dynamics"])
+def test_c_answers_itself(call: str, tied: ModuleType) -> None:
+    """Arrays would answer in its place, and as well; `inverse_dynamics` is a sum of `partial_torque`."""
+    constraints = tied.load("native").constraints
+    given = motion(tied.load("numpy").constraints)[: ON_MOTION[call]]
+    assert constraints.answered(call, given, ("q", "qd", "tau")) is not None
+
+
 def test_c_starts_anew_with_other_joints_where_its_own_do_not_close_ties(
     tied: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -319,7 +327,12 @@ def test_c_controls_what_numpy_controls(
         for call in ("__call__", "acceleration", "forces"):
             for s in range(3):
                 given = (q[s], qd[s], aim, other[3])
-                compare(getattr(compiled, call)(*given), getattr(exact, call)(*given), EXACT)
+                expected = getattr(exact, call)(*given)
+                with pytest.MonkeyPatch.context() as patch:  # arrays have no part in it
+                    patch.setattr(
+                        type(compiled), "_followed", lambda *asked: pytest.fail("arrays were asked")
+                    )
+                    compare(getattr(compiled, call)(*given), expected, EXACT)
         assert sum(len(of_one._of_one.free) for of_one in compiled._of_one.values()) == 3
     for driven in (None, few):
         exact, compiled = (

@@ -10,6 +10,7 @@ import pytest
 from conftest import DATA, needs_compiler
 from linkwise import generate, read_system, write_package
 from linkwise.package.load import import_package
+from linkwise_runtime.motion.between_samples import sample_slopes
 
 torch = pytest.importorskip("torch")
 
@@ -50,6 +51,14 @@ def motion_of(n: int, time: Any = TIME) -> tuple[Any, Any, Any]:
     rates = 2.0 + np.arange(n)
     phase = rates * time[:, None] + np.arange(n)
     return 0.5 * np.sin(phase), 0.5 * rates * np.cos(phase), -0.5 * rates**2 * np.sin(phase)
+
+
+@pytest.mark.parametrize("samples", [2, 3, 6])
+def test_slopes_of_samples_are_those_of_parabolas_and_of_lines_for_two(samples: int) -> None:
+    time = np.cumsum(np.linspace(0.1, 0.3, samples))
+    values = time**2 if samples > 2 else 3.0 * time
+    expected = 2.0 * time if samples > 2 else [3.0, 3.0]
+    np.testing.assert_allclose(sample_slopes(np.diff(time), values), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("backend", BACKENDS)

@@ -192,6 +192,43 @@ def test_at_rest_products_deviate_by_bodies_and_motion_together(
     agree(found.joint_power, (tau.sum(-1) * qd).std(0))
 
 
+def test_a_share_of_two_uncertain_factors_deviates_as_their_product_does(
+    package_at: Callable[[str], ModuleType],
+) -> None:
+    """Var(h a) = (1 + e^2) (a^2 + s^2) - a^2, for a mass h times the file's, with deviation e."""
+    robot = package_at("puma560").load("numpy")
+    n, e, s = robot.n, 0.5, 2e-3
+    q, a = np.random.default_rng(6).uniform(-2.0, 2.0, (2, n))
+    motion = np.diag(np.repeat([0.0, 0.0, s**2], n))
+    found = robot.uncertainty(q, 0.0 * a, a, UncertainBodies(e), motion).acceleration
+    expected = np.abs(robot.coefficients(q, a)[0]) * np.sqrt((1.0 + e**2) * (a**2 + s**2) - a**2)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_bodies_that_a_robot_was_loaded_with_are_those_that_are_uncertain(
+    package_at: Callable[[str], ModuleType],
+) -> None:
+    package = package_at("puma560")
+    own, motion = package.bodies(), random_states(6, 5)
+    heavy = own._replace(masses=2.0 * own.masses, inertias=2.0 * own.inertias)
+    light, twice = (
+        package.load("numpy", bodies=bodies).uncertainty(*motion, UncertainBodies(0.1, 0.02, 0.1)).torque
+        for bodies in (own, heavy)
+    )
+    np.testing.assert_allclose(twice, 2.0 * light, rtol=1e-12)
+
+
+def test_large_batches_deviate_as_small_ones(
+    package_at: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = package_at("puma560").load("numpy")
+    motion = random_states(robot.n, 23)
+    whole = robot.uncertainty(*motion, uncertain(robot.N))
+    monkeypatch.setattr(type(robot.backend), "chunk", lambda self, motion, most: 5)
+    for piece, one in zip(robot.uncertainty(*motion, uncertain(robot.N)), whole, strict=True):
+        np.testing.assert_allclose(piece, one, rtol=1e-12, atol=1e-15)
+
+
 @pytest.mark.parametrize(
     ("given", "told"),
     [

@@ -173,6 +173,7 @@ BAD = {
     "twice": ('subjects = "who.csv"\n', "subject,mass\nS1,70\nS1,71\n", "row 3: subject 'S1' is there twice"),
     "no columns": ('subjects = "who.csv"\n', "who,mass\nS1,70\n", "name its columns subject, mass in kg and"),
     "no way": ('normalise = "kg"\n', "", "'normalise' is 'kg'; give "),
+    "no sizes": ('subjects = "who.csv"\n', "subject\nS1\n", "name its columns subject, mass in kg and"),
     "no file": ('subjects = "gone.csv"\n', "", "gone.csv: no such file"),
 }
 

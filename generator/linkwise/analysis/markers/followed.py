@@ -120,7 +120,6 @@ def followed(
         told += [f"markers {what}: {listed(names)}"] if names else []
     told += [*markers.told, *found.told]
     motion = folder / MOTION
-    motion.write_bytes(found.motion)
     made = MarkerLog(motion, loads, found, log.name, asked, tuple(told))
     if (apart := made.rms(found.apart)) > FAR:
         far = f"markers are {1000 * apart:.3g} mm (root mean square) from those of the model"
