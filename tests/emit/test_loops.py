@@ -175,6 +175,25 @@ def test_large_blocks_go_past_the_cache_where_lines_are_whole(
 
 
 @needs_compiler
+def test_blocks_that_are_one_vector_are_filled_as_others(
+    directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType], tmp_path: Path
+) -> None:
+    """As where registers are as wide as a block; gcc takes such vectors apart for others."""
+    wide = ("gcc", "-std=c99", "-O1", "-mavx", "-D__AVX512F__", "-Wno-psabi", *counting(tmp_path, 64))
+    directory = directory_of("puma560 loops")
+    compile_library(directory, tmp_path / "library.so", wide)
+    library, states = ctypes.CDLL(str(tmp_path / "library.so")), random_states(6, 24)
+    motion = [rows.reshape(3, 8, 6).swapaxes(1, 2).copy() for rows in states]
+    results = [np.empty((3, size, 8)) for size in (56, 91, 21, 21)]
+    arrays = [ctypes.c_void_p(a.ctypes.data) for a in (*motion, *results)]
+    library.puma560_decomposition_blocks(ctypes.c_size_t(3), *arrays)
+    expected = package_of("puma560").load("numpy").packed(*states)
+    for field, made in zip(FIELDS, results, strict=True):
+        whole = made.swapaxes(1, 2).reshape(24, -1)
+        assert relative_error(whole, getattr(expected, field)) <= 1e-14, field
+
+
+@needs_compiler
 @pytest.mark.parametrize("behind", [0, 16], ids=["on a line", "off a line"])
 def test_reactions_of_many_rows_go_past_the_cache(
     behind: int, directory_of: Callable[[str], Path], tmp_path: Path

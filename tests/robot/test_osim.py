@@ -177,6 +177,13 @@ def test_constraints_between_bodies_close_loops(tmp_path: Path) -> None:
         assert robot_of(tmp_path, chain(bars, off)).ties == ()
 
 
+def test_a_coupled_coordinate_follows_and_no_other(tmp_path: Path) -> None:
+    coupled = constraints(coupler("joint1_angle", "joint0_angle", LINES))
+    robot = robot_of(tmp_path, chain(["PinJoint", "PinJoint"], coupled))
+    assert [coordinate.name for coordinate in robot.coordinates] == ["joint0_angle"]
+    assert [follower.name for follower in robot.followers] == ["joint1_angle"]
+
+
 def test_a_function_may_stand_without_a_name(tmp_path: Path) -> None:
     wrapped = robot_of(tmp_path, chain([KNEE]))
     bare = robot_of(tmp_path, chain([KNEE]).replace(' name="function"', ""))

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import DATA, needs_compiler
+from conftest import needs_compiler
 from helpers.answers import relative_error
+from helpers.urdf_text import chain, joint, mimic
 from linkwise import Options, generate, read_system, write_package
 from linkwise.package.load import import_package
 from linkwise_runtime.arrays.backend import Crossing, largest_batch
@@ -114,11 +115,17 @@ def test_large_batches_in_pieces_are_what_single_samples_are(
             assert relative_error(piece, one) <= 1e-15
 
 
-def test_joints_that_follow_one_coordinate_rest_in_numbers(package_of: Callable[[str], ModuleType]) -> None:
-    robot = package_of(str(DATA / "crane.urdf")).load("numpy", kernel="rule")
-    q, qd, qdd = motion_of("numpy", robot.n, 300)
-    for part in robot.packed(0.0 * q, 0.0 * qd, 0.0 * qdd):
-        assert np.isfinite(part).all()
+def test_joints_that_follow_one_coordinate_rest_in_numbers(tmp_path: Path) -> None:
+    """Entries of theirs are sums, of which some have nothing to add; weight does not turn what is upright."""
+    upright = joint("ab", "a", "b", rpy="0 0 0", axis="0 0 1")
+    follows = joint("bc", "b", "c", inner=mimic("ab", 0.5))
+    (tmp_path / "arm.urdf").write_text(chain(upright, follows, joint("cd", "c", "d")))
+    write_package(generate(read_system(tmp_path / "arm.urdf"), ["numpy"]), tmp_path / "arm")
+    robot = import_package(tmp_path / "arm").load("numpy", kernel="rule")
+    for samples in (1, 300):
+        q, qd, qdd = motion_of("numpy", robot.n, samples)
+        for part in robot.packed(q, 0.0 * qd, 0.0 * qdd):
+            assert np.isfinite(part).all()
 
 
 def test_batches_beyond_the_cache_are_what_single_samples_are(
