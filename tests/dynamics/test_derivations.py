@@ -38,6 +38,8 @@ def test_sines_and_cosines_are_named_so_and_explained(derivation: str) -> None:
     names = set(re.findall(r"^    ([a-z]+)\d+(?:_[xyz])? = ", text, re.MULTILINE))
     explained = set(re.findall(r"\b([a-z]+)[13]", files["forms/__init__.py"]))
     assert names <= explained | {"q", "qd", "qdd"}
+    if derivation == "rule":  # axes of frames, velocities of their origins
+        assert {"x", "y", "z", "v"} <= names
 
 
 def test_loops_derive_nothing_and_a_derivation_has_a_name() -> None:

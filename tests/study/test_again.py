@@ -3,6 +3,8 @@
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from linkwise.study import run_study
 from linkwise.study.file import read_study
 from linkwise.study.folder import trial_folders
 from linkwise.study.inputs import trial_files
+from linkwise.study.kept_curves import lacks_curves
 from linkwise.study.ledger import done_before
 
 CYCLES = '\n[cycles]\ntable = "cycles.csv"\npoints = 21\n'
@@ -103,6 +106,11 @@ def test_a_trial_is_done_again_for_whatever_it_is_made_of(done: Path, what: str)
     finally:
         for path, content in before.items():
             path.write_bytes(content)
+
+
+def test_a_trial_that_keeps_no_curves_lacks_none(tmp_path: Path) -> None:
+    plan: Any = SimpleNamespace(cycles="on")
+    assert not lacks_curves(plan, tmp_path)
 
 
 @pytest.mark.parametrize(("column", "fresh"), [("tau/joint1", 0), ("q/joint1", 2)])
