@@ -178,7 +178,7 @@ def test_large_blocks_go_past_the_cache_where_lines_are_whole(
 def test_blocks_that_are_one_vector_are_filled_as_others(
     directory_of: Callable[[str], Path], package_of: Callable[[str], ModuleType], tmp_path: Path
 ) -> None:
-    """As where registers are as wide as a block; gcc takes such vectors apart for others."""
+    """Some registers are as wide as a block; gcc takes such vectors apart for others."""
     wide = ("gcc", "-std=c99", "-O1", "-mavx", "-D__AVX512F__", "-Wno-psabi", *counting(tmp_path, 64))
     directory = directory_of("puma560 loops")
     compile_library(directory, tmp_path / "library.so", wide)
