@@ -16,6 +16,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -162,7 +163,7 @@ def main() -> None:
             if caught(directory, None):
                 sys.exit(f"{name}: `linkwise check` refuses the package as it was generated")
             chosen = sample(formula_mutants(directory), options.each, options.seed)
-            verdicts = pool.map(lambda mutant: caught(directory, mutant), chosen)  # noqa: B023  # of this package
+            verdicts = pool.map(partial(caught, directory), chosen)
             for mutant, killed in zip(chosen, verdicts, strict=True):
                 counts[name, killed] += 1
                 record.append({"package": name, "mutant": mutant.key, "caught": killed})
