@@ -452,6 +452,13 @@ def test_c_that_does_not_compile_fails_with_the_compilers_words(copy_for: Copy) 
     assert "error: " in result.detail
 
 
+def test_a_length_that_belongs_to_another_joint_fails_though_both_are_alike(tmp_path: Path) -> None:
+    write_package(generate(read_system("planar3"), ["autograd"]), tmp_path / "arm")
+    change_file(tmp_path / "arm", "energies/link_2.py", 'places = {1: "place"}', 'places = {2: "place"}')
+    failing = {name for name, mark in marks(tmp_path / "arm").items() if mark == "FAIL"}
+    assert failing == {"autograd: other numbers of links against Newton-Euler recursion"}
+
+
 @needs_compiler
 @pytest.mark.usefixtures("unread")
 @pytest.mark.parametrize(
@@ -486,13 +493,15 @@ def test_c_that_does_not_compile_fails_with_the_compilers_words(copy_for: Copy) 
             "effort_limit[PLANAR2_JOINTS] = {",
             "the effort limits",
         ),
+        ("float arm[3];", "float arm[2];", "the type planar2_contactf is not"),
+        ("size_t *reached;", "long *reached;", "the type planar2_simulation is not"),
     ],
 )
 def test_a_header_that_says_something_else_fails(old: str, new: str, fault: str, copy_for: Copy) -> None:
     package = copy_for("c")
     change_file(package, "c/planar2.h", old, new)
     found = {result.name: result for result in check_package(package, 3)}
-    headers = found["c: numbers, indices and functions of the headers"]
+    headers = found["c: numbers, indices, types and functions of the headers"]
     assert headers.failed
     assert fault in headers.detail
 
@@ -503,7 +512,10 @@ def test_a_table_of_indices_has_these_rows_and_nothing_else(new: str, copy_for: 
     package = copy_for("c")
     change_file(package, "c/planar2_index.h", "{2, 2, 2}", new)
     found = {result.name: result for result in check_package(package, 3)}
-    assert found["c: numbers, indices and functions of the headers"].detail == "the indices of c2 are wrong"
+    assert (
+        found["c: numbers, indices, types and functions of the headers"].detail
+        == "the indices of c2 are wrong"
+    )
 
 
 @needs_compiler

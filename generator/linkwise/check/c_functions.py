@@ -277,7 +277,9 @@ def compile_c(manifest: Manifest, directory: Path, rows: IndexRows) -> tuple[Com
     functions = prototypes(manifest, rows)
     wrong = wrong_header(manifest, compiled, directory, rows, functions, tied_constants(manifest))
     detail = wrong or "as the manifest's paths say"
-    return compiled, Result("c: numbers, indices and functions of the headers", not wrong, None, detail)
+    return compiled, Result(
+        "c: numbers, indices, types and functions of the headers", not wrong, None, detail
+    )
 
 
 def _blocks(motion: Array, width: int) -> Array:

@@ -17,6 +17,7 @@ from linkwise_runtime.native.system import system_here
 from numpy.typing import NDArray
 
 from linkwise.check.compare import IndexRows
+from linkwise.check.header_types import wrong_type
 from linkwise.errors import LinkwiseError
 from linkwise.escape import identifiers
 from linkwise.package.manifest import Manifest
@@ -184,7 +185,7 @@ def wrong_header(
     functions: Iterable[Prototype],
     constants: Mapping[str, int],
 ) -> str:
-    """Return the first number, index, name, limit or function unlike the manifest's; empty if none.
+    """Return the first number, index, name, limit, type or function unlike the manifest's; empty if none.
 
     constants: those of every robot of its kind, beside its own
     """
@@ -193,6 +194,7 @@ def wrong_header(
         or _wrong_table(manifest, directory, rows)
         or _wrong_joint(manifest, compiled.header)
         or _wrong_function(manifest.name, compiled.header, functions)
+        or wrong_type(manifest, compiled.header)
     )
 
 

@@ -7,6 +7,7 @@ from typing import Any, Generic, TypeVar
 from linkwise.check.answers import BackendAnswers, derivations
 from linkwise.check.as_generated import GeneratedFiles, check_files, check_import, check_texts
 from linkwise.check.compare import Result, skipped
+from linkwise.check.constant_checks import constant_calls
 from linkwise.check.constraint_checks import loop_calls
 from linkwise.check.formula_texts import check_formulas
 from linkwise.check.frame_checks import frame_calls
@@ -87,6 +88,11 @@ def _by_any(a: BackendAnswers) -> bool:
     return not a.is_c and not a.is_refused
 
 
+def _of_learned_links(a: BackendAnswers) -> bool:
+    """Return whether modules hold the numbers of rigid links, which may be learned."""
+    return a.way.backend == "autograd" and a.subject.tree is not None
+
+
 def _by_forms(a: BackendAnswers) -> bool:
     """Return whether calls composed of answers, which are checked for both kernels, are those of this one."""
     return _by_any(a) and a.way.kernel != "rule"
@@ -144,6 +150,12 @@ def _coefficients(name: str, a: BackendAnswers) -> Iterable[Result]:
     return against_reference(Named(name, a.model, a.subject.rows, a.subject.reference), a.subject.manifest)
 
 
+def _constants(name: str, a: BackendAnswers) -> Iterable[Result]:
+    s = a.subject
+    other = s.package.load(a.way.backend, s.parameters)
+    return constant_calls(name, other, s.manifest, there(s.tree), s.reference.states)
+
+
 def _graphs(name: str, a: BackendAnswers) -> Iterable[Result]:
     return [recorded_parts(Named(name, a.model, a.subject.rows, a.subject.reference))]
 
@@ -196,6 +208,7 @@ CHECKS: tuple[Check[Any], ...] = (
     Check("functions", BackendAnswers, lambda a: a.is_c, lambda _, a: a.of_c),
     Check("not called", BackendAnswers, lambda a: a.is_refused, _refused),
     Check("coefficients and torques", BackendAnswers, _by_any, _coefficients),
+    Check("other numbers of links", BackendAnswers, _of_learned_links, _constants),
     Check("recorded graphs", BackendAnswers, lambda a: a.way.backend == "autograd", _graphs),
     _called("sums over the links", _by_any, lambda name, a: sum_calls(name, a.model, a.subject.reference)),
     _called(
