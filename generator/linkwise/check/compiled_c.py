@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from linkwise.check.compare import IndexRows
 from linkwise.check.header_types import wrong_type
+from linkwise.check.table_numbers import wrong_numbers
 from linkwise.errors import LinkwiseError
 from linkwise.escape import identifiers
 from linkwise.package.manifest import Manifest
@@ -185,7 +186,7 @@ def wrong_header(
     functions: Iterable[Prototype],
     constants: Mapping[str, int],
 ) -> str:
-    """Return the first number, index, name, limit, type or function unlike the manifest's; empty if none.
+    """Return the first number, index, name, limit, type, function or table unlike the manifest's, or nothing.
 
     constants: those of every robot of its kind, beside its own
     """
@@ -195,6 +196,7 @@ def wrong_header(
         or _wrong_joint(manifest, compiled.header)
         or _wrong_function(manifest.name, compiled.header, functions)
         or wrong_type(manifest, compiled.header)
+        or _wrong_robot(manifest, directory)
     )
 
 
@@ -212,6 +214,13 @@ def _wrong_number(
         expected |= {"FRAMES": len(names)} | numbers
     wrong = sorted(set(expected.items()) ^ set(compiled.constants.items()))
     return f"{wrong[0][0]} is wrong" if wrong else ""
+
+
+def _wrong_robot(manifest: Manifest, directory: Path) -> str:
+    if manifest.tree is None:
+        return ""
+    text = (directory / "c" / f"{manifest.name}_tree.h").read_text(encoding="utf-8")
+    return wrong_numbers(manifest.tree, text)
 
 
 def _wrong_table(manifest: Manifest, directory: Path, rows: IndexRows) -> str:

@@ -1,5 +1,6 @@
 """Checks of the numbers that modules of rigid links hold, each changed, as where they are learned."""
 
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -23,8 +24,9 @@ CHANGED = 0.03
 def constant_calls(
     name: str, model: Dynamics, manifest: Manifest, tree: JointTree, states: States
 ) -> Iterator[Result]:
-    """Change all numbers of the modules of `model`, and hold torques and poses against a robot of these."""
+    """Hold the numbers of the modules of `model`, then change them all, and ask for torques and poses."""
     few, backend = states.at(slice(STATES)), model.backend
+    yield compare(f"{name}: numbers of links as the manifest has them", _numbers(tree, backend))
     changed = _changed(tree, backend)
     recursion, sizes = NewtonEuler(manifest, changed), Magnitudes(manifest, changed)
     q, qd, qdd = few.motion
@@ -45,6 +47,33 @@ def constant_calls(
         ),
     ]
     yield compare(f"{name}: other numbers of links against Newton-Euler recursion", entries)
+
+
+def _numbers(tree: JointTree, backend: Any) -> Iterator[Entries]:
+    """Yield the numbers that modules hold, some of which no torque tells, and the axes of their joints."""
+    carried = {link.joint for link in tree.links}
+    for j, (module, link) in enumerate(zip(backend.modules, tree.links, strict=True)):
+        joints = {key: tree.joints[joint].translation for joint, key in module.places.items()}
+        for key in module.constants:
+            held = getattr(module, key).numpy()
+            expected = np.array(joints[key] if key in joints else getattr(link, key))
+            yield Entries(f"{key} of {tree.link_name(j)}", held[None], expected[None], np.zeros(1))
+        chain = tree.chain(link.joint)
+        passed = chain[max((a + 1 for a, joint in enumerate(chain[:-1]) if joint in carried), default=0) :]
+        axes = [value for value in vars(sys.modules[type(module).__module__]).values() if _is_axes(value)]
+        turns = np.array([_rotation(value) for value in axes])
+        expected = np.array([tree.joints[joint].rotation for joint in passed])
+        yield Entries(f"axes of {tree.link_name(j)}", turns, expected, np.zeros(1))
+
+
+def _is_axes(value: object) -> bool:
+    """Return whether a name of a link's file stands for the axes of a joint; a package may carry the class."""
+    return type(value).__name__ == "Axes"
+
+
+def _rotation(axes: Any) -> list[list[float]]:
+    """Return R (3, 3) by R^T e of unit vectors e."""
+    return [[sign * at for sign, at in axes.along(unit)] for unit in np.eye(3)]
 
 
 def _changed(tree: JointTree, backend: Any) -> JointTree:
