@@ -309,6 +309,18 @@ WRONG = {
         '"mass": 0.6000001,',
         "autograd: Lagrangians against the energies",
     ),
+    "axes out of the plane": (
+        "energies/link_2.py",
+        "(0.0, 0.0, 1.0),\n)",
+        "(0.0, 1e-06, 1.0),\n)",
+        "autograd: numbers of links as",
+    ),
+    "a moment that no torque tells": (
+        "c/planar2_tree.h",
+        "{R(0.0), R(0.005), R(0.005), ",
+        "{R(1e-06), R(0.005), R(0.005), ",
+        "c: numbers, indices",
+    ),
     "text": ("formulas.txt", "588399*cos(q_1 + q_2)", "588399*cos(q_1 - q_2)", "formulas.txt: tau_ij"),
     "latex": ("formulas.tex", r"\frac{23 \ddot{q}_{2}}", r"\frac{23 \dot{q}_{2}}", "formulas.tex: tau_ij"),
     "last samples of a batch": (

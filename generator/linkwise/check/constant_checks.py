@@ -67,7 +67,7 @@ def _numbers(tree: JointTree, backend: Any) -> Iterator[Entries]:
 
 
 def _is_axes(value: object) -> bool:
-    """Return whether a name of a link's file stands for the axes of a joint; a package may carry the class."""
+    """Return whether a link's file has here the axes of a joint, of a class that a package may carry."""
     return type(value).__name__ == "Axes"
 
 
