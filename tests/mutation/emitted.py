@@ -18,13 +18,15 @@ import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.urdf_text import chain, joint, link, mimic, robot
-from linkwise import Options, check_package, generate, read_system, write_package
+from linkwise import Options, generate, read_system, write_package
+from linkwise.check import results_of
 from linkwise.emit.formulas import are_short
 from mutation.mutants import Mutant, Rules, mutants
 from mutation.verdicts import explained
@@ -96,8 +98,8 @@ def _prose(mutant: Mutant) -> bool:
 def caught(directory: Path, mutant: Mutant | None, seconds: int = 120) -> bool:
     """Return whether `check` refuses the package with this change, in a process of its own.
 
-    What takes more `seconds` of the processor, or ten times as long, is caught too. The parent may compute
-    nothing with torch: what it has forked could not.
+    It ends at the first result that says so. What takes more `seconds` of the processor, or ten times as
+    long, is caught too. The parent may compute nothing with torch: what it has forked could not.
     """
     with tempfile.TemporaryDirectory() as folder:
         changed = Path(folder) / directory.name
@@ -106,17 +108,21 @@ def caught(directory: Path, mutant: Mutant | None, seconds: int = 120) -> bool:
             damage(changed, mutant)
         child = os.fork()
         if child == 0:
+            os.setpgid(0, 0)
             resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
             signal.alarm(10 * seconds)
             with open(os.devnull, "w") as silence:
                 os.dup2(silence.fileno(), 1)
                 os.dup2(silence.fileno(), 2)
             try:
-                passed = not any(result.failed for result in check_package(changed, SAMPLES))
+                passed = not any(result.failed for result in results_of(changed, SAMPLES))
             except BaseException:
                 passed = False
             os._exit(0 if passed else 1)
-        return os.waitpid(child, 0)[1] != 0
+        status = os.waitpid(child, 0)[1]
+        with suppress(ProcessLookupError):  # what it began: after the first failure nobody waits for that
+            os.killpg(child, signal.SIGKILL)
+        return status != 0
 
 
 def damage(directory: Path, mutant: Mutant) -> None:
