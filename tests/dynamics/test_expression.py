@@ -51,6 +51,7 @@ def test_simplifications_are_these() -> None:
         (g.sub(g.zero, x), g.neg(x)),
         (g.sub(x, g.zero), x),
         (g.add(x, x), g.mul(two, x)),
+        (g.sub(x, g.sub(x, y)), y),
         (g.neg(g.neg(x)), x),
         (g.mul(x, g.const(-2.0)), g.neg(g.mul(two, x))),
         (g.mul(g.neg(x), g.neg(y)), g.mul(x, y)),

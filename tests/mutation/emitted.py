@@ -9,7 +9,6 @@ import argparse
 import hashlib
 import json
 import os
-import random
 import resource
 import shutil
 import signal
@@ -29,6 +28,7 @@ from linkwise import Options, generate, read_system, write_package
 from linkwise.check import results_of
 from linkwise.emit.formulas import are_short
 from mutation.mutants import Mutant, Rules, mutants
+from mutation.rooms import chance
 from mutation.verdicts import explained
 
 DATA = Path(__file__).parents[1] / "data"
@@ -77,17 +77,19 @@ def formula_mutants(directory: Path) -> list[Mutant]:
     found: list[Mutant] = []
     for pattern in FORMULAS:
         for path in sorted(directory.glob(pattern)):
-            found += mutants(path.relative_to(directory).as_posix(), path.read_text(), RULES)
-    return [one for one in found if not _prose(one)]
+            text = path.read_text()
+            every = mutants(path.relative_to(directory).as_posix(), text, RULES)
+            found += (mutant for mutant in every if not _prose(mutant, text[: mutant.start]))
+    return found
 
 
-def _prose(mutant: Mutant) -> bool:
-    """Return whether it changes no result: a head, when results pass the cache by, 0 · W, · W where W is
-    1."""
+def _prose(mutant: Mutant, before: str) -> bool:
+    """Return whether it changes no result: a head, when results pass the cache by, 0 · W, · W where W is 1.
+
+    before: the file up to there
+    """
     text = mutant.text
-    nothing = mutant.old == "*" and (
-        "_one(" in text or (mutant.place == 1 and text.partition("*")[0].endswith("[0 "))
-    )
+    nothing = mutant.old == "*" and ("_one(" in text or before.endswith("[0 "))
     if nothing or text.startswith("const int large ="):
         return True
     if mutant.path.startswith("formulas"):
@@ -135,13 +137,12 @@ def damage(directory: Path, mutant: Mutant) -> None:
 
 
 def sample(found: Sequence[Mutant], count: int, seed: int = 0) -> list[Mutant]:
-    """Some of the mutants: as many of each file as of any other, the same ones each time."""
-    chosen = random.Random(seed)
+    """Some of the mutants: as many of each file as of any other, drawn by a hash, as in the other sweep."""
     by_file: dict[str, list[Mutant]] = {}
     for mutant in found:
         by_file.setdefault(mutant.path, []).append(mutant)
     for group in by_file.values():
-        chosen.shuffle(group)
+        group.sort(key=lambda mutant: chance(f"{seed} {mutant.key}"))
     rounds = [group[k] for k in range(len(found)) for group in by_file.values() if k < len(group)]
     return rounds[:count]
 

@@ -226,8 +226,9 @@ def _by_chance(path: str) -> Iterator[tuple[str, list[Mutant]]]:
     for group in by_line.values():
         line = group[0].text
         seen[line] += 1
-        yield _chance(f"{path}: {line} {seen[line]}"), sorted(group, key=lambda mutant: _chance(mutant.key))
+        yield chance(f"{path}: {line} {seen[line]}"), sorted(group, key=lambda mutant: chance(mutant.key))
 
 
-def _chance(text: str) -> str:
+def chance(text: str) -> str:
+    """Hash by which a text is drawn before others."""
     return hashlib.sha256(text.encode()).hexdigest()

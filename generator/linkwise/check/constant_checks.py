@@ -52,18 +52,31 @@ def constant_calls(
 def _numbers(tree: JointTree, backend: Any) -> Iterator[Entries]:
     """Yield the numbers that modules hold, some of which no torque tells, and the axes of their joints."""
     carried = {link.joint for link in tree.links}
+    torch = extra("torch")
+    seen = backend.seen_by(torch.zeros(1, dtype=torch.float64))
+    # Of run-time parameters, and of merged bodies, numbers are summed from others as large as these.
+    length, mass = _longest(tree), max(abs(link.mass) for link in tree.links)
+    inertia = max(float(np.abs(link.inertia).max()) for link in tree.links)
+    sizes = (mass, length, inertia + mass * length**2)
     for j, (module, link) in enumerate(zip(backend.modules, tree.links, strict=True)):
-        joints = {key: tree.joints[joint].translation for joint, key in module.places.items()}
-        for key in module.constants:
-            held = getattr(module, key).numpy()
-            expected = np.array(joints[key] if key in joints else getattr(link, key))
-            yield Entries(f"{key} of {tree.link_name(j)}", held[None], expected[None], np.zeros(1))
+        body = zip(("mass", "com", "inertia"), module.body(seen), sizes, strict=True)
+        told = [(key, value, getattr(link, key), size) for key, value, size in body]
+        for joint, key in module.places.items():
+            told.append((key, seen.constants(module)[key], tree.joints[joint].translation, length))
+        for key, value, expected, size in told:
+            found = np.array(value, dtype=float)[None]
+            yield Entries(f"{key} of {tree.link_name(j)}", found, np.array(expected)[None], np.full(1, size))
         chain = tree.chain(link.joint)
         passed = chain[max((a + 1 for a, joint in enumerate(chain[:-1]) if joint in carried), default=0) :]
         axes = [value for value in vars(sys.modules[type(module).__module__]).values() if _is_axes(value)]
         turns = np.array([_rotation(value) for value in axes])
         expected = np.array([tree.joints[joint].rotation for joint in passed])
         yield Entries(f"axes of {tree.link_name(j)}", turns, expected, np.zeros(1))
+
+
+def _longest(tree: JointTree) -> float:
+    lengths = [*(joint.translation for joint in tree.joints), *(link.com for link in tree.links)]
+    return float(np.abs(lengths).max())
 
 
 def _is_axes(value: object) -> bool:
@@ -80,8 +93,7 @@ def _changed(tree: JointTree, backend: Any) -> JointTree:
     """Return the tree with other numbers, which the modules of a back end then hold too."""
     torch, generator = extra("torch"), np.random.default_rng(7)
     joints, links = list(tree.joints), list(tree.links)
-    lengths = [*(joint.translation for joint in joints), *(link.com for link in links)]
-    length = float(np.abs(lengths).max()) or 1.0
+    length = _longest(tree) or 1.0
 
     def moved(place: Any) -> Any:
         return tuple((np.array(place) + length * generator.uniform(-CHANGED, CHANGED, 3)).tolist())

@@ -136,11 +136,13 @@ class Graph:
         if a == self.zero:
             return self.neg(b)
         op_a, xa, _ = self.nodes[a]
-        op_b, xb, _ = self.nodes[b]
+        op_b, xb, yb = self.nodes[b]
         if op_a == "const" and op_b == "const":
             return self._fold(DECIMAL.subtract, a, b)
         if op_b == "neg":
             return self.add(a, xb)
+        if op_b == "sub" and xb == a:
+            return int(yb)
         if op_a == "neg":
             return self.neg(self.add(xa, b))
         if op_b == "const" and xb < 0.0:
