@@ -3,6 +3,7 @@
 python tests/mutation/emitted.py --out out/mutate [--each 40] [--only planar3]
 
 What survives is to be caught by a check, or listed in equivalents.json, by its package, with the reason.
+Verdicts are kept beside those of the other sweep, so that this one goes on where it stopped.
 """
 
 import argparse
@@ -15,7 +16,7 @@ import signal
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
@@ -27,6 +28,7 @@ from helpers.urdf_text import chain, joint, link, mimic, robot
 from linkwise import Options, generate, read_system, write_package
 from linkwise.check import results_of
 from linkwise.emit.formulas import are_short
+from linkwise.generator_fingerprint import fingerprint
 from mutation.mutants import Mutant, Rules, mutants
 from mutation.rooms import chance
 from mutation.verdicts import explained
@@ -158,25 +160,45 @@ def main() -> None:
     import torch.func  # noqa: F401  # loaded once, for all processes that are forked from this one
 
     options.out.mkdir(parents=True, exist_ok=True)
-    record, counts, reasons = [], Counter[tuple[str, bool]](), explained()
+    file, reasons, counts = options.out / "emitted.json", explained(), Counter[str]()
+    kept = json.loads(file.read_text()) if file.is_file() else {}
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(options.jobs) as pool:
         os.environ["LINKWISE_CACHE"] = folder
         for name in options.only:
             directory = package(name, Path(folder))
-            if caught(directory, None):
+            state = _state(directory)
+            drawn = {
+                f"{name}/{mutant.key}": mutant
+                for mutant in sample(formula_mutants(directory), options.each, options.seed)
+            }
+            asked = {key: mutant for key, mutant in drawn.items() if key not in reasons}
+            new = {key: mutant for key, mutant in asked.items() if kept.get(key, [""])[0] != state}
+            if new and caught(directory, None):
                 sys.exit(f"{name}: `linkwise check` refuses the package as it was generated")
-            drawn = sample(formula_mutants(directory), options.each, options.seed)
-            chosen = [one for one in drawn if f"{name}/{one.key}" not in reasons]
-            verdicts = pool.map(partial(caught, directory), chosen)
-            for mutant, killed in zip(chosen, verdicts, strict=True):
-                counts[name, killed] += 1
-                record.append({"package": name, "mutant": mutant.key, "caught": killed})
-                if not killed:
-                    print(f"survives: {name}/{mutant.key}", flush=True)
-            told = f"{len(drawn) - len(chosen)} change nothing"
-            print(f"{name}: {counts[name, True]} caught, {counts[name, False]} survive, {told}", flush=True)
-    (options.out / "emitted.json").write_text(json.dumps(record, indent=1))
-    sys.exit(any(not entry["caught"] for entry in record))
+            for key, verdict in zip(new, pool.map(partial(caught, directory), new.values()), strict=True):
+                kept[key] = state, verdict
+                file.write_text(json.dumps(kept, indent=1))
+            left = [key for key in asked if not kept[key][1]]
+            for key in left:
+                print(f"survives: {key}")
+            own = {
+                "caught": len(asked) - len(left),
+                "survive": len(left),
+                "explained": len(drawn) - len(asked),
+            }
+            print(f"{name}: {_told(own)}", flush=True)
+            counts.update(own)
+    print(f"{len(options.only)} packages: {_told(counts)}")
+    sys.exit(counts["survive"] > 0)
+
+
+def _told(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{counts[what]} {what}" for what in ("caught", "survive", "explained"))
+
+
+def _state(directory: Path) -> str:
+    """Hash of linkwise and of the package: a verdict counts for as long as both are the same."""
+    return hashlib.sha256((fingerprint() + (directory / "manifest.json").read_text()).encode()).hexdigest()
 
 
 if __name__ == "__main__":
