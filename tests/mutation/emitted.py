@@ -2,7 +2,8 @@
 
 python tests/mutation/emitted.py --out out/mutate [--each 40] [--only planar3]
 
-What survives is to be caught by a check, or listed in equivalents.json, by its package, with the reason.
+What survives is to be caught by a check, or listed in emitted.json, by its package, with the reason why
+nothing that is promised changes.
 Verdicts are kept beside those of the other sweep, so that this one goes on where it stopped.
 """
 
@@ -16,7 +17,7 @@ import signal
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
@@ -31,7 +32,6 @@ from linkwise.emit.formulas import are_short
 from linkwise.generator_fingerprint import fingerprint
 from mutation.mutants import Mutant, Rules, mutants
 from mutation.rooms import chance
-from mutation.verdicts import explained
 
 DATA = Path(__file__).parents[1] / "data"
 FORMULAS = (
@@ -40,6 +40,7 @@ FORMULAS = (
 )
 BACKENDS = ("numpy", "autograd", "c", "formulas")
 SAMPLES = 20
+EXPLAINED = Path(__file__).with_name("emitted.json")
 RULES = Rules(share=1e-6, names=True)
 """Constants change by a millionth of their own."""
 EVERY_JOINT = robot(
@@ -138,15 +139,15 @@ def damage(directory: Path, mutant: Mutant) -> None:
     manifest.write_text(json.dumps(data))
 
 
-def sample(found: Sequence[Mutant], count: int, seed: int = 0) -> list[Mutant]:
+def sample(found: Mapping[str, Mutant], count: int, seed: int = 0) -> dict[str, Mutant]:
     """Some of the mutants: as many of each file as of any other, drawn by a hash, as in the other sweep."""
-    by_file: dict[str, list[Mutant]] = {}
-    for mutant in found:
-        by_file.setdefault(mutant.path, []).append(mutant)
+    by_file: dict[str, list[str]] = {}
+    for key, mutant in found.items():
+        by_file.setdefault(mutant.path, []).append(key)
     for group in by_file.values():
-        group.sort(key=lambda mutant: chance(f"{seed} {mutant.key}"))
-    rounds = [group[k] for k in range(len(found)) for group in by_file.values() if k < len(group)]
-    return rounds[:count]
+        group.sort(key=lambda key: chance(f"{seed} {found[key].key}"))
+    rounds = [keys[k] for k in range(len(found)) for keys in by_file.values() if k < len(keys)]
+    return {key: found[key] for key in rounds[:count]}
 
 
 def main() -> None:
@@ -160,17 +161,17 @@ def main() -> None:
     import torch.func  # noqa: F401  # loaded once, for all processes that are forked from this one
 
     options.out.mkdir(parents=True, exist_ok=True)
-    file, reasons, counts = options.out / "emitted.json", explained(), Counter[str]()
+    file, counts = options.out / "emitted.json", Counter[str]()
+    reasons = json.loads(EXPLAINED.read_text())
     kept = json.loads(file.read_text()) if file.is_file() else {}
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(options.jobs) as pool:
         os.environ["LINKWISE_CACHE"] = folder
         for name in options.only:
             directory = package(name, Path(folder))
             state = _state(directory)
-            drawn = {
-                f"{name}/{mutant.key}": mutant
-                for mutant in sample(formula_mutants(directory), options.each, options.seed)
-            }
+            found = {f"{name}/{mutant.key}": mutant for mutant in formula_mutants(directory)}
+            drawn = sample(found, options.each, options.seed)
+            gone = [key for key in reasons if key.startswith(f"{name}/") and key not in found]
             asked = {key: mutant for key, mutant in drawn.items() if key not in reasons}
             new = {key: mutant for key, mutant in asked.items() if kept.get(key, [""])[0] != state}
             if new and caught(directory, None):
@@ -179,9 +180,10 @@ def main() -> None:
                 kept[key] = state, verdict
                 file.write_text(json.dumps(kept, indent=1))
             left = [key for key in asked if not kept[key][1]]
-            for key in left:
-                print(f"survives: {key}")
+            for told, keys in (("survives", left), ("explained, and no such text any more", gone)):
+                print(*(f"{told}: {key}\n" for key in keys), sep="", end="")
             own = {
+                "gone": len(gone),
                 "caught": len(asked) - len(left),
                 "survive": len(left),
                 "explained": len(drawn) - len(asked),
@@ -189,7 +191,7 @@ def main() -> None:
             print(f"{name}: {_told(own)}", flush=True)
             counts.update(own)
     print(f"{len(options.only)} packages: {_told(counts)}")
-    sys.exit(counts["survive"] > 0)
+    sys.exit(counts["survive"] + counts["gone"] > 0)
 
 
 def _told(counts: Mapping[str, int]) -> str:
