@@ -316,6 +316,12 @@ WRONG = {
         "(0.0, 1e-06, 1.0),\n)",
         "autograd: numbers of links as",
     ),
+    "place out of the plane": (
+        "energies/link_2.py",
+        '"place": (0.25, 0.0, 0.0)',
+        '"place": (0.25, 0.0, 1e-06)',
+        "autograd: numbers of links as",
+    ),
     "a moment that no torque tells": (
         "c/planar2_tree.h",
         "{R(0.0), R(0.005), R(0.005), ",
