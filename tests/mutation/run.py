@@ -29,7 +29,7 @@ from mutation.mutants import Mutant
 from mutation.reach import Map
 from mutation.rooms import ROOMS, drawn, test_files
 from mutation.tree import ROOT, Tree, load_heavy, say
-from mutation.verdicts import Record, explained, scores, table, written
+from mutation.verdicts import Record, explained, scores, table, total, written
 
 PAGE = ROOT / "docs/trust.md"
 Item = TypeVar("Item")
@@ -135,7 +135,7 @@ def main() -> None:
     found = scores(Record(options.out / "survived.json"), options.only)
     report = "\n".join([table(found), *(f"- {key}" for score in found for key in score.survivors)]) + "\n"
     (options.out / "mutants.md").write_text(report, encoding="utf-8")
-    print(report)
+    print(report + total(found))
     sys.exit(not whole or any(score.survivors for score in found))
 
 

@@ -220,6 +220,14 @@ def table(found: Sequence[Score]) -> str:
     return HEAD + "".join(score.row for score in found)
 
 
+def total(found: Sequence[Score]) -> str:
+    """The scores in a line."""
+    mutants, caught = sum(score.mutants for score in found), sum(score.caught for score in found)
+    left, reasons = sum(len(score.survivors) for score in found), sum(score.equivalent for score in found)
+    told = f"{caught:,} caught, {left} survive, {reasons} explained"
+    return f"{mutants:,} changes in {len(found)} rooms: {told}"
+
+
 def written(page: str, found: Sequence[Score]) -> str:
     """The page with the table in its place."""
     before, _, rest = page.partition(MARK)
