@@ -1,9 +1,9 @@
 """Checks of the numbers that modules of rigid links hold, each changed, as where they are learned."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from linkwise_runtime.dynamics import Dynamics
@@ -16,6 +16,7 @@ from linkwise.oracle.newton_euler import NewtonEuler
 from linkwise.oracle.states import States
 from linkwise.package.manifest import Manifest
 
+BODY = ("mass", "com", "inertia")
 STATES = 4
 CHANGED = 0.03
 """Most that a mass or an inertia changes, of its own, and a place, of the longest one, or of 1 m."""
@@ -25,8 +26,12 @@ def constant_calls(
     name: str, model: Dynamics, manifest: Manifest, tree: JointTree, states: States
 ) -> Iterator[Result]:
     """Hold the numbers of the modules of `model`, then change them all, and ask for torques and poses."""
-    few, backend = states.at(slice(STATES)), model.backend
-    yield compare(f"{name}: numbers of links as the manifest has them", _numbers(tree, backend))
+    few, backend = states.at(slice(STATES)), cast(Any, model.backend)
+    told = f"{name}: numbers of links as the manifest has them"
+    if wrong := [j for j, module in enumerate(backend.modules) if not _are_placed(module, _passed(tree, j))]:
+        yield Result(told, False, None, f"places of {tree.link_name(wrong[0])} are not those of its joints")
+        return
+    yield compare(told, _numbers(tree, backend))
     changed = _changed(tree, backend)
     recursion, sizes = NewtonEuler(manifest, changed), Magnitudes(manifest, changed)
     q, qd, qdd = few.motion
@@ -51,7 +56,6 @@ def constant_calls(
 
 def _numbers(tree: JointTree, backend: Any) -> Iterator[Entries]:
     """Yield the numbers that modules hold, some of which no torque tells, and the axes of their joints."""
-    carried = {link.joint for link in tree.links}
     torch = extra("torch")
     seen = backend.seen_by(torch.zeros(1, dtype=torch.float64))
     # Of run-time parameters, and of merged bodies, numbers are summed from others as large as these.
@@ -59,24 +63,40 @@ def _numbers(tree: JointTree, backend: Any) -> Iterator[Entries]:
     inertia = max(float(np.abs(link.inertia).max()) for link in tree.links)
     sizes = (mass, length, inertia + mass * length**2)
     for j, (module, link) in enumerate(zip(backend.modules, tree.links, strict=True)):
-        body = zip(("mass", "com", "inertia"), module.body(seen), sizes, strict=True)
+        body, held = zip(BODY, module.body(seen), sizes, strict=True), module.constants
         told = [(key, value, getattr(link, key), size) for key, value, size in body]
         for joint, key in module.places.items():
             told.append((key, seen.constants(module)[key], tree.joints[joint].translation, length))
         for key, value, expected, size in told:
-            found = np.array(value, dtype=float)[None]
-            yield Entries(f"{key} of {tree.link_name(j)}", found, np.array(expected)[None], np.full(1, size))
-        chain = tree.chain(link.joint)
-        passed = chain[max((a + 1 for a, joint in enumerate(chain[:-1]) if joint in carried), default=0) :]
+            found, own = np.array(_plain(value))[None], np.array(expected)[None]
+            yield Entries(f"{key} of {tree.link_name(j)}", found, own, np.full(1, key not in held and size))
+        passed = _passed(tree, j)
         axes = [value for value in vars(sys.modules[type(module).__module__]).values() if _is_axes(value)]
         turns = np.array([_rotation(value) for value in axes])
         expected = np.array([tree.joints[joint].rotation for joint in passed])
         yield Entries(f"axes of {tree.link_name(j)}", turns, expected, np.zeros(1))
 
 
+def _plain(value: Any) -> Any:
+    """Return numbers, nested, of which some may be tensors."""
+    return [_plain(item) for item in value] if isinstance(value, Sequence) else float(value)
+
+
 def _longest(tree: JointTree) -> float:
     lengths = [*(joint.translation for joint in tree.joints), *(link.com for link in tree.links)]
     return float(np.abs(lengths).max())
+
+
+def _passed(tree: JointTree, j: int) -> tuple[int, ...]:
+    """Return the joints between link j and the link that carries it."""
+    carried, chain = {link.joint for link in tree.links}, tree.chain(tree.links[j].joint)
+    return chain[max((a + 1 for a, joint in enumerate(chain[:-1]) if joint in carried), default=0) :]
+
+
+def _are_placed(module: Any, passed: Sequence[int]) -> bool:
+    """Return whether each place that a module holds is that of one of its own joints."""
+    held = [key for key in module.constants if key not in BODY]
+    return sorted(module.places.values()) == sorted(held) and {*module.places} <= {*passed}
 
 
 def _is_axes(value: object) -> bool:
@@ -110,7 +130,7 @@ def _changed(tree: JointTree, backend: Any) -> JointTree:
         for joint, key in module.places.items():
             at = moved(joints[joint].translation)
             joints[joint] = replace(joints[joint], translation=held(module, key, at))
-        ways = {"mass": scaled, "com": moved, "inertia": scaled}
+        ways = dict(zip(BODY, (scaled, moved, scaled), strict=True))
         own = {
             key: held(module, key, change(getattr(links[j], key)))
             for key, change in ways.items()

@@ -14,6 +14,7 @@ from linkwise.arrays import Array
 
 PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Places of an inertia's six numbers, in the order of C."""
+NUMBER = re.compile(r"\bR\((-?[\d.e+-]+)\)")
 ROUNDING = 1e-12
 """Largest relative difference: of a parameter's own value a formula may be rounded otherwise."""
 
@@ -42,9 +43,12 @@ def wrong_numbers(tree: JointTree, text: str) -> str:
 
 
 def _written(text: str, kind: str) -> Array:
-    """Return the numbers of one table, in order."""
-    body = re.search(rf"\bown_{kind} = \{{(.*?)\n\}};", text, re.DOTALL)
-    return np.array([float(number) for number in re.findall(r"\bR\(([^()]*)\)", body[1] if body else "")])
+    """Return the numbers of one table, in order; none where anything but numbers stands there."""
+    code = re.sub(r"/\*.*?\*/", " ", text, flags=re.DOTALL)
+    body = re.search(rf"\bown_{kind} = \{{(.*?)\n\}};", code, re.DOTALL)
+    if not body or NUMBER.sub("", body[1]).strip("{}, \n"):
+        return np.array([])
+    return np.array([float(number) for number in NUMBER.findall(body[1])])
 
 
 def _flat(rows: Iterable[Iterable[float]]) -> list[float]:
