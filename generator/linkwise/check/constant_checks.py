@@ -30,8 +30,8 @@ def constant_calls(
     told = f"{name}: numbers of links as the manifest has them"
     if wrong := [j for j, module in enumerate(backend.modules) if not _are_placed(module, _passed(tree, j))]:
         yield Result(told, False, None, f"places of {tree.link_name(wrong[0])} are not those of its joints")
-        return
-    yield compare(told, _numbers(tree, backend))
+    else:
+        yield compare(told, _numbers(tree, backend))
     changed = _changed(tree, backend)
     recursion, sizes = NewtonEuler(manifest, changed), Magnitudes(manifest, changed)
     q, qd, qdd = few.motion
