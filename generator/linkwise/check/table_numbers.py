@@ -11,9 +11,8 @@ import numpy as np
 from linkwise_runtime.rule.joint_tree import JointTree
 
 from linkwise.arrays import Array
+from linkwise.check.parametric_tree import MOMENTS
 
-PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-"""Places of an inertia's six numbers, in the order of C."""
 NUMBER = re.compile(r"\bR\((-?[\d.e+-]+)\)")
 ROUNDING = 1e-12
 """Largest relative difference: of a parameter's own value a formula may be rounded otherwise."""
@@ -29,7 +28,7 @@ def wrong_numbers(tree: JointTree, text: str) -> str:
     bodies = [
         number
         for link in tree.links
-        for number in (link.mass, *link.com, *(link.inertia[i][k] for i, k in PRODUCTS))
+        for number in (link.mass, *link.com, *(link.inertia[i][k] for i, k in MOMENTS))
     ]
     expected = {
         "numbers": [*joints, *bodies, *tree.gravity],
